@@ -1,0 +1,28 @@
+/* Arena memory: many allocations, one free. Two uses: the world's memory (grows at load, freed whole) and a step's
+ * scratch (a fixed block, emptied after every step, so that a step never calls the heap).
+ * Thread: an arena belongs to one thread at a time. */
+#ifndef PAL_BASE_ARENA_H
+#define PAL_BASE_ARENA_H
+#include "server/base/err.h"
+
+#include <stdbool.h>
+
+typedef struct pal_arena pal_arena;
+
+/* growing arena (grows = true: takes further blocks of at least n_byte from the heap) or fixed arena (one block of
+ * n_byte, touched here, so that a step meets no page fault); NULL: out of memory. [load] */
+pal_arena *pal_arena_create(size_t n_byte, bool grows);
+void pal_arena_destroy(pal_arena *arena); /* NULL is fine */
+
+/* n_byte zeroed bytes at a multiple of 64, valid until reset or destroy; NULL: full or out of memory. n_byte 0 gives a
+ * valid pointer that must not be read. */
+void *pal_arena_take(pal_arena *arena, size_t n_byte);
+/* zeroed array of n_item items of n_byte; NULL also when the product overflows */
+void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte);
+#define PAL_NEW(arena, type, n) ((type *)pal_arena_array((arena), (size_t)(n), sizeof(type)))
+
+/* bytes handed out since the last reset, with padding; a fixed arena's mark and return for nested scratch */
+size_t pal_arena_used(const pal_arena *arena);
+void pal_arena_reset(pal_arena *arena);               /* fixed arenas only: empty again */
+void pal_arena_return(pal_arena *arena, size_t used); /* fixed arenas only: back to an earlier pal_arena_used */
+#endif

@@ -1,0 +1,34 @@
+/* Monotonic time and pacing on POSIX clocks. */
+#include "server/base/clock.h"
+
+#include <errno.h>
+#include <time.h>
+
+static uint64_t read_ns(clockid_t clock)
+{
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
+
+uint64_t pal_clock_ns(void)
+{
+    return read_ns(CLOCK_MONOTONIC);
+}
+
+uint64_t pal_clock_thread_ns(void)
+{
+    return read_ns(CLOCK_THREAD_CPUTIME_ID);
+}
+
+double pal_clock_s(void)
+{
+    return 1e-9 * (double)pal_clock_ns();
+}
+
+void pal_clock_sleep_until_ns(uint64_t when)
+{
+    struct timespec t = {.tv_sec = (time_t)(when / 1000000000u), .tv_nsec = (long)(when % 1000000000u)};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, 0) == EINTR) {
+    }
+}

@@ -1,0 +1,44 @@
+/* The error table as text. */
+#include "server/base/err.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const char *const names[] = {
+#define X(code, text) #code,
+    PAL_ERR_TABLE(X)
+#undef X
+};
+static const char *const texts[] = {
+#define X(code, text) text,
+    PAL_ERR_TABLE(X)
+#undef X
+};
+
+const char *pal_err_name(pal_err err)
+{
+    return (unsigned)err < PAL_ERR_COUNT ? names[err] : "UNKNOWN";
+}
+
+const char *pal_err_text(pal_err err)
+{
+    return (unsigned)err < PAL_ERR_COUNT ? texts[err] : "unknown error code";
+}
+
+pal_err pal_note_set(pal_note *note, pal_err err, const char *format, ...)
+{
+    if (note) {
+        va_list args;
+        va_start(args, format);
+        vsnprintf(note->text, sizeof note->text, format, args);
+        va_end(args);
+    }
+    return err;
+}
+
+void pal_assert_failed(const char *condition, const char *file, int line)
+{
+    fprintf(stderr, "%s:%d: assertion failed: %s\n", file, line, condition);
+    abort();
+}

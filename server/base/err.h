@@ -1,0 +1,56 @@
+/* The error table: one code per thing the caller may do about it.
+ *
+ * Every fallible function returns pal_err, 0 is success, and writes its results only on success. A function that has
+ * more to say than its code takes a pal_note, which may be NULL: one sentence that names the file, entry and number.
+ * Thread: any. */
+#ifndef PAL_BASE_ERR_H
+#define PAL_BASE_ERR_H
+#include <stddef.h>
+
+/*  code, what the caller may conclude */
+#define PAL_ERR_TABLE(X)                                                                                               \
+    X(OK, "ok")                                                                                                        \
+    X(REFUSED, "input refused, nothing changed")                                                                       \
+    X(MEMORY, "out of memory, nothing changed")                                                                        \
+    X(IO, "file or socket failed, nothing changed")                                                                    \
+    X(FULL, "queue full, try again later")                                                                             \
+    X(STATE, "not possible in this state, nothing changed")                                                            \
+    X(BUDGET, "asks for more than the stated budget, nothing changed")                                                 \
+    X(NUMERIC, "no usable number came out, nothing changed")                                                           \
+    X(FROZEN, "a body diverged and was frozen")                                                                        \
+    X(INTERNAL, "a mistake of ours")
+
+typedef enum pal_err {
+#define X(code, text) PAL_ERR_##code,
+    PAL_ERR_TABLE(X)
+#undef X
+        PAL_ERR_COUNT
+} pal_err;
+
+/* name ("REFUSED") and sentence of a code; never NULL */
+const char *pal_err_name(pal_err err);
+const char *pal_err_text(pal_err err);
+
+/* one sentence for people, without a line end */
+typedef struct pal_note {
+    char text[512];
+} pal_note;
+
+/* writes the sentence (cut at the buffer's end) unless note is NULL, and returns err: return pal_note_set(note,
+ * PAL_ERR_REFUSED, ...) */
+pal_err pal_note_set(pal_note *note, pal_err err, const char *format, ...) __attribute__((format(printf, 3, 4)));
+
+#define PAL_TRY(call)                                                                                                  \
+    do {                                                                                                               \
+        pal_err pal_try_err = (call);                                                                                  \
+        if (pal_try_err) return pal_try_err;                                                                           \
+    } while (0)
+
+/* our own mistakes only, never bytes, files or flags; off in Release */
+#ifdef NDEBUG
+#define PAL_ASSERT(condition) ((void)0)
+#else
+#define PAL_ASSERT(condition) ((condition) ? (void)0 : pal_assert_failed(#condition, __FILE__, __LINE__))
+#endif
+_Noreturn void pal_assert_failed(const char *condition, const char *file, int line);
+#endif

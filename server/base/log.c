@@ -1,0 +1,35 @@
+/* The log writes one line with one call, so that lines of several threads never mix. */
+#include "server/base/log.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+static pal_log_level most_detailed = PAL_LOG_INFO;
+static pal_log_handler current_handler;
+static void *current_user;
+
+void pal_log_set_level(pal_log_level most)
+{
+    most_detailed = most;
+}
+
+void pal_log_set_handler(pal_log_handler handler, void *user)
+{
+    current_handler = handler;
+    current_user = user;
+}
+
+void pal_log(pal_log_level level, const char *event, const char *format, ...)
+{
+    static const char *const names[] = {"error", "warn", "info", "debug"};
+    char text[1024];
+    va_list args;
+    if (level > most_detailed) return;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    if (current_handler)
+        current_handler(level, event, text, current_user);
+    else
+        fprintf(stderr, "%s %s: %s\n", names[level], event, text);
+}

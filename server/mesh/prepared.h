@@ -1,0 +1,32 @@
+/* The prepared mesh: everything about a body that is computed once from its surface and read at every start.
+ * One file, little-endian, sections with counts and a checksum; loading never trusts a count or an index.
+ * Thread: [load]. */
+#ifndef PAL_MESH_PREPARED_H
+#define PAL_MESH_PREPARED_H
+#include "server/mesh/skin.h"
+#include "server/mesh/surface.h"
+#include "server/mesh/tets.h"
+#include "server/mesh/voxels.h"
+
+typedef struct pal_prepared {
+    pal_surface surface; /* what is shown                                    */
+    pal_tets tets;       /* what is simulated, same origin_m as the surface  */
+    pal_skin skin;       /* surface on tets                                  */
+} pal_prepared;
+
+typedef struct pal_prepare_report {
+    pal_voxel_report voxel;
+    int64_t n_voxel;     /* kept, border included                          */
+    double volume_m3;    /* of the tetrahedra                              */
+    double volume_error; /* inside voxels over the surface's volume, - 1; 0 when the surface is open */
+    double split_s, skin_s;
+} pal_prepare_report;
+
+/* surface -> voxels -> tets -> skin; copies the surface; one error names the step */
+pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
+                          pal_prepare_report *report, pal_note *note);
+void pal_prepared_free(pal_prepared *prepared);
+pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_note *note);
+pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_note *note);
+pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out, pal_note *note);
+#endif

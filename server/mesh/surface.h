@@ -1,0 +1,60 @@
+/* Triangle surfaces at rest: positions, triangles, welding and cleaning, adjacency, measures.
+ *
+ * A pal_surface owns its arrays (heap); pal_surface_free frees them. Positions are metres relative to origin_m, which
+ * is subtracted in double precision while reading, so that a body far from the file's origin keeps its accuracy.
+ * Triangles are counter-clockwise seen from outside when the file means them so. Thread: [load]. */
+#ifndef PAL_MESH_SURFACE_H
+#define PAL_MESH_SURFACE_H
+#include "server/base/err.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct pal_surface {
+    int n_vertex, n_tri;
+    double *x;          /* position relative to origin_m, m     [n_vertex][3] */
+    int32_t *tri;       /* vertex indices                       [n_tri][3]    */
+    double origin_m[3]; /* file position (in m) = x + origin_m                */
+} pal_surface;
+
+/* what reading and cleaning dropped or joined; all counts of the file's own pieces */
+typedef struct pal_surface_report {
+    char format[16];                   /* "obj", "stl binary", "stl ascii", "ply", "off", "nifti", "inr"         */
+    int64_t n_vertex_read, n_tri_read; /* as stored; polygons count as their triangles                           */
+    int64_t n_welded;                  /* vertices joined to an earlier one                                      */
+    int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */
+    int64_t n_nonfinite;               /* triangles dropped because a corner is NaN or infinite                  */
+    int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
+} pal_surface_report;
+
+/* frees the arrays and zeroes the struct; a zeroed struct is fine */
+void pal_surface_free(pal_surface *surface);
+/* deep copy; MEMORY */
+pal_err pal_surface_copy(const pal_surface *from, pal_surface *to);
+
+/* Joins vertices closer than tolerance (relative to the bounding-box diagonal; 0: equal positions only), drops
+ * degenerate, duplicate and non-finite triangles and unused vertices, recentres on the box centre, and adds the counts
+ * to report. In place. REFUSED when no triangle is left, MEMORY. */
+pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_note *note);
+
+/* axis-aligned box; diagonal = |high - low| */
+void pal_surface_box(const pal_surface *surface, double low_m[3], double high_m[3]);
+double pal_surface_area(const pal_surface *surface);   /* m^2 */
+double pal_surface_volume(const pal_surface *surface); /* signed, m^3: meaningful for closed surfaces */
+
+/* triangles around each vertex as sparse rows: start [n_vertex+1], item [3 n_tri]; the caller frees both; MEMORY */
+pal_err pal_surface_fans(const pal_surface *surface, int32_t **start, int32_t **item);
+
+/* edge-connected components: label of each triangle [n_tri] (caller's memory), number out; MEMORY */
+pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *n_component);
+
+/* topology facts for reports: edges with one, with more than two triangles, and run through twice the same way */
+typedef struct pal_surface_topology {
+    int n_open_edge, n_crowded_edge, n_flipped_edge;
+    bool closed, manifold, oriented;
+} pal_surface_topology;
+pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out);
+
+/* area-weighted unit vertex normals [n_vertex][3] (caller's memory); a vertex without area gets zero */
+void pal_surface_normals(const pal_surface *surface, double *normal);
+#endif

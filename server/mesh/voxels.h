@@ -1,0 +1,47 @@
+/* Surface -> voxels -> tetrahedra (paper B 2.2): flood fill of the voxels whose centres lie inside, one layer of border
+ * voxels kept outside, five tetrahedra per voxel with mirrored parity.
+ *
+ * Departures from the paper: seeds in every component, not one; closed input is filled by scanline parity with a
+ * half-open edge rule (the same voxels as ray flood fill, found sooner); open, inside-out, self-intersecting, doubled
+ * or nested input is decided by a vote of the three axes and, where they disagree too often, by the winding number.
+ * Thread: [load]. */
+#ifndef PAL_MESH_VOXELS_H
+#define PAL_MESH_VOXELS_H
+#include "server/mesh/surface.h"
+#include "server/mesh/tets.h"
+
+typedef struct pal_voxel_options {
+    int resolution;     /* voxels on the longest axis, 1..1024                                            */
+    bool border;        /* keep the one layer of border voxels outside (paper B); false: inside only      */
+    bool largest_only;  /* keep only the largest face-connected component                                 */
+    int64_t most_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
+    const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
+} pal_voxel_options;
+
+typedef struct pal_voxels {
+    int n[3];           /* grid size, x fastest                                                */
+    double h_m;         /* voxel edge                                                          */
+    double low_m[3];    /* corner of voxel (0,0,0), relative to origin_m                       */
+    double origin_m[3]; /* as in the surface                                                   */
+    uint8_t *kind;      /* 0 outside, 1 border, 2 inside                       [n2][n1][n0]    */
+    int64_t n_inside, n_border;
+} pal_voxels;
+
+typedef struct pal_voxel_report {
+    char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
+    int n_component;          /* face-connected components of inside voxels                        */
+    int64_t n_disagree;       /* voxels on which the three axes disagreed                          */
+    double surface_volume_m3; /* by the divergence theorem; 0 when the surface is open             */
+    double inside_volume_m3;  /* inside voxels                                                     */
+    double tree_s, fill_s;    /* time for the box tree (0: not built) and for the fill             */
+} pal_voxel_report;
+
+/* REFUSED with numbers when no volume is meant (flat sheet, single triangle, nothing inside), BUDGET, MEMORY */
+pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
+                        pal_voxel_report *report, pal_note *note);
+void pal_voxels_free(pal_voxels *voxels);
+
+/* five tetrahedra per kept voxel, vertices shared, nodes ordered so that neighbours in space are near in memory,
+ * boundary faces oriented and surface nodes tagged. Peak memory <= 120 bytes per tetrahedron. MEMORY */
+pal_err pal_voxels_split(const pal_voxels *voxels, pal_tets *out);
+#endif

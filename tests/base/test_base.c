@@ -1,0 +1,182 @@
+/* The base room: arenas, mailbox, queue, error table. */
+#include "server/base/arena.h"
+#include "server/base/clock.h"
+#include "server/base/err.h"
+#include "server/base/ring.h"
+#include "server/base/trio.h"
+#include "server/base/vec3.h"
+#include "tests/check.h"
+
+#include <pthread.h>
+#include <stdint.h>
+
+static void every_error_has_name_and_text(void)
+{
+    for (int e = 0; e < PAL_ERR_COUNT; e++) CHECK(strlen(pal_err_name(e)) > 0 && strlen(pal_err_text(e)) > 0);
+    CHECK_TEXT(pal_err_name(PAL_ERR_REFUSED), "REFUSED");
+    CHECK_TEXT(pal_err_name((pal_err)999), "UNKNOWN");
+}
+
+static void note_is_cut_at_its_end(void)
+{
+    pal_note note;
+    char longer[2000];
+    memset(longer, 'x', sizeof longer - 1);
+    longer[sizeof longer - 1] = 0;
+    CHECK_INT(pal_note_set(&note, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
+    CHECK_INT(strlen(note.text), sizeof note.text - 1);
+    CHECK_INT(pal_note_set(NULL, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
+}
+
+static void arena_gives_zeroed_aligned_bytes_and_refuses_overflow(void)
+{
+    pal_arena *arena = pal_arena_create(1000, true);
+    REQUIRE(arena);
+    for (int i = 0; i < 100; i++) {
+        uint8_t *bytes = pal_arena_take(arena, 177);
+        REQUIRE(bytes && (uintptr_t)bytes % 64 == 0);
+        int sum = 0;
+        for (int k = 0; k < 177; k++) sum += bytes[k];
+        CHECK_INT(sum, 0);
+        memset(bytes, 255, 177);
+    }
+    CHECK(!pal_arena_array(arena, SIZE_MAX / 2, 3));
+    CHECK(!pal_arena_take(arena, SIZE_MAX));
+    pal_arena_destroy(arena);
+}
+
+static void fixed_arena_refuses_beyond_its_size_and_empties(void)
+{
+    pal_arena *arena = pal_arena_create(256, false);
+    REQUIRE(arena);
+    CHECK(pal_arena_take(arena, 200));
+    CHECK(!pal_arena_take(arena, 1));
+    pal_arena_reset(arena);
+    CHECK_INT(pal_arena_used(arena), 0);
+    size_t mark = pal_arena_used(arena);
+    CHECK(pal_arena_take(arena, 64));
+    pal_arena_return(arena, mark);
+    uint8_t *again = pal_arena_take(arena, 256);
+    CHECK(again && again[0] == 0);
+    pal_arena_destroy(arena);
+}
+
+/* the value is written twice, so that a torn read shows */
+typedef struct pair {
+    uint64_t a, b;
+} pair;
+enum { HANDED = 200000 };
+
+static void *write_trio(void *user)
+{
+    pal_trio *trio = user;
+    for (uint64_t i = 1; i <= HANDED; i++) {
+        pair *slot = pal_trio_slot(trio);
+        slot->a = slot->b = i;
+        pal_trio_publish(trio);
+    }
+    return NULL;
+}
+
+static void trio_hands_over_newest_untorn_in_order(void)
+{
+    pair slots[3] = {{0}};
+    pal_trio trio;
+    pthread_t writer;
+    pal_trio_init(&trio, &slots[0], &slots[1], &slots[2]);
+    CHECK(!pal_trio_take(&trio));
+    REQUIRE(pthread_create(&writer, NULL, write_trio, &trio) == 0);
+    uint64_t last = 0, torn = 0, back = 0;
+    while (last < HANDED) {
+        pair *p = pal_trio_take(&trio);
+        if (!p) continue;
+        torn += p->a != p->b;
+        back += p->a <= last;
+        last = p->a;
+    }
+    pthread_join(writer, NULL);
+    CHECK_INT(torn, 0);
+    CHECK_INT(back, 0);
+    CHECK(!pal_trio_take(&trio));
+}
+
+typedef struct sender {
+    pal_ring *ring;
+    uint32_t id;
+} sender;
+
+static void *fill_ring(void *user)
+{
+    sender *s = user;
+    for (uint32_t i = 0; i < 20000; i++) {
+        uint32_t item[2] = {s->id, i};
+        while (pal_ring_put(s->ring, item)) {
+        }
+    }
+    return NULL;
+}
+
+static void ring_keeps_every_item_of_every_writer_in_order(void)
+{
+    pal_ring *ring = pal_ring_create(64, 8);
+    pthread_t thread[3];
+    sender who[3];
+    REQUIRE(ring);
+    for (uint32_t i = 0; i < 3; i++) {
+        who[i] = (sender){ring, i};
+        REQUIRE(pthread_create(&thread[i], NULL, fill_ring, &who[i]) == 0);
+    }
+    uint32_t next[3] = {0}, item[2], wrong = 0;
+    for (int taken = 0; taken < 60000;) {
+        if (!pal_ring_get(ring, item)) continue;
+        wrong += item[0] > 2 || item[1] != next[item[0]]++;
+        taken++;
+    }
+    for (int i = 0; i < 3; i++) pthread_join(thread[i], NULL);
+    CHECK_INT(wrong, 0);
+    CHECK(!pal_ring_get(ring, item));
+    pal_ring_destroy(ring);
+}
+
+static void full_ring_refuses(void)
+{
+    pal_ring *ring = pal_ring_create(4, 4);
+    uint32_t item = 7;
+    REQUIRE(ring);
+    for (int i = 0; i < 4; i++) CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_OK);
+    CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_FULL);
+    CHECK(pal_ring_get(ring, &item));
+    CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_OK);
+    pal_ring_destroy(ring);
+}
+
+static void quaternion_turns_like_its_matrix(void)
+{
+    /* a quarter turn about z takes x to y */
+    double q[4] = {sqrt(0.5), 0, 0, sqrt(0.5)}, r[3];
+    pal_quat_rotate(r, q, (double[3]){1, 0, 0});
+    CHECK_NEAR(r[0], 0, 1e-15);
+    CHECK_NEAR(r[1], 1, 1e-15);
+    CHECK_NEAR(r[2], 0, 1e-15);
+}
+
+static void clock_sleeps_until_the_time_asked(void)
+{
+    uint64_t when = pal_clock_ns() + 3000000;
+    pal_clock_sleep_until_ns(when);
+    CHECK(pal_clock_ns() >= when);
+}
+
+int main(void)
+{
+    RUN(every_error_has_name_and_text);
+    RUN(note_is_cut_at_its_end);
+    RUN(arena_gives_zeroed_aligned_bytes_and_refuses_overflow);
+    RUN(fixed_arena_refuses_beyond_its_size_and_empties);
+    RUN(trio_hands_over_newest_untorn_in_order);
+    RUN(ring_keeps_every_item_of_every_writer_in_order);
+    RUN(full_ring_refuses);
+    RUN(quaternion_turns_like_its_matrix);
+    RUN(clock_sleeps_until_the_time_asked);
+    return check_report();
+}

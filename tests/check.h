@@ -1,0 +1,102 @@
+/* The test harness: a test file is a list of sentences, run in order in one process.
+ *
+ *     static void restores_volume_after_squeeze(void) { CHECK_NEAR(volume, 1.0, 1e-3); }
+ *     int main(void) { RUN(restores_volume_after_squeeze); return check_report(); }
+ *
+ * A failed check prints file, line and the numbers, marks the test failed and goes on. check_report prints
+ * "N passed, N failed" (tests, not checks) and is the exit code. A test that ran no check counts as failed.
+ * check_shared(path) gives the path of a file of ../shared (environment PAL_SHARED, default ../shared) or NULL after
+ * saying that the test is left out because it is not there. */
+#ifndef TESTS_CHECK_H
+#define TESTS_CHECK_H
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static int check_passed, check_failed, check_count;
+static bool check_bad;
+
+#define CHECK_FAIL(...)                                                                                                \
+    do {                                                                                                               \
+        printf("  %s:%d: ", __FILE__, __LINE__);                                                                       \
+        printf(__VA_ARGS__);                                                                                           \
+        printf("\n");                                                                                                  \
+        check_bad = true;                                                                                              \
+    } while (0)
+#define CHECK(condition)                                                                                               \
+    do {                                                                                                               \
+        check_count++;                                                                                                 \
+        if (!(condition)) CHECK_FAIL("%s", #condition);                                                                \
+    } while (0)
+/* |a - b| <= tolerance, absolute; NaN fails */
+#define CHECK_NEAR(a, b, tolerance)                                                                                    \
+    do {                                                                                                               \
+        double check_a = (a), check_b = (b), check_t = (tolerance);                                                    \
+        check_count++;                                                                                                 \
+        if (!(fabs(check_a - check_b) <= check_t))                                                                     \
+            CHECK_FAIL("%s = %.9g, wanted %.9g +- %.3g", #a, check_a, check_b, check_t);                               \
+    } while (0)
+/* a <= b; NaN fails */
+#define CHECK_LE(a, b)                                                                                                 \
+    do {                                                                                                               \
+        double check_a = (a), check_b = (b);                                                                           \
+        check_count++;                                                                                                 \
+        if (!(check_a <= check_b)) CHECK_FAIL("%s = %.9g, wanted <= %.9g", #a, check_a, check_b);                      \
+    } while (0)
+#define CHECK_INT(a, b)                                                                                                \
+    do {                                                                                                               \
+        long long check_a = (long long)(a), check_b = (long long)(b);                                                  \
+        check_count++;                                                                                                 \
+        if (check_a != check_b) CHECK_FAIL("%s = %lld, wanted %lld", #a, check_a, check_b);                            \
+    } while (0)
+#define CHECK_TEXT(a, b)                                                                                               \
+    do {                                                                                                               \
+        const char *check_a = (a), *check_b = (b);                                                                     \
+        check_count++;                                                                                                 \
+        if (!check_a || strcmp(check_a, check_b))                                                                      \
+            CHECK_FAIL("%s = \"%s\", wanted \"%s\"", #a, check_a ? check_a : "(null)", check_b);                       \
+    } while (0)
+/* stops the test function when the rest would make no sense */
+#define REQUIRE(condition)                                                                                             \
+    do {                                                                                                               \
+        check_count++;                                                                                                 \
+        if (!(condition)) {                                                                                            \
+            CHECK_FAIL("%s (test given up here)", #condition);                                                         \
+            return;                                                                                                    \
+        }                                                                                                              \
+    } while (0)
+#define RUN(test)                                                                                                      \
+    do {                                                                                                               \
+        check_bad = false;                                                                                             \
+        check_count = 0;                                                                                               \
+        test();                                                                                                        \
+        if (check_count == 0) check_bad = true;                                                                        \
+        printf("%s %s (%d checks)\n", check_bad ? "FAIL" : "ok  ", #test, check_count);                                \
+        fflush(stdout);                                                                                                \
+        if (check_bad)                                                                                                 \
+            check_failed++;                                                                                            \
+        else                                                                                                           \
+            check_passed++;                                                                                            \
+    } while (0)
+
+static inline int check_report(void)
+{
+    printf("%d passed, %d failed\n", check_passed, check_failed);
+    return check_failed > 0;
+}
+
+static inline const char *check_shared(const char *path)
+{
+    static char full[4][1024];
+    static int turn;
+    char *buffer = full[turn++ & 3];
+    const char *root = getenv("PAL_SHARED");
+    snprintf(buffer, 1024, "%s/%s", root ? root : "../shared", path);
+    if (access(buffer, R_OK) == 0) return buffer;
+    printf("  left out: %s is not there\n", buffer);
+    return NULL;
+}
+#endif
