@@ -1,0 +1,69 @@
+/* A scene as plain structs: what the world is built from. pal_scene_default gives the defaults; the scene room fills
+ * it from a file, tests fill it by hand. All SI. The scene borrows its prepared meshes: they must live as long as every
+ * world made from it. Thread: [load]. */
+#ifndef PAL_SIM_DEF_H
+#define PAL_SIM_DEF_H
+#include "server/mesh/prepared.h"
+#include "server/sim/item.h"
+#include "server/sim/tools.h"
+
+enum { PAL_NAME = 48, PAL_BODY_MAX = 8, PAL_ROW_ITEMS = 16, PAL_SUPPORT_MAX = 8 };
+
+/* isotropic material of a body; defaults: soft abdominal tissue */
+typedef struct pal_material {
+    double young_Pa;      /* 5000           */
+    double poisson;       /* 0.45; above 0.4999 is clamped with a message */
+    double density_kg_m3; /* 1000           */
+    double damping_1_s;   /* 4: viscous damping rate c/m of the row `viscous`; 0: no such row */
+} pal_material;
+
+/* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), or the lowest
+ * fraction of the body's height along `up` */
+typedef struct pal_support {
+    bool lowest;     /* true: `fraction`, false: the box */
+    double fraction; /* 0.05                              */
+    double low_m[3], high_m[3];
+} pal_support;
+
+typedef struct pal_body_def {
+    char name[PAL_NAME];
+    const pal_prepared *mesh; /* borrowed                                                        */
+    pal_material material;
+    pal_item model;  /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
+    pal_item solver; /* name: "verlet"; empty name: the model's own choice               */
+    pal_item output; /* "skin_out" (default) or "surface_out"                            */
+    int n_support;
+    pal_support support[PAL_SUPPORT_MAX];
+    int n_effect; /* gravity, tool_push, tool_grab, finite_guard, viscous ...         */
+    pal_item effect[PAL_ROW_ITEMS];
+} pal_body_def;
+
+typedef struct pal_tool_def {
+    char name[PAL_NAME]; /* "probe 1"                                      */
+    double radius_m;     /* 0: 4 % of the first body's box diagonal         */
+    double force_cap_N;  /* most force the tool may exert or feel; 15       */
+} pal_tool_def;
+
+typedef struct pal_scene {
+    char name[PAL_NAME]; /* session name, [a-z0-9_-]                                  */
+    char title[128];     /* shown to people: "Liver, abdominal CT"                    */
+    char source[256];    /* where the organ comes from and its licence, shown as well */
+    double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
+    double up[3];        /* unit, against gravity: (0, 0, 1)                          */
+    double gravity_m_s2; /* 9.81 times the item `gravity`'s presence                  */
+    int most_substep;    /* budget of sub-steps per step, refused beyond: 2000        */
+    int n_body;
+    pal_body_def body[PAL_BODY_MAX];
+    int n_tool;
+    pal_tool_def tool[PAL_TOOL_MAX];
+} pal_scene;
+
+/* an empty scene with defaults, and a body with defaults: material above, model tet_springs, output skin_out, lowest
+ * 5 % held, effects gravity, tool_push, tool_grab, finite_guard */
+void pal_scene_default(pal_scene *scene);
+void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh);
+/* the three tools of a scene that names none */
+void pal_tools_default(pal_scene *scene, int n_tool);
+/* REFUSED names the entry: no body, bad numbers, two bodies of one name, tool radius, step outside [1e-4, 0.1] s */
+pal_err pal_scene_check(const pal_scene *scene, pal_note *note);
+#endif

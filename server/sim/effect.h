@@ -1,0 +1,74 @@
+/* Effects: one physical or service term, one file in effects/ or solvers/. A row is an effect bound to a body. The plan
+ * is the ordered list of rows that a scene calls for; what a scene does not call for has no row, memory or branch.
+ *
+ * Order of a step: for every sub-step CONTACT rows, then SOLVE (which calls pal_gather, and that the FORCE rows, as
+ * often as it likes); then once ADAPT, GUARD and OUTPUT rows. The number of sub-steps is
+ * ceil(step / limit of the SOLVE rows), so that a step may be any length.
+ * Effect files include this header and mesh or num headers, never world.h and never each other. */
+#ifndef PAL_SIM_EFFECT_H
+#define PAL_SIM_EFFECT_H
+#include "server/sim/body.h"
+#include "server/sim/def.h"
+#include "server/sim/item.h"
+#include "server/sim/tools.h"
+
+typedef enum pal_stage {
+    PAL_STAGE_CONTACT,
+    PAL_STAGE_FORCE,
+    PAL_STAGE_SOLVE,
+    PAL_STAGE_ADAPT,
+    PAL_STAGE_GUARD,
+    PAL_STAGE_OUTPUT,
+    PAL_STAGE_COUNT
+} pal_stage;
+
+typedef struct pal_row pal_row;
+
+/* all that a row may touch in a step */
+typedef struct pal_step {
+    pal_body *body;
+    pal_tools *tools;
+    pal_arena *scratch; /* fixed; emptied after every sub-step       */
+    pal_row *force;     /* this body's FORCE rows          [n_force] */
+    int n_force;
+    double dt_s;    /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT */
+    double time_s;  /* at its end                                                         */
+    int sub, n_sub; /* this sub-step's number and how many there are                      */
+} pal_step;
+
+/* what make may use: everything that exists at load */
+typedef struct pal_build {
+    const pal_scene *scene;
+    const pal_body_def *def;
+    pal_body *body;
+    pal_arena *arena;    /* world memory                                                     */
+    size_t scratch_byte; /* a row raises it to the scratch it needs in a sub-step            */
+    pal_note *note;      /* may be NULL                                                      */
+} pal_build;
+
+typedef struct pal_effect {
+    const char *name; /* as written in scene files */
+    pal_stage stage;
+    /* reads and checks the item's keys (pal_item_done at the end), allocates self from build->arena. [load] */
+    pal_err (*make)(pal_item *item, pal_build *build, void **self);
+    /* FORCE rows add to body->f, CONTACT rows to body->load and the tools' forces. [sim] */
+    pal_err (*run)(void *self, pal_step *step);
+    /* optional, NULL when there is nothing to do or say */
+    double (*energy)(void *self, const pal_body *body); /* J; run = -gradient of it (tests)                          */
+    void (*stiffness)(void *self, const pal_body *body, double *bound_N_m); /* += Gershgorin row sums [n_dof], eq. of
+                                                                               numerics.md 1 B                        */
+    double (*limit)(void *self, pal_step *step); /* SOLVE: largest stable sub-step, s, at the current state         */
+    pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note); /* live edit */
+    void (*reset)(void *self, const pal_body *body); /* the body is back at rest                                      */
+} pal_effect;
+
+struct pal_row {
+    const pal_effect *effect;
+    void *self;
+    uint64_t spent_ns; /* in the last step; FORCE rows inside SOLVE are counted on their own and not in SOLVE */
+    size_t n_byte;     /* memory it took at load                                                              */
+};
+
+/* f = load, then every FORCE row adds, then g = f for held-free dofs (rows see held nodes too); [sim] */
+pal_err pal_gather(pal_step *step);
+#endif

@@ -1,0 +1,47 @@
+/* What a step shows: copied out of the world, float metres in the scene frame, safe to read on another thread.
+ * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. */
+#ifndef PAL_SIM_FRAME_H
+#define PAL_SIM_FRAME_H
+#include "server/sim/def.h"
+#include "server/sim/tools.h"
+
+enum { PAL_FRAME_ROWS = 64 };
+
+typedef struct pal_frame_part {
+    int n_vertex;
+    float *position_m; /* [n_vertex][3] */
+    uint64_t revision; /* of the topology these positions belong to */
+    bool frozen;
+} pal_frame_part;
+
+typedef struct pal_frame_tool {
+    bool present, touching, holding;
+    pal_pose pose;     /* newest used, with its seq and stamp            */
+    uint64_t pose_ns;  /* pal_clock_ns when that pose came in            */
+    double force_N[3]; /* on the tool, mean over the step                */
+    double radius_m;
+    int n_patch;
+    pal_patch patch[PAL_PATCH_MAX];
+    bool has_grip;
+    double grip_x0_m[3], grip_f0_N[3], grip_k_N_m[6], grip_b_Ns_m;
+} pal_frame_tool;
+
+typedef struct pal_frame {
+    uint64_t tick;    /* steps since create or reset; equal ticks may differ in tools or status */
+    double time_s;    /* simulated                                                              */
+    uint64_t end_ns;  /* pal_clock_ns at the end of the step                                     */
+    uint64_t step_ns; /* processor time of the step                                              */
+    int n_substep;
+    /* filled by the session */
+    bool paused;
+    double slowdown;    /* real over simulated time, 1: in time (mean over the last second)        */
+    uint64_t n_late;    /* steps that began late                                                   */
+    uint64_t n_refused; /* poses and commands refused                                              */
+    int n_part;
+    pal_frame_part part[PAL_BODY_MAX];
+    int n_tool;
+    pal_frame_tool tool[PAL_TOOL_MAX];
+    int n_row;
+    uint32_t row_ns[PAL_FRAME_ROWS]; /* of the last step, in the plan's order */
+} pal_frame;
+#endif

@@ -1,0 +1,58 @@
+/* The world: bodies and plan, one step function. No threads, no heap in a step, no files. Deterministic: the same
+ * scene, poses and commands at the same ticks give the same hash on any machine with IEEE doubles.
+ *
+ * Scene frame: metres, origin at the first body's mesh origin; the others are offset by the difference of their
+ * meshes' origin_m. Poses and frames use it. */
+#ifndef PAL_SIM_WORLD_H
+#define PAL_SIM_WORLD_H
+#include "server/sim/body.h"
+#include "server/sim/frame.h"
+
+typedef struct pal_world pal_world;
+
+/* one row of the plan, for people and the panel */
+typedef struct pal_row_info {
+    const char *name, *body, *stage;
+    size_t n_byte;
+    uint64_t spent_ns; /* last step */
+} pal_row_info;
+
+/* shown surface of a part; pointers borrow from the world and its scene and do not change while revision is the same */
+typedef struct pal_shown {
+    const char *name;
+    int n_vertex, n_tri;
+    const float *rest_m; /* scene frame             [n_vertex][3] */
+    const int32_t *tri;  /* counter-clockwise       [n_tri][3]    */
+    uint64_t revision;
+} pal_shown;
+
+pal_err pal_world_create(const pal_scene *scene, pal_note *note,
+                         pal_world **out); /* [load] borrows scene's meshes, copies the rest */
+void pal_world_destroy(pal_world *world);  /* [load] */
+
+/* the pose a tool shall have at the end of the next step; NULL: let go. REFUSED (state untouched) for a number that is
+ * not finite, a position farther than 100 body sizes, a tool that does not exist. [sim] */
+pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
+/* moves on by dt_s (split into equal sub-steps); FROZEN when a body diverged in this step and was frozen. [sim] */
+pal_err pal_world_step(pal_world *world, double dt_s);
+/* every body back to rest, tools let go, time 0. [sim] */
+void pal_world_reset(pal_world *world);
+/* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
+pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
+
+pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
+void pal_frame_destroy(pal_frame *frame);
+void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
+uint64_t pal_world_hash(const pal_world *world); /* [sim] of tick, x and v of every body (FNV-1a over the bits) */
+
+int pal_world_rows(const pal_world *world);
+void pal_world_row(const pal_world *world, int row, pal_row_info *out);
+int pal_world_parts(const pal_world *world);
+void pal_world_shown(const pal_world *world, int part, pal_shown *out);
+double pal_world_limit_s(const pal_world *world); /* largest stable sub-step of the last step */
+int pal_world_substeps(const pal_world *world);
+/* for tests, tools and the lab: the bodies themselves [sim] */
+int pal_world_bodies(const pal_world *world);
+pal_body *pal_world_body(pal_world *world, int body);
+const pal_tools *pal_world_tools(const pal_world *world);
+#endif
