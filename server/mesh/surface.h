@@ -51,6 +51,7 @@ pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *
 /* topology facts for reports: edges with one, with more than two triangles, and run through twice the same way */
 typedef struct pal_surface_topology {
     int n_open_edge, n_crowded_edge, n_flipped_edge;
+    int n_crowded_vertex; /* vertices with more than one fan of triangles */
     bool closed, manifold, oriented;
 } pal_surface_topology;
 pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out);
