@@ -1,0 +1,34 @@
+/* The network side of a server: one loop, one hub, the websocket road with the viewer's files, the mem road for tests.
+ * All of it runs on the one [net] thread that calls pal_server_run. */
+#ifndef PAL_NET_SERVER_H
+#define PAL_NET_SERVER_H
+#include "server/session/session.h"
+
+typedef struct pal_server pal_server;
+
+typedef struct pal_server_options {
+    const char *listen; /* "127.0.0.1"; any other address needs allow_remote                         */
+    int port;           /* 8090; 0: any free port, see pal_server_port                               */
+    bool allow_remote;
+    const char *viewer_folder; /* files served at /; NULL: none                                             */
+    double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
+    int most_clients;          /* 0: 200                                                                    */
+    const char *road;          /* "ws" (default) or "mem" (tests)                                           */
+} pal_server_options;
+
+/* REFUSED: address needs allow_remote, port in use (the sentence names it); borrows sessions until close. [load] */
+pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_note *note,
+                        pal_server **out);
+/* the wake callback that sessions are opened with: user is a pal_server_gate, made before the sessions because they
+ * start before the server exists; waking an unconnected gate does nothing */
+typedef struct pal_server_gate pal_server_gate;
+pal_server_gate *pal_server_gate_create(void);
+void pal_server_gate_destroy(pal_server_gate *gate);
+void pal_server_gate_wake(void *gate);                              /* [any] */
+void pal_server_connect(pal_server *server, pal_server_gate *gate); /* [load] */
+
+pal_err pal_server_run(pal_server *server); /* returns after pal_server_stop; this thread is [net] */
+void pal_server_stop(pal_server *server);   /* [any], also from a signal handler's thread */
+int pal_server_port(const pal_server *server);
+void pal_server_close(pal_server *server); /* [load] */
+#endif

@@ -1,0 +1,64 @@
+/* Scenes from files: JSON -> pal_scene and the prepared meshes it names. Every error names file and entry path
+ * ("scene.json: bodies[0].material.young_Pa: ..."); an unknown key is an error. Thread: [load].
+ *
+ * {
+ *   "name": "liver", "title": "Liver, abdominal CT", "source": "...", "step_s": 0.0166667,
+ *   "up": [0, 0, 1],
+ *   "bodies": [{
+ *     "name": "liver", "mesh": "liver.palmesh"            (relative to the scene file; or "surface": "x.stl" with
+ *                                                          "units": "mm", "resolution": 24, prepared at load)
+ *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
+ *     "model": {"name": "tet_springs", "k_distance_J": ...},
+ *     "solver": {"name": "verlet"}, "output": {"name": "skin_out"},
+ *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}}],
+ *     "effects": [{"name": "gravity"}, {"name": "tool_push", ...}, {"name": "tool_grab"}, {"name": "finite_guard"}]
+ *   }],
+ *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]
+ * }
+ * Absent keys take the defaults of pal_scene_default and pal_body_default. */
+#ifndef PAL_SCENE_SCENE_FILE_H
+#define PAL_SCENE_SCENE_FILE_H
+#include "server/sim/def.h"
+
+/* a scene with the meshes it owns; the address of `scene` stays */
+typedef struct pal_loaded_scene {
+    pal_scene scene;
+    pal_prepared mesh[PAL_BODY_MAX];
+    int n_mesh;
+} pal_loaded_scene;
+
+/* at most 1 MiB of JSON, depth 16; *out is freed with pal_scene_free. IO, REFUSED, MEMORY */
+pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note);
+/* folder: where relative mesh names are looked up; name: used in messages */
+pal_err pal_scene_parse(const char *name, const char *json, size_t n_byte, const char *folder, pal_loaded_scene **out,
+                        pal_note *note);
+void pal_scene_free(pal_loaded_scene *scene);
+/* how a bare surface or label volume is turned into a scene */
+typedef struct pal_surface_scene {
+    double unit_m;      /* 0: guess                                            */
+    int resolution;     /* 0: about 13,000 tetrahedra                          */
+    int label;          /* of a label volume; < 0: the most frequent           */
+    int target_tri;     /* shown triangles of a label volume's surface; 50,000 */
+    pal_material material; /* young_Pa 0: the default material                 */
+    void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
+    void *user;
+} pal_surface_scene;
+
+typedef struct pal_surface_scene_report {
+    pal_surface_report surface;
+    pal_prepare_report prepare;
+    double unit_m;
+    const char *unit_name;     /* "mm", "m", "given", ... */
+    double read_s;
+    int resolution;
+} pal_surface_scene_report;
+
+/* any surface file or label volume -> default scene: material, lowest 5 % held, three tools. report may be NULL */
+pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
+                               pal_surface_scene_report *report, pal_note *note);
+/* our own procedural organ as a scene, for when nothing else can be had */
+pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
+                             pal_note *note);
+/* writes DIR/scene.json and DIR/NAME.palmesh for every body; creates DIR; IO */
+pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
+#endif

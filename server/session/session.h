@@ -1,0 +1,61 @@
+/* A session: one world with a simulation thread, pacing and members.
+ *
+ * Pacing: steps are due at absolute times, one per scene step_s. A step that is too slow makes simulated time slow
+ * down: the next step is due at once, missed steps are dropped, never queued; the frame says by how much (slowdown) and
+ * how often (n_late). Input never queues up: a tool's newest pose wins.
+ * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
+ * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback. No heap call after
+ * open until close. */
+#ifndef PAL_SESSION_SESSION_H
+#define PAL_SESSION_SESSION_H
+#include "server/sim/world.h"
+
+typedef struct pal_session pal_session;
+
+typedef enum pal_command_kind {
+    PAL_COMMAND_PAUSE,
+    PAL_COMMAND_RESUME,
+    PAL_COMMAND_STEP, /* one step while paused */
+    PAL_COMMAND_RESET,
+    PAL_COMMAND_MATERIAL, /* body, material        */
+    PAL_COMMAND_COUNT
+} pal_command_kind;
+
+typedef struct pal_command {
+    pal_command_kind kind;
+    int body;
+    pal_material material;
+} pal_command;
+
+typedef struct pal_session_options {
+    double lease_s; /* 0: 0.25                                                                   */
+    bool start_paused;
+    bool unpaced;             /* step as fast as possible (tests, replay); frames are still newest-wins    */
+    void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: nobody     */
+    void *user;
+    const char *record_path; /* write the input log there (replay.h); NULL: do not                        */
+} pal_session_options;
+
+/* builds the world and starts the thread; borrows the scene (and its meshes) until close. [load] */
+pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_note *note, pal_session **out);
+void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
+
+const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
+/* the plan and the shown parts: constant while the session lives (this release). [any] */
+int pal_session_rows(const pal_session *session);
+void pal_session_row(const pal_session *session, int row, pal_row_info *out); /* spent_ns is 0: see frames */
+int pal_session_parts(const pal_session *session);
+void pal_session_shown(const pal_session *session, int part, pal_shown *out);
+
+/* newest pose of a tool; latest wins, never waits; NULL lets go. REFUSED: not finite, out of reach, no such tool.
+ * One thread at a time per tool. [net] */
+pal_err pal_session_put_pose(pal_session *session, int tool, const pal_pose *pose);
+/* taken between two steps. FULL when 64 are waiting; REFUSED for an unknown kind, body or material. [any] */
+pal_err pal_session_command(pal_session *session, const pal_command *command);
+/* newest unseen frame or NULL; valid until the next call. One reader. [net] */
+const pal_frame *pal_session_take_frame(pal_session *session);
+/* did the thread tick in the last second (or is it paused)? for /healthz [any] */
+bool pal_session_alive(const pal_session *session);
+/* last thing that went wrong in a command (a refused material), "" when nothing; copies. [any] */
+void pal_session_last_note(pal_session *session, pal_note *out);
+#endif
