@@ -1,0 +1,55 @@
+/* Configuration of a server: defaults < file < environment < flags.
+ *
+ * The file is one JSON object with the keys below (deploy/palpate.json is an example); the environment variable of a
+ * key is PALPATE_ and the key in capitals (PALPATE_ALLOW_REMOTE=true); the flag is the key with dashes
+ * (--allow-remote). An unknown key, an unknown PALPATE_ variable and a value out of range are errors that name where
+ * they stand. Thread: [load]. */
+#ifndef PAL_CONFIG_H
+#define PAL_CONFIG_H
+#include "server/base/err.h"
+#include "server/base/log.h"
+
+#include <stdbool.h>
+
+enum { PAL_CONFIG_TEXT = 256 };
+
+typedef struct pal_config {
+    char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
+    int port;                     /* 8090; 0: any free port                                              */
+    bool allow_remote;            /* false: only loopback addresses may be listened on                   */
+    char viewer[PAL_CONFIG_TEXT]; /* folder of the page's files; "": the one beside the program          */
+    double error_m;               /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
+    int most_clients;             /* 200                                                                 */
+    char lcm[PAL_CONFIG_TEXT];    /* LCM URL: start palpate-lcm with it; "": no LCM                      */
+    char log[8];                  /* "error" | "warn" | "info" | "debug"; info                           */
+    char record[PAL_CONFIG_TEXT]; /* write the input log there; "": do not                               */
+} pal_config;
+
+typedef enum pal_setting_kind {
+    PAL_SETTING_TEXT,
+    PAL_SETTING_BOOL,
+    PAL_SETTING_INT,
+    PAL_SETTING_NUMBER
+} pal_setting_kind;
+/* one key, for manuals and checks */
+typedef struct pal_setting {
+    const char *key, *value; /* "allow_remote"; word for its value in a manual */
+    pal_setting_kind kind;
+    size_t offset, n_byte; /* place in pal_config; bytes of a text */
+    double low, high;
+    const char *help;
+} pal_setting;
+
+const pal_setting *pal_config_settings(int *n);
+void pal_config_default(pal_config *config);
+/* reads a file over what is there; REFUSED names file and key, IO. All or nothing. */
+pal_err pal_config_file(pal_config *config, const char *path, pal_note *note);
+/* the same from memory: name is used in messages */
+pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_note *note);
+/* every PALPATE_ variable of environ-like list (NULL-terminated "KEY=value" texts); PALPATE_CONFIG is left out: it is
+ * the file to read when there is no --config. All or nothing. */
+pal_err pal_config_environment(pal_config *config, char *const *variable, pal_note *note);
+/* one key from text; where ("--port", "PALPATE_PORT") is used in messages */
+pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_note *note);
+pal_log_level pal_config_log_level(const pal_config *config);
+#endif
