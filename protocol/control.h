@@ -1,0 +1,170 @@
+/* The text messages of palpate.v1: one JSON object each, `type` says which (README.md, "Control").
+ *
+ * Structs on this side, JSON on the wire, no JSON type in between. pal_control_get reads untrusted text: size, nesting,
+ * number of values, UTF-8 and every field are checked; unknown keys are ignored (that is how the protocol grows),
+ * unknown types are refused. Strings are UTF-8, zero terminated, without control characters; pal_control_put
+ * refuses what pal_control_get would refuse. Both directions exist in C because the bridge, palpate-lcm
+ * and the trainee are clients. Thread: any. */
+#ifndef PAL_PROTOCOL_CONTROL_H
+#define PAL_PROTOCOL_CONTROL_H
+#include "protocol/refusal.h"
+#include "protocol/wire.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define PAL_CONTROL_IN_MAX   4096  /* bytes of a text message from a client */
+#define PAL_CONTROL_OUT_MAX  65536 /* bytes of a text message from the server */
+#define PAL_WIRE_NAME_BYTES  64
+#define PAL_WIRE_TEXT_BYTES  256
+#define PAL_WIRE_ROW_MAX     64
+#define PAL_WIRE_MEMBER_MAX  256
+#define PAL_WIRE_MEMBER_NAME 32
+#define PAL_WIRE_ARG_MAX     8
+#define PAL_WIRE_TOOL_ANY    (-1)
+#define PAL_WIRE_TOOL_NONE   (-2)
+
+/* X(NAME, "type in JSON", from server) */
+#define PAL_CONTROL_TABLE(X)                                                                                           \
+    X(HELLO, "hello", true)       /* first message of the server after join                          */                \
+    X(TOPOLOGY, "topology", true) /* parts changed: new epochs and assets                            */                \
+    X(STATUS, "status", true)     /* 2-4 Hz                                                          */                \
+    X(MEMBERS, "members", true)   /* on every change: who is here, who holds which tool              */                \
+    X(ERROR, "error", true)       /* a request was refused, the connection stays                     */                \
+    X(PONG, "pong", true)         /* answer to ping                                                  */                \
+    X(JOIN, "join", false)        /* first message of a client                                       */                \
+    X(COMMAND, "command", false)  /* pause, resume, step, reset, material ...                        */                \
+    X(TAKE, "take", false)        /* take a tool                                                     */                \
+    X(LEAVE, "leave", false)      /* give the own tool back                                          */                \
+    X(PING, "ping", false)        /* round trip                                                      */
+
+typedef enum pal_control_type {
+#define X(name, text, from_server) PAL_CONTROL_##name,
+    PAL_CONTROL_TABLE(X)
+#undef X
+        PAL_CONTROL_COUNT
+} pal_control_type;
+
+typedef enum pal_wire_role {
+    PAL_WIRE_ROLE_VIEWER,
+    PAL_WIRE_ROLE_TRAINEE,
+    PAL_WIRE_ROLE_INSTRUCTOR,
+    PAL_WIRE_ROLE_COUNT
+} pal_wire_role;
+/* "viewer", "trainee", "instructor"; never NULL */
+const char *pal_wire_role_name(pal_wire_role role);
+
+typedef struct pal_wire_part_info {
+    char name[PAL_WIRE_NAME_BYTES];
+    uint32_t epoch;
+    uint32_t n_vertex, n_triangle;
+    char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
+    double error_m;                  /* bound per axis of its frames in normal use */
+} pal_wire_part_info;                /* its place in the array is its part index   */
+typedef struct pal_wire_topology {
+    uint32_t n_part;
+    pal_wire_part_info part[PAL_WIRE_PART_MAX];
+} pal_wire_topology;
+
+typedef struct pal_wire_tool_info {
+    char name[PAL_WIRE_NAME_BYTES]; /* e.g. "probe" */
+    double radius_m;
+} pal_wire_tool_info;
+typedef struct pal_wire_hello {
+    uint32_t version; /* PAL_PROTOCOL_VERSION                                        */
+    char session[PAL_WIRE_NAME_BYTES];
+    char title[PAL_WIRE_TEXT_BYTES]; /* for people                                                  */
+    char organ[PAL_WIRE_TEXT_BYTES]; /* which organ this is and where from: "liver, abdominal CT"   */
+    double step_rate_hz, frame_rate_hz;
+    uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
+    double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
+    uint32_t n_part, n_tool, n_row;
+    pal_wire_part_info part[PAL_WIRE_PART_MAX];
+    pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
+    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
+    uint16_t you_id;                                 /* member id, > 0                                              */
+    pal_wire_role you_role;
+    char you_name[PAL_WIRE_MEMBER_NAME];
+    int you_tool; /* tool given, or PAL_WIRE_TOOL_NONE                                */
+} pal_wire_hello;
+
+typedef struct pal_wire_status {
+    uint64_t tick; /* steps done                                                     */
+    double sim_time_s;
+    bool paused, frozen; /* frozen: a body diverged, `reset` brings it back                */
+    double step_rate_hz; /* measured, wall clock                                           */
+    double slowdown;     /* wall time / simulated time while running; 1 = real time        */
+    uint32_t substeps;
+    double step_ms; /* mean time of one step                                          */
+    uint32_t n_row;
+    double row_ms[PAL_WIRE_ROW_MAX]; /* mean time of each row of the plan in one step           */
+    uint32_t n_member;
+    double bytes_s;                 /* sent by the server to this member, bytes per second            */
+    double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
+    uint32_t n_skipped;             /* cycles not sent to this member because it had no credit, total */
+    uint64_t n_late;                /* steps that began late                                          */
+    uint64_t n_refused;             /* poses and commands refused by the session                      */
+    char note[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
+} pal_wire_status;
+
+typedef struct pal_wire_member {
+    uint16_t id;
+    pal_wire_role role;
+    int tool;        /* PAL_WIRE_TOOL_NONE when it holds none */
+    uint32_t colour; /* 0xRRGGBB                         */
+    char name[PAL_WIRE_MEMBER_NAME];
+} pal_wire_member;
+typedef struct pal_wire_members {
+    uint32_t n_member;
+    pal_wire_member member[PAL_WIRE_MEMBER_MAX];
+} pal_wire_members;
+
+typedef struct pal_wire_problem {
+    char code[PAL_WIRE_NAME_BYTES]; /* one word: "role", "tool_taken", "budget", "verb" ... */
+    char text[PAL_WIRE_TEXT_BYTES]; /* one sentence for people                              */
+} pal_wire_problem;
+
+typedef struct pal_wire_join {
+    char name[PAL_WIRE_MEMBER_NAME];
+    pal_wire_role role;
+    int tool; /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */
+} pal_wire_join;
+
+typedef struct pal_wire_arg {
+    char key[32];
+    double value;
+} pal_wire_arg;
+typedef struct pal_wire_order {       /* an order to the session */
+    char verb[32];                    /* pause resume step reset material ...                     */
+    char target[PAL_WIRE_NAME_BYTES]; /* what it is about (a body, a row), or ""                 */
+    uint32_t n_arg;
+    pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
+} pal_wire_order;
+
+typedef struct pal_control {
+    pal_control_type type;
+    union {
+        pal_wire_hello hello;
+        pal_wire_topology topology;
+        pal_wire_status status;
+        pal_wire_members members;
+        pal_wire_problem problem; /* error             */
+        pal_wire_join join;
+        pal_wire_order order; /* command               */
+        int tool;             /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
+        double stamp_ms;      /* ping, pong: the pinger's own clock         */
+    };
+} pal_control;
+
+/* JSON type of a control message, NULL when unknown */
+const char *pal_control_name(pal_control_type type);
+
+/* One message as compact JSON, zero terminated, *n_byte without the zero. SPACE: does not fit cap or the
+ * limit of its direction; RANGE: a count above its maximum; NAN: a number is not finite. */
+int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte);
+
+/* Reads one text message. from_server: which direction is expected here; a type of the other direction is refused with
+ * KIND. LONG above the limit of that direction. *out is about 20 KiB and is overwritten only on success. */
+int pal_control_get(const char *text, size_t n_byte, bool from_server, pal_control *out);
+#endif
