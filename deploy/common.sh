@@ -1,0 +1,66 @@
+# Shared by run.sh and test.sh: where things are, what is missing, how to build. Sourced, not run.
+tree=$(cd "$(dirname "$0")/.." && pwd) || exit 1
+build=${PALPATE_BUILD:-$tree/build}
+
+say() { echo "palpate: $*" >&2; }
+fail() {
+    echo "palpate: $*" >&2
+    exit 1
+}
+
+# is the thing of a packages.txt line there?
+have() {
+    case $2 in
+    cmd:*) command -v "${2#cmd:}" >/dev/null 2>&1 ;;
+    file:*) [ -e "${2#file:}" ] ;;
+    *) dpkg-query -W -f '${Status}' "$1" 2>/dev/null | grep -q 'ok installed' ;;
+    esac
+}
+
+missing() { # WHO...: packages that are not there
+    while read -r package who how; do
+        case $package in '' | '#'*) continue ;; esac
+        for wanted in "$@"; do
+            [ "$who" = "$wanted" ] && ! have "$package" "$how" && echo "$package"
+        done
+    done <"$tree/deploy/packages.txt"
+    return 0
+}
+
+install_missing() { # WHO...: installs, or says in one line what to do
+    list=$(missing "$@" | tr '\n' ' ')
+    [ -z "$list" ] && return 0
+    command -v apt-get >/dev/null 2>&1 || fail "missing: ${list}- install them with your system's package manager (this script knows apt-get)"
+    say "installing: $list"
+    as_root=
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null 2>&1 || fail "missing: ${list}- run as root: apt-get install $list"
+        as_root=sudo
+    fi
+    mkdir -p "$build"
+    if ! { $as_root apt-get update -q && $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $list; } >"$build/install.log" 2>&1; then
+        return 1
+    fi
+    [ -z "$(missing "$@")" ]
+}
+
+build_release() { # [cmake options]: quiet unless it fails
+    mkdir -p "$build"
+    log=$build/build.log
+    if ! cmake -S "$tree" -B "$build/release" -G Ninja -D PAL_PRESET=release "$@" >"$log" 2>&1 ||
+        ! cmake --build "$build/release" >>"$log" 2>&1; then
+        tail -n 30 "$log" >&2
+        fail "the build failed, see $log"
+    fi
+}
+
+# three.js for the viewer, from the lock file, into the build folder; nothing when it is there already
+fetch_viewer() {
+    from=$tree/clients/viewer to=$build/viewer_packages
+    if [ -e "$to/node_modules/three/build/three.module.js" ] && cmp -s "$from/package-lock.json" "$to/package-lock.json"; then
+        return 0
+    fi
+    mkdir -p "$to"
+    cp "$from/package.json" "$from/package-lock.json" "$to/" || return 1
+    (cd "$to" && npm ci --no-audit --no-fund --loglevel=error) >"$build/npm.log" 2>&1
+}

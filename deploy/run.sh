@@ -1,0 +1,64 @@
+#!/bin/sh
+# Installs what is missing, builds, prepares the default scene, starts the server and prints the address to open.
+# usage: deploy/run.sh [INPUT] [palpate serve options...]
+#   INPUT  a scene (.json), a surface (.obj .stl .ply .off) or a label volume (.nii .nii.gz .inr .inr.gz);
+#          without it: the liver of an abdominal CT, or our own organ when that cannot be had
+# PALPATE_BUILD names another build folder. A rerun starts in seconds.
+set -u
+. "$(dirname "$0")/common.sh"
+case ${1-} in -h | --help)
+    sed -n '2,7s/^# \{0,1\}//p' "$0"
+    exit 0
+    ;;
+esac
+start=$(pwd)
+input=
+case ${1-} in
+'' | -*) ;;
+*)
+    input=$1
+    shift
+    case $input in /*) ;; *) input=$start/$input ;; esac
+    [ -e "$input" ] || fail "$input: no such file"
+    ;;
+esac
+
+install_missing run || fail "could not install: $(missing run | tr '\n' ' ')- see $build/install.log"
+fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
+say "building (the first time takes a minute)"
+build_release -D PAL_BUILD_TESTS="${PALPATE_TESTS:-OFF}"
+palpate=$build/release/bin/palpate
+
+# the scan: a labelled abdominal CT that a Debian package carries (CC0-1.0)
+find_scan() {
+    scan=$build/scan/data/images/liver.inr.gz
+    [ -e "$scan" ] && return 0
+    mkdir -p "$build/scan"
+    install_missing scan || say "libcgal-demo could not be installed"
+    archive=/usr/share/doc/libcgal-dev/data.tar.gz
+    if [ ! -e "$archive" ]; then # slim systems leave documentation out: unpack the package itself
+        (cd "$build/scan" && apt-get download -q libcgal-demo && dpkg-deb -x libcgal-demo_*.deb .) >>"$build/install.log" 2>&1
+        archive=$build/scan/usr/share/doc/libcgal-dev/data.tar.gz
+    fi
+    [ -e "$archive" ] && tar -xzf "$archive" -C "$build/scan" data/images/liver.inr.gz 2>>"$build/install.log"
+    [ -e "$scan" ]
+}
+
+if [ -z "$input" ]; then
+    input=$build/scene/liver/scene.json
+    if [ ! -e "$input" ]; then
+        if find_scan; then
+            say "preparing the liver of an abdominal CT"
+            "$palpate" prepare "$scan" --label 255 --name liver --title "Liver, from an abdominal CT" \
+                --source "labelled CT of the Debian package libcgal-demo, CC0-1.0" -o "$build/scene/liver" \
+                --quiet || fail "the scene could not be prepared"
+        else
+            input=$build/scene/organ/scene.json
+            if [ ! -e "$input" ]; then
+                say "the scan cannot be had here, preparing our own organ"
+                "$palpate" prepare --procedural -o "$build/scene/organ" --quiet || fail "the scene could not be prepared"
+            fi
+        fi
+    fi
+fi
+exec "$palpate" serve "$input" "$@"

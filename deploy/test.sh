@@ -1,0 +1,84 @@
+#!/bin/sh
+# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed".
+# usage: deploy/test.sh [--fast]     --fast: the release build's tests only, no sanitizers, fuzzers or browser
+# PALPATE_BUILD names another build folder.
+set -u
+. "$(dirname "$0")/common.sh"
+fast=
+case ${1-} in
+'') ;;
+--fast) fast=1 ;;
+-h | --help)
+    sed -n '2,4s/^# \{0,1\}//p' "$0"
+    exit 0
+    ;;
+*) fail "unknown option ${1-} (known: --fast)" ;;
+esac
+
+install_missing run test || fail "could not install: $(missing run test | tr '\n' ' ')- see $build/install.log"
+install_missing scan || say "libcgal-demo could not be installed: tests of the scan say so and are left out"
+fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
+
+passed=0 failed=0
+step() { # NAME COMMAND...: one test that is a command; its output is shown when it fails
+    name=$1
+    shift
+    if "$@" >"$build/step.log" 2>&1; then
+        passed=$((passed + 1))
+        say "ok    $name"
+    else
+        failed=$((failed + 1))
+        cat "$build/step.log"
+        say "FAIL  $name"
+    fi
+}
+tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its tests
+    preset=$1
+    shift
+    (cd "$build/$preset" && ctest --output-on-failure "$@") >"$build/ctest_$preset.log" 2>&1
+    sed -n '/% tests passed/,$d; /^ *[0-9]*\/[0-9]* Test /p' "$build/ctest_$preset.log"
+    n_pass=$(grep -c '^ *[0-9]*/[0-9]* Test .*   Passed ' "$build/ctest_$preset.log")
+    n_fail=$(grep -cE '^ *[0-9]*/[0-9]* Test .*(\*\*\*|Not Run)' "$build/ctest_$preset.log")
+    if [ "$n_pass" -eq 0 ]; then n_fail=$((n_fail + 1)); fi
+    if [ "$n_fail" -gt 0 ]; then cat "$build/ctest_$preset.log"; fi
+    passed=$((passed + n_pass))
+    failed=$((failed + n_fail))
+    say "$preset: $n_pass passed, $n_fail failed"
+}
+build_preset() { # PRESET [cmake options]
+    preset=$1
+    shift
+    cmake -S "$tree" -B "$build/$preset" -G Ninja -D PAL_PRESET="$preset" "$@" >"$build/build_$preset.log" 2>&1 &&
+        cmake --build "$build/$preset" >>"$build/build_$preset.log" 2>&1 && return 0
+    tail -n 40 "$build/build_$preset.log"
+    say "FAIL  build of $preset"
+    failed=$((failed + 1))
+    return 1
+}
+
+say "building release"
+build_release -D PAL_BUILD_TESTS=ON
+tests_of release -j 2
+step "sources are formatted" sh "$tree/tests/house/check_format.sh" "$tree"
+step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types
+step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test
+if [ -z "$fast" ]; then
+    step "viewer: in a browser" sh "$tree/tests/browser/run.sh" "$build"
+    say "building with address and undefined-behaviour sanitizers"
+    build_preset asan && tests_of asan -j 2 -LE "accuracy|bench"
+    say "building with thread sanitizer"
+    build_preset tsan && tests_of tsan -j 2 -R '^(base|session|net|clients)/'
+    say "building fuzzers"
+    if build_preset fuzz -D CMAKE_C_COMPILER=clang; then
+        for fuzzer in "$build"/fuzz/tests/fuzz/fuzz_*; do
+            [ -x "$fuzzer" ] && [ -f "$fuzzer" ] || continue
+            thing=$(basename "$fuzzer" | sed 's/^fuzz_//')
+            corpus=$build/corpus/$thing
+            mkdir -p "$corpus"
+            step "fuzz $thing for 5 s" "$fuzzer" -max_total_time=5 -timeout=10 -rss_limit_mb=2048 -artifact_prefix="$build/crash_" \
+                "$corpus" "$tree/tests/data/fuzz/$thing"
+        done
+    fi
+fi
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]

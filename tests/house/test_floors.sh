@@ -1,0 +1,36 @@
+#!/bin/sh
+# The floor check itself can fail: in a copy of the tree's skeleton each kind of fault is planted and must be found.
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+passed=0 failed=0
+verdict() { # NAME WANTED GOT
+    if [ "$2" = "$3" ]; then
+        passed=$((passed + 1))
+        echo "ok   $1"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $1 (exit $3, wanted $2)"
+    fi
+}
+plant() { # NAME FILE TEXT: a clean little tree with one planted file must be refused
+    tree=$(mktemp -d)
+    mkdir -p "$tree/server/base" "$tree/server/sim/effects" "$tree/server/mesh" "$tree/protocol" "$tree/clients/trainee"
+    echo '#include "server/base/err.h"' >"$tree/server/mesh/clean.c"
+    if [ -n "$2" ]; then printf '%s\n' "$3" >"$tree/$2"; fi
+    sh "$here/check_floors.sh" "$tree" >/dev/null 2>&1
+    code=$?
+    rm -rf "$tree"
+    verdict "$1" "${4:-1}" "$code"
+}
+sh "$here/check_floors.sh" >/dev/null
+verdict "the tree keeps its floors" 0 $?
+plant "a clean tree passes" "" "" 0
+plant "finds an upward include" server/base/up.c '#include "server/mesh/surface.h"'
+plant "finds a sideways include" protocol/side.c '#include "server/base/err.h"'
+plant "finds a client that sees the server" clients/trainee/peek.c '#include "server/sim/world.h"'
+plant "finds an effect that sees the world" server/sim/effects/big.c '#include "server/sim/world.h"'
+plant "finds threads in sim" server/sim/threads.c '#include <pthread.h>'
+plant "finds a foreign top-level entry" notes.txt 'notes'
+plant "finds a name that stands twice" server/sim/clean.c '#include "server/base/err.h"'
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
