@@ -1,0 +1,45 @@
+/* UTF-8 from untrusted bytes: one character at a time, nothing but well-formed Unicode. Thread: any. */
+#ifndef PAL_BASE_UTF8_H
+#define PAL_BASE_UTF8_H
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* bytes of the character at text[0..n_byte-1] (1..4) and its code point; 0: not well-formed (too long a form,
+ * surrogate, beyond U+10FFFF, cut) or n_byte is 0 */
+static inline int pal_utf8_next(const char *text, size_t n_byte, uint32_t *code)
+{
+    static const uint32_t least[5] = {0, 0, 0x80, 0x800, 0x10000};
+    const uint8_t *b = (const uint8_t *)text;
+    if (n_byte == 0) return 0;
+    int n = b[0] < 0x80 ? 1 : (b[0] & 0xe0) == 0xc0 ? 2 : (b[0] & 0xf0) == 0xe0 ? 3 : (b[0] & 0xf8) == 0xf0 ? 4 : 0;
+    if (n == 0 || (size_t)n > n_byte) return 0;
+    uint32_t c = n == 1 ? b[0] : b[0] & (0x7fu >> n);
+    for (int k = 1; k < n; k++) {
+        if ((b[k] & 0xc0) != 0x80) return 0;
+        c = c << 6 | (b[k] & 0x3fu);
+    }
+    if (c < least[n] || c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) return 0;
+    *code = c;
+    return n;
+}
+
+/* may this character stand in a name or title? Not control characters, line and paragraph separators, direction marks
+ * and overrides, zero-width ones, the byte order mark */
+static inline bool pal_utf8_shown(uint32_t c)
+{
+    return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||
+             (c >= 0x2060 && c <= 0x206f) || c == 0xfeff);
+}
+
+static inline bool pal_utf8_valid(const char *text, size_t n_byte)
+{
+    uint32_t code;
+    for (size_t at = 0; at < n_byte;) {
+        int n = pal_utf8_next(text + at, n_byte - at, &code);
+        if (n == 0) return false;
+        at += (size_t)n;
+    }
+    return true;
+}
+#endif

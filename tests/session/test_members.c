@@ -1,0 +1,120 @@
+/* Members: names, places, and who holds which tool. */
+#include "server/base/utf8.h"
+#include "server/session/members.h"
+#include "tests/check.h"
+
+static pal_member_list list;
+
+static int join(pal_member_role role, const char *name)
+{
+    int id = 0;
+    return pal_members_join(&list, role, name, &id) ? 0 : id;
+}
+static const char *name_of(int id)
+{
+    pal_member_entry *member = pal_members_find(&list, id);
+    return member ? member->name : "(nobody)";
+}
+
+static void names_are_made_unique_by_a_number(void)
+{
+    pal_members_init(&list, 3);
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "Ann")), "Ann");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "Ann")), "Ann 2");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "Ann")), "Ann 3");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "Ann 2")), "Ann 2 2");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_VIEWER, "")), "guest");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_VIEWER, NULL)), "guest 2");
+}
+
+static void names_lose_control_and_direction_characters_and_broken_bytes(void)
+{
+    pal_members_init(&list, 3);
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "  a\x01 \n b\x7f\t  c  ")), "a b c");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "J\xc3\xb6rg")), "J\xc3\xb6rg");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "x\xe2\x80\xaey")), "xy");             /* right-to-left override */
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "\xc0\xafp\xff\xed\xa0\x80q")), "pq"); /* overlong, stray, surrogate */
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "\xf4\x90\x80\x80r\xe2\x82")), "r");   /* beyond Unicode, cut */
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "\x01\x02")), "guest");
+}
+
+static void a_long_name_is_cut_at_a_whole_character(void)
+{
+    pal_members_init(&list, 3);
+    char name[400] = "";
+    for (int k = 0; k < 60; k++) strcat(name, "\xe2\x82\xac");
+    for (int k = 0; k < PAL_MEMBER_LIST_MAX; k++) {
+        int id = join(PAL_MEMBER_TRAINEE, name);
+        REQUIRE(id > 0);
+        const char *got = name_of(id);
+        CHECK(strlen(got) < PAL_MEMBER_NAME);
+        CHECK(pal_utf8_valid(got, strlen(got)));
+        for (int other = 1; other < id; other++) CHECK(strcmp(name_of(other), got) != 0);
+    }
+}
+
+static void a_full_table_refuses_and_an_id_is_never_used_twice(void)
+{
+    pal_members_init(&list, 3);
+    for (int k = 0; k < PAL_MEMBER_LIST_MAX; k++) CHECK_INT(join(PAL_MEMBER_VIEWER, "v"), k + 1);
+    int id = -5;
+    CHECK_INT(pal_members_join(&list, PAL_MEMBER_VIEWER, "one more", &id), PAL_ERR_FULL);
+    CHECK_INT(id, -5);
+    pal_members_leave(&list, 7);
+    CHECK_INT(list.n_member, PAL_MEMBER_LIST_MAX - 1);
+    CHECK_INT(join(PAL_MEMBER_VIEWER, "new"), PAL_MEMBER_LIST_MAX + 1);
+    CHECK(pal_members_find(&list, 7) == NULL);
+    CHECK(pal_members_find(&list, 0) == NULL);
+    pal_members_leave(&list, 7);
+    CHECK_INT(list.n_member, PAL_MEMBER_LIST_MAX);
+}
+
+static void a_tool_has_one_holder(void)
+{
+    pal_members_init(&list, 2);
+    int ann = join(PAL_MEMBER_TRAINEE, "Ann"), bob = join(PAL_MEMBER_INSTRUCTOR, "Bob"),
+        eve = join(PAL_MEMBER_TRAINEE, "Eve"), tool = -9;
+    CHECK_INT(pal_members_take(&list, ann, 1, &tool), PAL_ERR_OK);
+    CHECK_INT(tool, 1);
+    CHECK_INT(pal_members_take(&list, bob, 1, &tool), PAL_ERR_STATE);
+    CHECK_INT(pal_members_take(&list, bob, -1, &tool), PAL_ERR_OK);
+    CHECK_INT(tool, 0);
+    CHECK_INT(pal_members_take(&list, eve, -1, &tool), PAL_ERR_STATE);
+    CHECK_INT(pal_members_take(&list, ann, -1, &tool), PAL_ERR_OK); /* keeps the one held */
+    CHECK_INT(tool, 1);
+    pal_members_leave(&list, bob);
+    CHECK_INT(pal_members_take(&list, ann, 0, &tool), PAL_ERR_OK); /* gives back 1 */
+    CHECK_INT(list.holder[0], ann);
+    CHECK_INT(list.holder[1], 0);
+    pal_members_give_back(&list, ann);
+    pal_members_give_back(&list, ann);
+    CHECK_INT(list.holder[0], 0);
+    CHECK_INT(pal_members_find(&list, ann)->tool, -1);
+}
+
+static void viewers_hold_nothing_and_command_nothing(void)
+{
+    pal_members_init(&list, 2);
+    int vic = join(PAL_MEMBER_VIEWER, "Vic"), ann = join(PAL_MEMBER_TRAINEE, "Ann"), tool = 4;
+    CHECK_INT(pal_members_take(&list, vic, -1, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take(&list, ann, 2, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take(&list, ann, -2, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take(&list, 99, 0, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(tool, 4);
+    CHECK(!pal_members_may_command(&list, vic));
+    CHECK(!pal_members_may_command(&list, 0));
+    CHECK(!pal_members_may_command(&list, 99));
+    CHECK(pal_members_may_command(&list, ann));
+    CHECK(pal_members_may_command(&list, join(PAL_MEMBER_INSTRUCTOR, "Ida")));
+}
+
+int main(void)
+{
+    RUN(names_are_made_unique_by_a_number);
+    RUN(names_lose_control_and_direction_characters_and_broken_bytes);
+    RUN(a_long_name_is_cut_at_a_whole_character);
+    RUN(a_full_table_refuses_and_an_id_is_never_used_twice);
+    RUN(a_tool_has_one_holder);
+    RUN(viewers_hold_nothing_and_command_nothing);
+    return check_report();
+}
