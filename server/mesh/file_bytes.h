@@ -1,0 +1,17 @@
+/* Files that appear whole or not at all: written under a temporary name beside the path, then renamed. Only for the
+ * writers of this room; pal_file_read and pal_file_write are declared in mesh_file.h. Thread: [load]. */
+#ifndef PAL_MESH_FILE_BYTES_H
+#define PAL_MESH_FILE_BYTES_H
+#include "server/base/err.h"
+
+#include <stdio.h>
+
+typedef struct pal_file_out {
+    FILE *file;
+    char path[4096], temporary[4104];
+} pal_file_out;
+
+pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note);
+/* closes; with err == 0 and every write good the file takes its name, else the temporary one is removed. IO or err */
+pal_err pal_file_end(pal_file_out *out, pal_err err, pal_note *note);
+#endif

@@ -1,0 +1,50 @@
+/* What the surface readers share: arrays that grow with the bytes that are there, polygons as fans, and refusals that
+ * name the file and the place. Only for the readers of this room. Thread: [load]. */
+#ifndef PAL_MESH_MESH_BUILD_H
+#define PAL_MESH_MESH_BUILD_H
+#include "server/base/err.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct pal_mesh_build {
+    const char *name; /* file name for messages                                          */
+    const uint8_t *bytes;
+    size_t n_byte;
+    pal_note *note;
+    const char *format;     /* for the report                                                  */
+    bool binary;            /* places are byte offsets, else line numbers                      */
+    double *x;              /* [n_vertex][3]                                                   */
+    int32_t *tri;           /* [n_tri][3], indices not yet checked against n_vertex            */
+    size_t n_vertex, n_tri; /* in use                                                          */
+    size_t cap_vertex, cap_tri;
+    int64_t most_index, most_at; /* largest index of any face (-1 at first) and its place      */
+    int64_t first_at;            /* place of the first face, 0: none yet                       */
+    int64_t fan_first, fan_last; /* the open polygon                                           */
+    int fan_n, fan_n_tri;
+} pal_mesh_build;
+
+/* REFUSED with "NAME: line AT: sentence" or "NAME: byte AT: sentence" */
+pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* room for n more vertices or triangles; n must come from bytes that are there, never from a claimed count. MEMORY */
+pal_err pal_mesh_reserve(pal_mesh_build *build, size_t n_vertex, size_t n_tri);
+pal_err pal_mesh_vertex(pal_mesh_build *build, const double p[3]);
+
+/* a polygon: begin, its corners (indices from 0, REFUSED when negative or beyond 2^31 - 2), end. One or two corners
+ * make a degenerate triangle, so that cleaning counts them. */
+void pal_mesh_fan_begin(pal_mesh_build *build, int64_t at);
+pal_err pal_mesh_fan_corner(pal_mesh_build *build, int64_t at, int64_t index);
+pal_err pal_mesh_fan_end(pal_mesh_build *build);
+
+/* the readers: from bytes to arrays; REFUSED, MEMORY */
+pal_err pal_obj_parse(pal_mesh_build *build);
+pal_err pal_stl_parse(pal_mesh_build *build);
+pal_err pal_ply_parse(pal_mesh_build *build);
+pal_err pal_off_parse(pal_mesh_build *build);
+/* is this an STL file by its content? */
+bool pal_stl_is(const uint8_t *bytes, size_t n_byte);
+bool pal_off_is(const uint8_t *bytes, size_t n_byte);
+bool pal_obj_is(const uint8_t *bytes, size_t n_byte);
+#endif
