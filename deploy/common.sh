@@ -47,7 +47,7 @@ install_missing() { # WHO...: installs, or says in one line what to do
 build_release() { # [cmake options]: quiet unless it fails
     mkdir -p "$build"
     log=$build/build.log
-    if ! cmake -S "$tree" -B "$build/release" -G Ninja -D PAL_PRESET=release "$@" >"$log" 2>&1 ||
+    if ! cmake -S "$tree" -B "$build/release" -G Ninja -D PAL_PRESET=release -D PAL_VIEWER_PACKAGES="$build/viewer_packages" "$@" >"$log" 2>&1 ||
         ! cmake --build "$build/release" >>"$log" 2>&1; then
         tail -n 30 "$log" >&2
         fail "the build failed, see $log"

@@ -1,0 +1,142 @@
+// One shown part: geometry that takes decoded frames, tissue material, displacement colours, picking.
+import * as THREE from "./three.js";
+
+// nine stops of a rainbow that is even to the eye, as in style.css
+const COLOURS = ["#30123b", "#4662d7", "#35abf8", "#1ae4b6", "#72fe5e", "#c8ef34", "#faba39", "#f66b19", "#ca2a04"];
+
+/** @typedef {{mix: {value: number}, top: {value: number}, stops: {value: THREE.Color[]}}} MapUniforms */
+
+/**
+ * Tissue: a wet layer over a soft, slightly translucent body; the displacement map is mixed in by the shader.
+ * @param {MapUniforms} uniforms
+ */
+function makeTissue(uniforms) {
+  const material = new THREE.MeshPhysicalMaterial({
+    color: 0x8f2f27, roughness: 0.52, metalness: 0, clearcoat: 0.55, clearcoatRoughness: 0.28,
+    sheen: 0.6, sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd9796a), specularIntensity: 0.55, side: THREE.DoubleSide,
+  });
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.mapMix = uniforms.mix;
+    shader.uniforms.mapTop = uniforms.top;
+    shader.uniforms.mapStops = uniforms.stops;
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nattribute vec3 rest;\nvarying float vMoved;\nvarying vec3 vRest;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvMoved = length(position - rest);\nvRest = rest;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", `#include <common>
+varying float vMoved;
+varying vec3 vRest;
+uniform float mapMix, mapTop;
+uniform vec3 mapStops[${COLOURS.length}];
+vec3 mapColour(float t) {
+  float s = clamp(t, 0.0, 1.0) * ${(COLOURS.length - 1).toFixed(1)};
+  vec3 c = mapStops[0];
+  for (int i = 0; i < ${COLOURS.length - 1}; i++) c = mix(c, mapStops[i + 1], clamp(s - float(i), 0.0, 1.0));
+  return c;
+}
+// value noise at rest positions: faint lobules that stay on the tissue when it moves
+float lattice(vec3 p) { return fract(sin(dot(p, vec3(127.1, 311.7, 74.7))) * 43758.5453); }
+float mottle(vec3 p) {
+  vec3 i = floor(p), f = fract(p);
+  f = f * f * (3.0 - 2.0 * f);
+  return mix(mix(mix(lattice(i), lattice(i + vec3(1, 0, 0)), f.x), mix(lattice(i + vec3(0, 1, 0)), lattice(i + vec3(1, 1, 0)), f.x), f.y),
+             mix(mix(lattice(i + vec3(0, 0, 1)), lattice(i + vec3(1, 0, 1)), f.x), mix(lattice(i + vec3(0, 1, 1)), lattice(i + vec3(1, 1, 1)), f.x), f.y), f.z);
+}`)
+      .replace("#include <color_fragment>", `#include <color_fragment>
+float shade = 0.86 + 0.14 * mottle(vRest * 160.0) + 0.10 * mottle(vRest * 45.0);
+diffuseColor.rgb *= shade;
+diffuseColor.rgb = mix(diffuseColor.rgb, mapColour(vMoved / mapTop), mapMix);`);
+  };
+  return material;
+}
+
+export class BodyMesh {
+  /**
+   * @param {THREE.Scene} scene
+   * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
+   */
+  constructor(scene, rest, triangles) {
+    this.scene = scene;
+    this.rest = rest;
+    this.uniforms = { mix: { value: 0 }, top: { value: 0.02 }, stops: { value: COLOURS.map((c) => new THREE.Color(c)) } };
+    this.geometry = new THREE.BufferGeometry();
+    this.position = new THREE.BufferAttribute(rest.slice(), 3).setUsage(THREE.DynamicDrawUsage);
+    this.normal = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
+    this.geometry.setAttribute("position", this.position);
+    this.geometry.setAttribute("normal", this.normal);
+    this.geometry.setAttribute("rest", new THREE.BufferAttribute(rest, 3));
+    this.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    this.geometry.computeBoundingSphere();
+    this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.uniforms));
+    this.mesh.frustumCulled = false;
+    scene.add(this.mesh);
+  }
+
+  /**
+   * takes a decoded frame over and gives the former arrays back for reuse
+   * @param {Float32Array} positions @param {Float32Array} normals
+   * @returns {{positions: Float32Array, normals: Float32Array}}
+   */
+  take(positions, normals) {
+    const old = { positions: /** @type {Float32Array} */ (this.position.array), normals: /** @type {Float32Array} */ (this.normal.array) };
+    this.position.array = positions;
+    this.normal.array = normals;
+    this.position.needsUpdate = true;
+    this.normal.needsUpdate = true;
+    return old;
+  }
+
+  /** @param {boolean} on @param {number} top displacement of the last colour, m */
+  colourMap(on, top) {
+    this.uniforms.mix.value = on ? 0.92 : 0;
+    this.uniforms.top.value = top;
+  }
+
+  /** @param {boolean} on */
+  wireframe(on) {
+    /** @type {THREE.MeshPhysicalMaterial} */ (this.mesh.material).wireframe = on;
+  }
+
+  /** largest displacement of the shown frame, m */
+  moved() {
+    const x = this.position.array, r = this.rest;
+    let most = 0;
+    for (let i = 0; i < r.length; i += 3) {
+      const d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
+      if (d > most) most = d;
+    }
+    return Math.sqrt(most);
+  }
+
+  /** nearest front hit of a ray @param {THREE.Ray} ray @returns {{point: THREE.Vector3, normal: THREE.Vector3, distance: number} | null} */
+  pick(ray) {
+    const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index).array, x = this.position.array;
+    const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3(), hit = new THREE.Vector3();
+    let best = Infinity, found = -1;
+    const point = new THREE.Vector3();
+    for (let t = 0; t < index.length; t += 3) {
+      a.fromArray(x, 3 * index[t]);
+      b.fromArray(x, 3 * index[t + 1]);
+      c.fromArray(x, 3 * index[t + 2]);
+      if (!ray.intersectTriangle(a, b, c, true, hit)) continue;
+      const d = hit.distanceToSquared(ray.origin);
+      if (d < best) {
+        best = d;
+        found = t;
+        point.copy(hit);
+      }
+    }
+    if (found < 0) return null;
+    a.fromArray(x, 3 * index[found]);
+    b.fromArray(x, 3 * index[found + 1]);
+    c.fromArray(x, 3 * index[found + 2]);
+    const normal = b.sub(a).cross(c.sub(a)).normalize();
+    return { point, normal, distance: Math.sqrt(best) };
+  }
+
+  dispose() {
+    this.scene.remove(this.mesh);
+    this.geometry.dispose();
+    /** @type {THREE.Material} */ (this.mesh.material).dispose();
+  }
+}

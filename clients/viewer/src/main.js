@@ -1,0 +1,279 @@
+// The page: joins the worker's messages to stage, tools and panel. The socket lives in the worker; what it sends is kept
+// here and applied once per drawn picture.
+import { BodyMesh } from "./body_mesh.js";
+import { PlanPanel } from "./plan_panel.js";
+import { Stage } from "./stage.js";
+import { ToolInput } from "./tool_input.js";
+import { ToolMarks } from "./tool_marks.js";
+
+/** @param {string} id @returns {any} */
+const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+const POSE_MS = 16; // poses while a tool moves
+const HOLD_MS = 50; // and while it rests: a silent tool is let go by the server
+
+const stage = new Stage(byId("view"));
+const marks = new ToolMarks(stage, byId("labels"));
+const panel = new PlanPanel(document);
+const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
+
+const state = {
+  /** @type {any} */ hello: null,
+  /** @type {any} */ status: null,
+  /** @type {Map<number, BodyMesh>} */ bodies: new Map(),
+  /** @type {Map<number, {positions: Float32Array, normals: Float32Array}>} newest undrawn frame of each part */ frames: new Map(),
+  /** @type {import("./wire.js").Tool[]} */ tools: [],
+  /** @type {Map<number, any>} */ members: new Map(),
+  me: 0,
+  myTool: -1,
+  /** @type {import("./tool_input.js").ToolWish} */ wish: null,
+  away: true,
+  poseAt: 0,
+  drawn: 0,
+  here: { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0 },
+  colourTop: 0.02,
+};
+
+const input = new ToolInput(
+  stage,
+  (ray) => {
+    let best = null;
+    for (const body of state.bodies.values()) {
+      const hit = body.pick(ray);
+      if (hit && (!best || hit.distance < best.distance)) best = hit;
+    }
+    return best;
+  },
+  (wish) => {
+    state.wish = wish;
+    sendPose(true);
+  },
+);
+input.touchedOnce = () => byId("hint").classList.add("gone");
+
+/** @param {boolean} now do not wait for the next turn */
+function sendPose(now) {
+  if (state.myTool < 0) return;
+  const t = performance.now();
+  if (state.wish) {
+    if (!now && t - state.poseAt < HOLD_MS) return;
+    if (now && t - state.poseAt < POSE_MS / 2 && !state.away) return;
+    worker.postMessage({ type: "pose", tool: state.myTool, position: state.wish.position, grab: state.wish.grab, away: false });
+    state.away = false;
+    state.poseAt = t;
+  } else if (!state.away) {
+    worker.postMessage({ type: "pose", tool: state.myTool, position: null, grab: false, away: true });
+    state.away = true;
+  }
+}
+
+/** @param {string} word @param {string} text */
+function showState(word, text) {
+  byId("state").dataset.state = word;
+  byId("state-text").textContent = text;
+}
+
+/** @param {string} text empty hides it */
+function notice(text) {
+  byId("notice").textContent = text;
+  byId("notice").hidden = !text;
+}
+
+function showTitle() {
+  document.title = state.hello.title + " · Palpate";
+  byId("title").textContent = state.hello.title;
+  byId("source").textContent = state.hello.organ;
+}
+
+function showTool() {
+  input.enabled = state.myTool >= 0;
+  const hint = byId("hint");
+  const me = state.members.get(state.me);
+  if (state.myTool < 0 && me) {
+    hint.classList.remove("gone");
+    hint.textContent = "All tools are in use. You are looking on; a tool is yours as soon as one is free.";
+  } else if (!hint.classList.contains("gone")) hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
+}
+
+/** @type {Record<string, (m: any) => void>} */
+const control = {
+  hello(m) {
+    const again = state.hello && state.hello.session === m.session;
+    state.hello = m;
+    state.me = m.you.id;
+    state.myTool = m.you.tool ?? -1;
+    if (!again) stage.frameBox(m.box_m, m.up ?? [0, 0, 1]);
+    state.colourTop = stage.size / 15;
+    byId("scale-top").textContent = (1000 * state.colourTop).toFixed(0) + " mm";
+    input.radius = m.tools[Math.max(0, state.myTool)]?.radius_m ?? 0.02 * stage.size;
+    panel.plan(m.rows);
+    showTitle();
+    showTool();
+  },
+  status(m) {
+    state.status = m;
+    byId("pause").textContent = m.paused ? "Go on" : "Pause";
+    byId("pause").setAttribute("aria-pressed", String(m.paused));
+    byId("step").hidden = !m.paused;
+    notice(m.frozen ? "The body diverged and was frozen. Reset brings it back." : "");
+    const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
+    showState(m.frozen ? "lost" : "live", slow);
+    if (!byId("panel").hidden) panel.status(m, state.here);
+  },
+  members(m) {
+    state.members = new Map(m.members.map((/** @type {any} */ p) => [p.id, p]));
+    const me = state.members.get(state.me);
+    state.myTool = me?.tool ?? -1;
+    const held = new Set(m.members.map((/** @type {any} */ p) => p.tool));
+    const free = state.hello && state.hello.tools.findIndex((/** @type {any} */ _, /** @type {number} */ i) => !held.has(i));
+    if (me && state.myTool < 0 && me.role !== "viewer" && free >= 0) worker.postMessage({ type: "control", message: { type: "take", tool: -1 } });
+    panel.people(m.members, state.me);
+    showTool();
+  },
+  error(m) {
+    if (m.code === "tool_taken") return;
+    notice(m.text);
+    setTimeout(() => notice(""), 4000);
+  },
+};
+
+worker.onmessage = ({ data }) => {
+  switch (data.type) {
+    case "state":
+      showState(data.state, data.text);
+      if (data.state !== "live") {
+        input.letGo();
+        input.enabled = false;
+      }
+      break;
+    case "control":
+      control[data.message.type]?.(data.message);
+      break;
+    case "part": {
+      state.bodies.get(data.part)?.dispose();
+      const body = new BodyMesh(stage.scene, data.rest, data.triangles);
+      body.colourMap(byId("colour-map").checked, state.colourTop);
+      body.wireframe(byId("wireframe").checked);
+      state.bodies.set(data.part, body);
+      state.here.vertices = [...state.bodies.values()].reduce((n, b) => n + b.rest.length / 3, 0);
+      stage.dirty = true;
+      break;
+    }
+    case "frame": {
+      const older = state.frames.get(data.part);
+      if (older) worker.postMessage({ type: "reuse", part: data.part, ...older }, [older.positions.buffer, older.normals.buffer]);
+      state.frames.set(data.part, { positions: data.positions, normals: data.normals });
+      break;
+    }
+    case "tools":
+      state.tools = data.tools;
+      stage.dirty = true;
+      break;
+    case "figures":
+      Object.assign(state.here, data.figures);
+      break;
+  }
+};
+
+function showForce() {
+  const mine = state.tools[state.myTool];
+  const force = mine && !mine.away ? Math.hypot(...mine.force) : 0;
+  byId("force").hidden = !(state.wish || force > 0.005);
+  byId("force-value").textContent = force.toFixed(2);
+}
+
+let fpsSince = performance.now();
+function picture() {
+  requestAnimationFrame(picture);
+  input.tick();
+  sendPose(false);
+  for (const [part, frame] of state.frames) {
+    const body = state.bodies.get(part);
+    if (!body || body.rest.length !== frame.positions.length) continue;
+    const old = body.take(frame.positions, frame.normals);
+    worker.postMessage({ type: "reuse", part, ...old }, [old.positions.buffer, old.normals.buffer]);
+    state.frames.delete(part);
+    stage.dirty = true;
+    state.drawn++;
+  }
+  if (stage.dirty) {
+    marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
+    stage.draw();
+    marks.placeLabels();
+    showForce();
+  }
+  const now = performance.now();
+  if (now - fpsSince > 1000) {
+    state.here.fps = (1000 * state.drawn) / (now - fpsSince);
+    state.drawn = 0;
+    fpsSince = now;
+  }
+}
+
+/** @param {"pull" | "press"} mode */
+function setMode(mode) {
+  input.mode = mode;
+  byId("mode-pull").setAttribute("aria-checked", String(mode === "pull"));
+  byId("mode-press").setAttribute("aria-checked", String(mode === "press"));
+}
+
+/** @param {string} verb */
+const command = (verb) => worker.postMessage({ type: "control", message: { type: "command", verb } });
+const togglePause = () => command(state.status?.paused ? "resume" : "pause");
+const togglePanel = () => {
+  byId("panel").hidden = !byId("panel").hidden;
+  byId("panel-toggle").setAttribute("aria-expanded", String(!byId("panel").hidden));
+  if (state.status) panel.status(state.status, state.here);
+};
+byId("mode-pull").onclick = () => setMode("pull");
+byId("mode-press").onclick = () => setMode("press");
+byId("pause").onclick = togglePause;
+byId("step").onclick = () => command("step");
+byId("reset").onclick = () => command("reset");
+byId("panel-toggle").onclick = togglePanel;
+byId("colour-map").onchange = () => {
+  for (const body of state.bodies.values()) body.colourMap(byId("colour-map").checked, state.colourTop);
+  byId("scale").hidden = !byId("colour-map").checked;
+  stage.dirty = true;
+};
+byId("wireframe").onchange = () => {
+  for (const body of state.bodies.values()) body.wireframe(byId("wireframe").checked);
+  stage.dirty = true;
+};
+/** @type {Record<string, () => void>} */
+const keys = { "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel };
+window.addEventListener("keydown", (e) => {
+  if (e.target instanceof HTMLInputElement || e.ctrlKey || e.metaKey || e.altKey) return;
+  const action = keys[e.key.toLowerCase()];
+  if (action) {
+    e.preventDefault();
+    action();
+  }
+});
+
+/** @returns {string} */
+function remembered() {
+  try {
+    return localStorage.getItem("palpate.name") ?? "Guest";
+  } catch {
+    return "Guest";
+  }
+}
+function connect() {
+  const query = new URLSearchParams(location.search);
+  const session = query.get("session");
+  const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
+  worker.postMessage({ type: "connect", url, name: byId("name").value.trim() || "Guest", role: query.get("role") ?? "trainee" });
+}
+byId("name").value = new URLSearchParams(location.search).get("name") ?? remembered();
+byId("name").onchange = () => {
+  try {
+    localStorage.setItem("palpate.name", byId("name").value.trim());
+  } catch {
+    // a browser that keeps nothing still shows the organ
+  }
+  connect();
+};
+// for tests and curious people: what the page shows, without touching it
+Object.defineProperty(window, "palpate", { value: { state, stage, input } });
+connect();
+picture();
