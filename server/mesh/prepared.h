@@ -28,5 +28,10 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
 void pal_prepared_free(pal_prepared *prepared);
 pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_note *note);
 pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_note *note);
+/* the same from memory: name is used in messages only; every count, index and number is checked */
 pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out, pal_note *note);
+/* the file's bytes, which the caller frees; MEMORY */
+pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes, size_t *n_byte);
+/* what the checksum at byte 24 must be; 0 when there are fewer than 32 bytes */
+uint64_t pal_prepared_checksum(const uint8_t *bytes, size_t n_byte);
 #endif

@@ -1,11 +1,12 @@
 /* Skinning of a shown surface to the surface nodes of a tetrahedral mesh (paper B 4.2 with errata B6-B8, B15).
  *
- * Each used surface node has a frame: X = mean of its boundary-face normals, Y = a chosen surface edge made normal to
- * X, Z = X x Y. Each shown vertex stores, for its 5 nearest surface nodes, the offset in their frames and inverse
- * squared distance weights (sum 1; a vertex that lies on a node belongs to it alone).
- * Errata: the node's position is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row
- * is Z (B8); the edge is the one with the largest tangential part at rest, with the next as fallback (B15).
- * Binding is [load]; evaluation is [sim], without heap use. */
+ * Each used surface node has a frame: X = unit sum of its boundary faces' normals, Y = a chosen surface edge made
+ * normal to X, Z = X x Y. Each shown vertex stores, for its 5 nearest surface nodes, the offset in their frames and
+ * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the node's
+ * position is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
+ * is the one with the largest tangential part at rest, with another as fallback (B15), whose angle to the first is
+ * stored, so that the fallback gives the same axes. Binding is [load]; evaluation is [sim], without heap use. One
+ * pal_skin may serve several threads; each needs its own frames buffer. */
 #ifndef PAL_MESH_SKIN_H
 #define PAL_MESH_SKIN_H
 #include "server/base/arena.h"
@@ -18,13 +19,14 @@ typedef struct pal_skin {
     int n_vertex;        /* shown vertices                                                               */
     int n_frame;         /* surface nodes that some vertex uses                                          */
     int n_node;          /* nodes of the mesh, for checks                                                */
-    int32_t *frame;      /* node of each frame                                     [n_frame]             */
+    int32_t *frame;      /* node of each frame, ascending                          [n_frame]             */
     int32_t *frame_edge; /* other ends of its two candidate edges (second may be -1) [n_frame][2]        */
+    float *frame_turn;   /* cos, sin of the angle about X from second to first edge at rest [n_frame][2] */
     int32_t *fan_start;  /* boundary faces around each frame's node, as sparse rows [n_frame+1]          */
     int32_t *fan;        /* the two other corners of each face, in outward order    [fan_start[n_frame]][2] */
     int32_t *near;       /* frames of each vertex                                   [n_vertex][5]        */
-    float *weight;       /* sum 1 over a row                                        [n_vertex][5]        */
-    float *offset;       /* in the frame's axes, m                                  [n_vertex][5][3]     */
+    float *coef;         /* weight w (sum 1 over a row) and offset o in the frame's axes, m, as
+                            w oX, w oY, w oZ, w                                     [n_vertex][5][4]     */
 } pal_skin;
 
 /* binds vertices x [n_vertex][3] (same frame as tets->x) to the mesh; heap arrays, pal_skin_free; MEMORY, REFUSED when
@@ -32,11 +34,17 @@ typedef struct pal_skin {
 pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_skin *out);
 void pal_skin_free(pal_skin *skin);
 
-/* frames from node positions x [n_node][3]: axes [n_frame][9] rows X, Y, Z. A flat or inverted neighbourhood keeps the
- * axes that the array holds from the last call (so fill it once at rest). [sim] */
-void pal_skin_frames(const pal_skin *skin, const double *x, double *axes);
-/* all shown vertices: out [n_vertex][3] float metres. [sim] */
-void pal_skin_evaluate(const pal_skin *skin, const double *x, const double *axes, float *out);
+/* The frames buffer: 64 bytes a frame, 16 floats X Y Z P each padded to 4 (an array of 9 doubles a frame is large
+ * enough). Caller's memory, zeroed before the first use, best at a multiple of 64; its content is this room's own. */
+static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
+{
+    return (size_t)skin->n_frame * 64;
+}
+/* axes from node positions x [n_node][3]. A flat or inverted neighbourhood keeps the axes that the buffer holds from
+ * the last call (so fill it once at rest). [sim] */
+void pal_skin_frames(const pal_skin *skin, const double *x, void *frames);
+/* all shown vertices: out [n_vertex][3] float metres; writes the nodes' positions into frames. [sim] */
+void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out);
 /* one shown vertex. [sim] */
-void pal_skin_vertex(const pal_skin *skin, const double *x, const double *axes, int vertex, double out[3]);
+void pal_skin_vertex(const pal_skin *skin, const double *x, const void *frames, int vertex, double out[3]);
 #endif
