@@ -1,8 +1,8 @@
 // One shown part: geometry that takes decoded frames, tissue material, displacement colours, picking.
 import * as THREE from "./three.js";
 
-// nine stops of a rainbow that is even to the eye, as in style.css
-const COLOURS = ["#30123b", "#4662d7", "#35abf8", "#1ae4b6", "#72fe5e", "#c8ef34", "#faba39", "#f66b19", "#ca2a04"];
+// nine stops of a rainbow, as in style.css
+const COLOURS = ["#4a5fc1", "#4682f0", "#35abf8", "#1ae4b6", "#72fe5e", "#c8ef34", "#faba39", "#f66b19", "#ca2a04"];
 
 /** @typedef {{mix: {value: number}, top: {value: number}, stops: {value: THREE.Color[]}}} MapUniforms */
 
@@ -12,8 +12,8 @@ const COLOURS = ["#30123b", "#4662d7", "#35abf8", "#1ae4b6", "#72fe5e", "#c8ef34
  */
 function makeTissue(uniforms) {
   const material = new THREE.MeshPhysicalMaterial({
-    color: 0x8f2f27, roughness: 0.52, metalness: 0, clearcoat: 0.55, clearcoatRoughness: 0.28,
-    sheen: 0.6, sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd9796a), specularIntensity: 0.55, side: THREE.DoubleSide,
+    color: 0x82352b, roughness: 0.5, metalness: 0, clearcoat: 0.55, clearcoatRoughness: 0.28,
+    sheen: 0.35, sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd98a7a), specularIntensity: 0.55, side: THREE.DoubleSide,
   });
   material.onBeforeCompile = (shader) => {
     shader.uniforms.mapMix = uniforms.mix;

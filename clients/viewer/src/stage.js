@@ -42,11 +42,11 @@ export class Stage {
     this.azimuth = -0.6; // around up, rad
     this.elevation = 0.42;
     this.size = 0.3; // of the scene, m
-    this.key = new THREE.DirectionalLight(0xfff2e2, 2.1);
+    this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
     this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
-    this.scene.add(this.key, this.rim, new THREE.HemisphereLight(0xdfe9f2, 0x33221c, 0.35));
+    this.scene.add(this.key, this.rim, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
     this.scene.environment = makeStudio(this.renderer);
-    this.scene.environmentIntensity = 0.55;
+    this.scene.environmentIntensity = 0.8;
     this.dirty = true;
     this.pixelRatio = Math.min(window.devicePixelRatio || 1, 2);
     this.slowFrames = 0;
@@ -65,7 +65,7 @@ export class Stage {
 
   home() {
     const narrow = Math.min(1, this.camera.aspect);
-    this.distance = (0.62 * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
+    this.distance = (0.53 * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
     this.azimuth = -0.6;
     this.elevation = 0.42;
     this.dirty = true;

@@ -20,6 +20,11 @@ export class ToolMarks {
         new THREE.MeshPhysicalMaterial({ roughness: 0.25, metalness: 0.1, clearcoat: 1, clearcoatRoughness: 0.1 }));
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xffffff);
       const label = document.createElement("span");
+      // the force mostly points into the tissue: draw its arrow over it
+      for (const piece of [arrow.line, arrow.cone]) {
+        piece.renderOrder = 1;
+        /** @type {THREE.Material} */ (piece.material).depthTest = false;
+      }
       ball.visible = arrow.visible = label.hidden = false;
       this.stage.scene.add(ball, arrow);
       this.labels.append(label);

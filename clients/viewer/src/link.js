@@ -1,0 +1,219 @@
+// The connection of one viewer: join, assets, frames, credit, reconnecting. Socket, fetch, clock and output are handed
+// in, so that the same code runs in the worker and under node --test.
+import { decodeAsset } from "./asset.js";
+import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
+import { vertexNormals } from "./normals.js";
+import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
+
+const RETRY_MS = 500, RETRY_MOST_MS = 5000;
+/** close codes after which trying again makes no sense, with what to tell people */
+const FINAL = new Map([
+  [1002, "the server refused what this page sent"], [1008, "not allowed here"], [1009, "the server refused what this page sent"],
+  [4001, "this page sent too much"], [4003, "the session is full"], [4004, "this session does not exist"],
+]);
+
+/**
+ * @typedef {{
+ *   open: (url: string, protocol: string) => WebSocket,
+ *   get: (url: string) => Promise<ArrayBuffer>,
+ *   post: (message: any, transfer?: Transferable[]) => void,
+ *   now: () => number,
+ *   later: (call: () => void, ms: number) => any,
+ * }} Surroundings
+ * @typedef {{decoder: FrameDecoder, triangles: Uint32Array, epoch: number, n: number, spare: {positions: Float32Array, normals: Float32Array}[]}} Part
+ */
+
+export class Link {
+  /** @param {Surroundings} around */
+  constructor(around) {
+    this.around = around;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.want = { url: "", name: "Guest", role: "trainee" };
+    this.tries = 0;
+    this.generation = 0;
+    this.poseSeq = 0;
+    this.fresh();
+    this.figuresAt = around.now();
+  }
+
+  fresh() {
+    /** @type {Map<number, Part>} */
+    this.parts = new Map();
+    /** @type {Map<number, Uint8Array>} newest frame of a part whose asset is not here yet */
+    this.kept = new Map();
+    this.decodeUs = 0;
+    this.nDecoded = 0;
+    this.decodeSum = 0;
+    this.bytes = 0;
+    this.myTool = -1;
+    this.latency = 0;
+    this.rtt = 0;
+    this.echo = 0;
+  }
+
+  /** @param {{url: string, name: string, role: string}} want */
+  connect(want) {
+    this.want = want;
+    this.tries = 0;
+    const old = this.socket;
+    this.socket = null;
+    this.generation++;
+    old?.close(1000);
+    this.dial();
+  }
+
+  dial() {
+    const generation = this.generation;
+    this.fresh();
+    this.say("connecting", this.tries ? "connecting again" : "connecting");
+    const socket = this.around.open(this.want.url, PROTOCOL);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      if (generation === this.generation) this.send({ type: "join", name: this.want.name, role: this.want.role, tool: this.want.role === "viewer" ? null : -1 });
+    };
+    socket.onmessage = (event) => {
+      if (generation !== this.generation) return;
+      try {
+        this.received(event.data);
+      } catch (error) {
+        // a message we cannot read is the server's mistake: say so and start over
+        socket.close(4900, String(error).slice(0, 100));
+      }
+    };
+    socket.onclose = (event) => {
+      if (generation !== this.generation) return;
+      this.generation++;
+      this.socket = null;
+      const final = FINAL.get(event.code);
+      if (final) {
+        this.say("refused", event.reason ? `${final}: ${event.reason}` : final);
+        return;
+      }
+      const pause = Math.min(RETRY_MOST_MS, RETRY_MS * 2 ** this.tries++);
+      this.say("lost", "connection lost, trying again");
+      const next = this.generation;
+      this.around.later(() => next === this.generation && this.dial(), pause);
+    };
+  }
+
+  /** @param {string} state @param {string} text */
+  say(state, text) {
+    this.around.post({ type: "state", state, text });
+  }
+
+  /** @param {any} message */
+  send(message) {
+    if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(message));
+  }
+
+  /** @param {{tool: number, position: number[] | null, grab: boolean, away: boolean}} pose */
+  pose(pose) {
+    if (this.socket?.readyState !== 1) return;
+    this.lastPosition = pose.position ?? this.lastPosition ?? [0, 0, 0];
+    this.socket.send(writePose({
+      tool: pose.tool, seq: ++this.poseSeq, flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
+      stampUs: Math.round(this.around.now() * 1000), position: this.lastPosition, buttons: pose.grab ? 1 : 0,
+    }));
+  }
+
+  /** @param {string | ArrayBuffer} data */
+  received(data) {
+    if (typeof data === "string") {
+      this.bytes += data.length;
+      this.control(JSON.parse(data));
+      return;
+    }
+    const bytes = new Uint8Array(data);
+    this.bytes += bytes.length;
+    const head = readHead(bytes);
+    if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
+    else if (head.kind === KIND.TOOLS) this.tools(bytes);
+  }
+
+  /** @param {any} message */
+  control(message) {
+    if (message.type === "hello") {
+      this.tries = 0;
+      this.myTool = message.you.tool ?? -1;
+      message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
+      this.say("live", "live");
+      this.ping();
+    } else if (message.type === "topology") message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
+    else if (message.type === "pong") this.rtt = this.around.now() - message.stamp_ms;
+    this.around.post({ type: "control", message });
+  }
+
+  ping() {
+    const generation = this.generation;
+    this.send({ type: "ping", stamp_ms: this.around.now() });
+    this.around.later(() => generation === this.generation && this.ping(), 1000);
+  }
+
+  /** @param {number} index @param {{epoch: number, asset: string}} info */
+  async loadPart(index, info) {
+    if (this.parts.get(index)?.epoch === info.epoch) return;
+    const generation = this.generation;
+    const address = new URL(info.asset, this.want.url.replace(/^ws/, "http")).href;
+    try {
+      const asset = await decodeAsset(new Uint8Array(await this.around.get(address)));
+      if (generation !== this.generation) return;
+      const n = asset.rest.length / 3;
+      this.parts.set(index, { decoder: new FrameDecoder(asset), triangles: asset.triangles, epoch: info.epoch, n, spare: [] });
+      this.around.post({ type: "part", part: index, rest: asset.rest.slice(), triangles: asset.triangles.slice() });
+    } catch (error) {
+      if (generation === this.generation) this.socket?.close(4900, `asset: ${error}`.slice(0, 100));
+      return;
+    }
+    const kept = this.kept.get(index);
+    this.kept.delete(index);
+    if (kept) this.frame(index, kept);
+  }
+
+  /** @param {number} index @param {Uint8Array} bytes */
+  frame(index, bytes) {
+    const part = this.parts.get(index), { epoch } = readFrameHead(bytes);
+    if (!part || epoch > part.epoch) {
+      this.kept.set(index, bytes.slice());
+      return;
+    }
+    if (epoch < part.epoch) return;
+    const begin = this.around.now();
+    const { positions, normals } = part.spare.pop() ?? { positions: new Float32Array(3 * part.n), normals: new Float32Array(3 * part.n) };
+    part.decoder.decode(bytes, positions);
+    const ms = this.around.now() - begin;
+    vertexNormals(positions, part.triangles, normals);
+    this.decodeUs += Math.round(1000 * ms);
+    this.decodeSum += ms;
+    this.nDecoded++;
+    this.around.post({ type: "frame", part: index, positions, normals }, [positions.buffer, normals.buffer]);
+  }
+
+  /** arrays come back from the page @param {{part: number, positions: Float32Array, normals: Float32Array}} old */
+  reuse(old) {
+    const part = this.parts.get(old.part);
+    if (part && part.spare.length < 4 && old.positions.length === 3 * part.n) part.spare.push({ positions: old.positions, normals: old.normals });
+  }
+
+  /** @param {Uint8Array} bytes */
+  tools(bytes) {
+    const message = readTools(bytes);
+    this.socket?.send(writeAck({ cycle: message.cycle, decodeUs: this.decodeUs }));
+    this.decodeUs = 0;
+    const mine = message.tools[this.myTool];
+    const now = this.around.now();
+    if (mine && mine.held && mine.echoSeq && mine.echoSeq !== this.echo && mine.echoSeq <= this.poseSeq) {
+      this.echo = mine.echoSeq;
+      const latency = now - mine.echoStampUs / 1000;
+      if (latency >= 0 && latency < 10000) this.latency = this.latency ? 0.9 * this.latency + 0.1 * latency : latency;
+    }
+    this.around.post({ type: "tools", tools: message.tools });
+    if (now - this.figuresAt > 500) {
+      const figures = { latency_ms: this.latency, rtt_ms: this.rtt, decode_ms: this.nDecoded ? this.decodeSum / this.nDecoded : 0, bytes_s: (1000 * this.bytes) / (now - this.figuresAt) };
+      this.around.post({ type: "figures", figures });
+      this.figuresAt = now;
+      this.bytes = this.nDecoded = this.decodeSum = 0;
+    }
+  }
+}
