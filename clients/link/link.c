@@ -1,0 +1,418 @@
+/* One link: connect, join, messages in and out, reconnect (link.h). */
+#include "clients/link/link_inside.h"
+#include "protocol/frame_codec.h"
+#include "server/base/clock.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+
+enum {
+    LINK_QUEUE = 16,
+    LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part fits */
+    LINK_SMALL_SOCKET = 16384,   /* receive buffer of a client that reads slowly on purpose */
+    LINK_PAUSE_FIRST_MS = 250,
+    LINK_PAUSE_MOST_MS = 5000
+};
+
+struct pal_link {
+    pal_link *next;
+    pal_link_loop *loop;
+    struct lws *wsi;
+    link_address address;
+    char name[PAL_WIRE_MEMBER_NAME];
+    pal_wire_role role;
+    int tool;
+    bool once, closing, up, held, pause_reading;
+    double read_bytes_s, read_budget;
+    uint64_t read_ns;
+    const pal_link_events *events;
+    void *user;
+    pal_link_state state;
+    int close_code;
+    char close_why[128];
+    uint32_t pause_ms;
+    lws_sorted_usec_list_t retry, resume;
+    uint8_t *in; /* message being put together  [in_cap] */
+    size_t n_in, in_cap;
+    bool in_drop;
+    bool has_pose, has_ack, has_hello;
+    uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
+    int n_queued, queue_first;
+    size_t queued_bytes[LINK_QUEUE];
+    char queued[LINK_QUEUE][PAL_CONTROL_IN_MAX + 1];
+    pal_wire_hello hello;
+    pal_control control;
+    pal_link_counts count;
+};
+
+static void link_connect(pal_link *link);
+
+static void link_tell(pal_link *link, pal_link_state state, const char *why)
+{
+    link->state = state;
+    if (!link->closing && link->events->state)
+        link->events->state(link->user, link, state, link->close_code, why ? why : "");
+}
+
+static void link_want_write(pal_link *link)
+{
+    if (link->wsi && link->up) lws_callback_on_writable(link->wsi);
+}
+
+static void link_retry_fired(lws_sorted_usec_list_t *sul)
+{
+    link_connect(lws_container_of(sul, pal_link, retry));
+}
+
+static void link_resume_fired(lws_sorted_usec_list_t *sul)
+{
+    pal_link *link = lws_container_of(sul, pal_link, resume);
+    link->pause_reading = false;
+    if (link->wsi && link->up && !link->held) lws_rx_flow_control(link->wsi, 1);
+}
+
+static void link_free(pal_link *link)
+{
+    pal_link **place = &link->loop->links;
+    while (*place && *place != link) place = &(*place)->next;
+    if (*place) *place = link->next;
+    free(link->in);
+    free(link);
+}
+
+/* after these a client comes back, after the others it says why and stops (protocol, "Closing") */
+static bool link_may_return(int code)
+{
+    return code == 0 || code == PAL_WIRE_CLOSE_NORMAL || code == PAL_WIRE_CLOSE_GOING_AWAY || code == 1005 ||
+           code == 1006 || code == PAL_WIRE_CLOSE_INTERNAL || code == PAL_WIRE_CLOSE_STALLED;
+}
+
+/* the connection is gone: try again later, or end */
+static void link_lost(pal_link *link, const char *why)
+{
+    link->wsi = NULL;
+    link->up = link->has_pose = link->has_ack = false;
+    link->n_queued = 0;
+    link->n_in = 0;
+    link->in_drop = false;
+    lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired, LWS_SET_TIMER_USEC_CANCEL);
+    if (link->closing) {
+        link_free(link);
+        return;
+    }
+    if (link->once || !link_may_return(link->close_code)) {
+        link_tell(link, PAL_LINK_ENDED, why);
+        return;
+    }
+    lws_sul_schedule(link->loop->context, 0, &link->retry, link_retry_fired, (lws_usec_t)link->pause_ms * 1000);
+    link->pause_ms = link->pause_ms * 2 < LINK_PAUSE_MOST_MS ? link->pause_ms * 2 : LINK_PAUSE_MOST_MS;
+    link_tell(link, PAL_LINK_LOST, why);
+}
+
+static void link_connect(pal_link *link)
+{
+    link->close_code = 0;
+    link->close_why[0] = 0;
+    link_tell(link, PAL_LINK_CONNECTING, "");
+    struct lws_client_connect_info info = {0};
+    info.context = link->loop->context;
+    info.vhost = link->loop->vhost;
+    info.address = link->address.host, info.host = link->address.host;
+    info.port = link->address.port;
+    info.path = link->address.path;
+    info.protocol = PAL_PROTOCOL_NAME;
+    info.local_protocol_name = PAL_PROTOCOL_NAME;
+    info.ietf_version_or_minus_one = -1;
+    info.opaque_user_data = link;
+    info.pwsi = &link->wsi;
+    /* on failure the callback has told already */
+    lws_client_connect_via_info(&info);
+}
+
+pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_note *note, pal_link **out)
+{
+    pal_link *link = calloc(1, sizeof *link);
+    if (!link) return PAL_ERR_MEMORY;
+    pal_err err = link_address_parse(options->url, &link->address, note);
+    if (err) {
+        free(link);
+        return err;
+    }
+    link->loop = loop;
+    strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
+    link->role = options->role;
+    link->tool = options->tool;
+    link->once = options->once;
+    link->read_bytes_s = options->read_bytes_s;
+    link->read_budget = options->read_bytes_s / 4;
+    link->events = options->events;
+    link->user = options->user;
+    link->pause_ms = LINK_PAUSE_FIRST_MS;
+    link->next = loop->links;
+    loop->links = link;
+    *out = link;
+    /* by timer, so that no event comes before the caller has its pointer */
+    lws_sul_schedule(loop->context, 0, &link->retry, link_retry_fired, 1);
+    return PAL_ERR_OK;
+}
+
+void pal_link_close(pal_link *link)
+{
+    if (!link || link->closing) return;
+    link->closing = true;
+    lws_sul_schedule(link->loop->context, 0, &link->retry, link_retry_fired, LWS_SET_TIMER_USEC_CANCEL);
+    lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired, LWS_SET_TIMER_USEC_CANCEL);
+    if (link->up) {
+        lws_rx_flow_control(link->wsi, 1);
+        link_want_write(link);
+        return;
+    }
+    if (link->wsi) {
+        lws_set_opaque_user_data(link->wsi, NULL);
+        lws_set_timeout(link->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
+    }
+    link_free(link);
+}
+
+void link_close_all(pal_link_loop *loop)
+{
+    for (pal_link *link = loop->links, *next; link; link = next) {
+        next = link->next;
+        pal_link_close(link);
+    }
+}
+
+bool link_any_open(const pal_link_loop *loop)
+{
+    for (const pal_link *link = loop->links; link; link = link->next)
+        if (link->up) return true;
+    return false;
+}
+
+void link_free_all(pal_link_loop *loop)
+{
+    while (loop->links) link_free(loop->links);
+}
+
+pal_link_state pal_link_now(const pal_link *link)
+{
+    return link->state;
+}
+const pal_wire_hello *pal_link_hello(const pal_link *link)
+{
+    return link->has_hello ? &link->hello : NULL;
+}
+pal_link_counts pal_link_count(const pal_link *link)
+{
+    return link->count;
+}
+
+pal_err pal_link_send_pose(pal_link *link, const pal_wire_pose *pose)
+{
+    pal_wire_pose back;
+    if (link->state != PAL_LINK_JOINED) return PAL_ERR_STATE;
+    uint8_t bytes[PAL_WIRE_POSE_BYTES];
+    /* what the server would refuse is not sent */
+    if (!pal_wire_put_pose(bytes, sizeof bytes, pose) || pal_wire_get_pose(bytes, sizeof bytes, &back))
+        return PAL_ERR_REFUSED;
+    memcpy(link->pose, bytes, sizeof bytes);
+    link->has_pose = true;
+    link_want_write(link);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack)
+{
+    if (link->state != PAL_LINK_JOINED) return PAL_ERR_STATE;
+    pal_wire_put_ack(link->ack, sizeof link->ack, ack);
+    link->has_ack = true;
+    link_want_write(link);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_link_send_control(pal_link *link, const pal_control *c)
+{
+    if (!link->up) return PAL_ERR_STATE;
+    if (link->n_queued == LINK_QUEUE) return PAL_ERR_FULL;
+    const int place = (link->queue_first + link->n_queued) % LINK_QUEUE;
+    if (pal_control_put(link->queued[place], sizeof link->queued[place], c, &link->queued_bytes[place]))
+        return PAL_ERR_REFUSED;
+    link->n_queued++;
+    link_want_write(link);
+    return PAL_ERR_OK;
+}
+
+void pal_link_hold(pal_link *link, bool hold)
+{
+    link->held = hold;
+    if (link->wsi && link->up && !link->pause_reading) lws_rx_flow_control(link->wsi, !hold);
+}
+
+/* one message per writable callback: control, pose, acknowledgement */
+static int link_write(pal_link *link, struct lws *wsi)
+{
+    uint8_t buffer[LWS_PRE + PAL_CONTROL_IN_MAX];
+    size_t n = 0;
+    enum lws_write_protocol kind = LWS_WRITE_BINARY;
+    if (link->closing) {
+        lws_close_reason(wsi, LWS_CLOSE_STATUS_NORMAL, NULL, 0);
+        return -1;
+    }
+    if (link->n_queued > 0) {
+        n = link->queued_bytes[link->queue_first];
+        memcpy(buffer + LWS_PRE, link->queued[link->queue_first], n);
+        link->queue_first = (link->queue_first + 1) % LINK_QUEUE;
+        link->n_queued--;
+        kind = LWS_WRITE_TEXT;
+    } else if (link->has_pose) {
+        n = sizeof link->pose;
+        memcpy(buffer + LWS_PRE, link->pose, n);
+        link->has_pose = false;
+    } else if (link->has_ack) {
+        n = sizeof link->ack;
+        memcpy(buffer + LWS_PRE, link->ack, n);
+        link->has_ack = false;
+    } else {
+        return 0;
+    }
+    if (lws_write(wsi, buffer + LWS_PRE, n, kind) < 0) return -1;
+    link->count.bytes_out += n;
+    link->count.messages_out++;
+    if (link->n_queued > 0 || link->has_pose || link->has_ack) lws_callback_on_writable(wsi);
+    return 0;
+}
+
+static void link_fault(pal_link *link, int refusal)
+{
+    link->count.faults++;
+    if (link->events->fault) link->events->fault(link->user, link, refusal);
+}
+
+static void link_text(pal_link *link)
+{
+    const int refusal = pal_control_get((const char *)link->in, link->n_in, true, &link->control);
+    if (refusal) {
+        link_fault(link, refusal);
+        return;
+    }
+    const bool hello = link->control.type == PAL_CONTROL_HELLO;
+    if (hello) {
+        link->hello = link->control.hello;
+        link->has_hello = true;
+        link->pause_ms = LINK_PAUSE_FIRST_MS;
+        link->count.joins++;
+    }
+    if (link->events->control) link->events->control(link->user, link, &link->control);
+    if (hello && !link->closing) link_tell(link, PAL_LINK_JOINED, "");
+}
+
+static void link_binary(pal_link *link)
+{
+    pal_wire_head head;
+    int refusal = pal_wire_get_head(link->in, link->n_in, &head);
+    if (!refusal && head.kind >= PAL_WIRE_POSE) refusal = PAL_REFUSAL_KIND;
+    if (refusal)
+        link_fault(link, refusal);
+    else if (link->events->message)
+        link->events->message(link->user, link, &head, link->in, link->n_in);
+}
+
+/* a slow client's purse: read_bytes_s flows in, messages take out; empty: reading rests until it is filled */
+static void link_spend(pal_link *link, struct lws *wsi, size_t n_byte)
+{
+    const uint64_t now = pal_clock_ns();
+    link->read_budget += link->read_bytes_s * 1e-9 * (double)(now - link->read_ns);
+    if (link->read_budget > link->read_bytes_s / 4) link->read_budget = link->read_bytes_s / 4;
+    link->read_ns = now;
+    link->read_budget -= (double)n_byte;
+    if (link->read_budget >= 0 || link->pause_reading) return;
+    link->pause_reading = true;
+    lws_rx_flow_control(wsi, 0);
+    lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired,
+                     (lws_usec_t)(-link->read_budget / link->read_bytes_s * 1e6) + 1);
+}
+
+/* pieces of a message are put together, memory follows what really came */
+static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, size_t n_byte)
+{
+    link->count.bytes_in += n_byte;
+    if (link->read_bytes_s > 0) link_spend(link, wsi, n_byte);
+    if (lws_is_first_fragment(wsi)) {
+        link->n_in = 0;
+        link->in_drop = false;
+    }
+    const size_t rest = n_byte + lws_remaining_packet_payload(wsi);
+    if (!link->in_drop && link->n_in + rest > link->in_cap) {
+        const size_t wanted = link->n_in + rest;
+        uint8_t *grown = wanted <= LINK_MESSAGE_MAX ? realloc(link->in, wanted) : NULL;
+        link->in_drop = grown == NULL;
+        if (grown) link->in = grown, link->in_cap = wanted;
+    }
+    if (!link->in_drop) {
+        memcpy(link->in + link->n_in, bytes, n_byte);
+        link->n_in += n_byte;
+    }
+    if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0) return;
+    link->count.messages_in++;
+    if (link->in_drop)
+        link_fault(link, PAL_REFUSAL_LONG);
+    else if (lws_frame_is_binary(wsi))
+        link_binary(link);
+    else
+        link_text(link);
+    link->n_in = 0;
+}
+
+static void link_established(pal_link *link, struct lws *wsi)
+{
+    link->up = true;
+    link->pause_reading = false;
+    link->read_ns = pal_clock_ns();
+    if (link->read_bytes_s > 0) {
+        const int small = LINK_SMALL_SOCKET;
+        setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
+    }
+    pal_control join = {.type = PAL_CONTROL_JOIN};
+    memcpy(join.join.name, link->name, sizeof join.join.name);
+    join.join.role = link->role;
+    join.join.tool = link->tool;
+    pal_link_send_control(link, &join);
+    link_tell(link, PAL_LINK_OPEN, "");
+    if (link->held) lws_rx_flow_control(wsi, 0);
+}
+
+int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
+{
+    (void)user;
+    pal_link *link = wsi ? lws_get_opaque_user_data(wsi) : NULL;
+    if (!link) return 0;
+    switch (reason) {
+    case LWS_CALLBACK_CLIENT_ESTABLISHED:
+        link_established(link, wsi);
+        break;
+    case LWS_CALLBACK_CLIENT_RECEIVE:
+        if (!link->closing) link_receive(link, wsi, in, len);
+        break;
+    case LWS_CALLBACK_CLIENT_WRITEABLE:
+        return link_write(link, wsi);
+    case LWS_CALLBACK_WS_PEER_INITIATED_CLOSE:
+        if (len < 2) break;
+        link->close_code = ((const uint8_t *)in)[0] << 8 | ((const uint8_t *)in)[1];
+        len = len - 2 < sizeof link->close_why - 1 ? len - 2 : sizeof link->close_why - 1;
+        memcpy(link->close_why, (const char *)in + 2, len);
+        link->close_why[len] = 0;
+        break;
+    case LWS_CALLBACK_CLIENT_CONNECTION_ERROR:
+        lws_set_opaque_user_data(wsi, NULL);
+        link_lost(link, in ? in : "no connection");
+        break;
+    case LWS_CALLBACK_CLIENT_CLOSED:
+        lws_set_opaque_user_data(wsi, NULL);
+        link_lost(link, link->close_why[0] ? link->close_why : "connection closed");
+        break;
+    default:
+        break;
+    }
+    return 0;
+}

@@ -1,0 +1,212 @@
+/* The event loop of the clients: one libwebsockets context with timers, wake, watched descriptors and addresses.
+ * libwebsockets 4.1.6 facts used: lws_cancel_service is the one call allowed from other threads and raises
+ * EVENT_WAIT_CANCELLED on every protocol; a flag set inside a timer needs it too, because timers run before the sleep
+ * of the next service call; adopted descriptors are closed by the library, so a copy is handed over; extensions stay
+ * NULL (permessage-deflate can abort a process). */
+#include "clients/link/link_inside.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct link_watch {
+    link_watch *next;
+    void (*fn)(void *user);
+    void *user;
+};
+
+static int link_loop_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
+{
+    (void)user, (void)in, (void)len;
+    if (reason == LWS_CALLBACK_EVENT_WAIT_CANCELLED) {
+        pal_link_loop *loop = lws_context_user(lws_get_context(wsi));
+        if (loop && loop->woken) loop->woken(loop->woken_user);
+    }
+    return 0;
+}
+
+static int link_watch_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
+{
+    (void)user, (void)in, (void)len;
+    link_watch *watch = lws_get_opaque_user_data(wsi);
+    if (reason == LWS_CALLBACK_RAW_RX_FILE && watch) watch->fn(watch->user);
+    return 0;
+}
+
+static const struct lws_protocols link_protocols[] = {
+    {"pal-loop", link_loop_callback, 0, 0, 0, NULL, 0},
+    {PAL_PROTOCOL_NAME, link_ws_callback, 0, LINK_RX_BYTES, 0, NULL, 0},
+    {LINK_LOCAL_GET, link_get_callback, 0, LINK_RX_BYTES, 0, NULL, 0},
+    {LINK_LOCAL_WATCH, link_watch_callback, 0, 0, 0, NULL, 0},
+    {NULL, NULL, 0, 0, 0, NULL, 0},
+};
+
+static void link_library_log(int level, const char *line)
+{
+    const size_t n = strcspn(line, "\n");
+    pal_log(PAL_LOG_DEBUG, level & LLL_ERR ? "lws_error" : "lws", "%.*s", (int)n, line);
+}
+
+pal_err pal_link_loop_create(pal_link_loop **out)
+{
+    pal_link_loop *loop = calloc(1, sizeof *loop);
+    if (!loop) return PAL_ERR_MEMORY;
+    lws_set_log_level(LLL_ERR | LLL_WARN, link_library_log);
+    struct lws_context_creation_info info = {0};
+    info.port = CONTEXT_PORT_NO_LISTEN;
+    info.protocols = link_protocols;
+    info.extensions = NULL;
+    info.pt_serv_buf_size = LINK_RX_BYTES;
+    info.timeout_secs = 5;
+    info.user = loop;
+    info.gid = -1, info.uid = -1;
+    info.vhost_name = "client";
+    loop->context = lws_create_context(&info);
+    loop->vhost = loop->context ? lws_get_vhost_by_name(loop->context, "client") : NULL;
+    if (!loop->vhost) {
+        if (loop->context) lws_context_destroy(loop->context);
+        free(loop);
+        return PAL_ERR_MEMORY;
+    }
+    *out = loop;
+    return PAL_ERR_OK;
+}
+
+void pal_link_loop_destroy(pal_link_loop *loop)
+{
+    if (!loop) return;
+    while (loop->timers) pal_link_never(loop->timers);
+    /* goodbyes get a fifth of a second; a cancelled wait keeps the service call from sleeping longer */
+    link_close_all(loop);
+    const uint64_t end = pal_clock_ns() + 200000000;
+    while (link_any_open(loop) && pal_clock_ns() < end) {
+        lws_cancel_service(loop->context);
+        lws_service(loop->context, 0);
+    }
+    lws_context_destroy(loop->context);
+    link_free_all(loop);
+    link_get_free_all(loop);
+    for (link_watch *watch = loop->watches, *next; watch; watch = next) {
+        next = watch->next;
+        free(watch);
+    }
+    free(loop);
+}
+
+void pal_link_run(pal_link_loop *loop)
+{
+    while (!atomic_load(&loop->stop) && lws_service(loop->context, 0) >= 0) {
+    }
+}
+
+static void link_time_is_up(void *loop)
+{
+    pal_link_stop(loop);
+}
+
+void pal_link_run_for(pal_link_loop *loop, double seconds)
+{
+    pal_link_timer *timer = pal_link_every(loop, (uint64_t)(seconds * 1e6), link_time_is_up, loop);
+    if (timer) pal_link_run(loop);
+    pal_link_never(timer);
+    atomic_store(&loop->stop, false);
+}
+
+void pal_link_stop(pal_link_loop *loop)
+{
+    atomic_store(&loop->stop, true);
+    lws_cancel_service(loop->context);
+}
+
+void pal_link_wake(pal_link_loop *loop)
+{
+    lws_cancel_service(loop->context);
+}
+
+void pal_link_on_wake(pal_link_loop *loop, void (*woken)(void *user), void *user)
+{
+    loop->woken = woken;
+    loop->woken_user = user;
+}
+
+static void link_timer_fired(lws_sorted_usec_list_t *sul)
+{
+    pal_link_timer *timer = lws_container_of(sul, pal_link_timer, sul);
+    timer->fn(timer->user);
+    lws_sul_schedule(timer->loop->context, 0, &timer->sul, link_timer_fired, (lws_usec_t)timer->period_us);
+}
+
+pal_link_timer *pal_link_every(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user)
+{
+    pal_link_timer *timer = calloc(1, sizeof *timer);
+    if (!timer) return NULL;
+    timer->loop = loop;
+    timer->period_us = period_us > 0 ? period_us : 1;
+    timer->fn = fn;
+    timer->user = user;
+    timer->next = loop->timers;
+    loop->timers = timer;
+    lws_sul_schedule(loop->context, 0, &timer->sul, link_timer_fired, (lws_usec_t)timer->period_us);
+    return timer;
+}
+
+void pal_link_never(pal_link_timer *timer)
+{
+    if (!timer) return;
+    pal_link_timer **place = &timer->loop->timers;
+    while (*place && *place != timer) place = &(*place)->next;
+    if (*place) *place = timer->next;
+    lws_sul_schedule(timer->loop->context, 0, &timer->sul, link_timer_fired, LWS_SET_TIMER_USEC_CANCEL);
+    free(timer);
+}
+
+pal_err pal_link_watch(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user)
+{
+    link_watch *watch = calloc(1, sizeof *watch);
+    if (!watch) return PAL_ERR_MEMORY;
+    watch->fn = fn;
+    watch->user = user;
+    lws_sock_file_fd_type copy = {.filefd = dup(fd)};
+    struct lws *wsi = copy.filefd < 0 ? NULL
+                                      : lws_adopt_descriptor_vhost(loop->vhost, LWS_ADOPT_RAW_FILE_DESC, copy,
+                                                                   LINK_LOCAL_WATCH, NULL);
+    if (!wsi) {
+        free(watch);
+        return PAL_ERR_IO;
+    }
+    lws_set_opaque_user_data(wsi, watch);
+    watch->next = loop->watches;
+    loop->watches = watch;
+    return PAL_ERR_OK;
+}
+
+pal_err link_address_parse(const char *url, link_address *out, pal_note *note)
+{
+    const char *host = NULL;
+    if (!strncmp(url, "ws://", 5)) host = url + 5;
+    if (!strncmp(url, "http://", 7)) host = url + 7;
+    if (!host) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a ws:// or http:// address", url);
+    const size_t n_all = strcspn(host, "/"), n_path = strlen(host + n_all);
+    const char *colon = NULL;
+    const bool bracket = host[0] == '[';
+    const char *close = bracket ? memchr(host, ']', n_all) : NULL;
+    const size_t after = close ? (size_t)(close - host) : 0;
+    colon = memchr(host + after, ':', n_all - after);
+    const size_t n_host = close ? after - 1 : (colon ? (size_t)(colon - host) : n_all);
+    if (n_host == 0 || n_host >= sizeof out->host || n_path >= sizeof out->path || (bracket && !close))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: host or path is empty or too long", url);
+    long port = 80;
+    if (colon) {
+        char *end;
+        port = strtol(colon + 1, &end, 10);
+        if (end != host + n_all || port < 1 || port > 65535)
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: port is not a number of 1 to 65535", url);
+    }
+    memcpy(out->host, host + bracket, n_host);
+    out->host[n_host] = 0;
+    memcpy(out->path, n_path > 1 ? host + n_all : "/ws", n_path > 1 ? n_path + 1 : 4);
+    out->port = (int)port;
+    return PAL_ERR_OK;
+}

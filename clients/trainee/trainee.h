@@ -1,0 +1,70 @@
+/* One headless trainee: joins, moves its tool by a script, checks every message, measures.
+ *
+ * Checked: every FRAME decodes, belongs to a known part and epoch, its seq grows, its positions are finite and within
+ * the scene's box grown by its own size, its quantisation keeps the stated error; cycles grow, frames lie inside their
+ * cycle; assets have the hash of their name; nothing malformed. A wish broken is counted under its name.
+ * Measured: pose to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
+#ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
+#define PAL_CLIENTS_TRAINEE_TRAINEE_H
+#include "clients/link/asset_store.h"
+#include "clients/trainee/samples.h"
+#include "clients/trainee/script.h"
+
+/* X(name, sentence) */
+#define PAL_FAULT_TABLE(X)                                                                                             \
+    X(MALFORMED, "a message is not well-formed")                                                                       \
+    X(DECODE, "a frame does not decode")                                                                               \
+    X(PART, "a frame of an unknown part")                                                                              \
+    X(EPOCH, "a frame of an older epoch after a newer one")                                                            \
+    X(SEQ, "a part's seq does not grow")                                                                               \
+    X(CYCLE, "a cycle number does not grow or a frame stands outside its cycle")                                       \
+    X(BOUND, "a frame's step is too coarse for the stated error")                                                      \
+    X(PLACE, "a vertex lies far outside the scene or is not finite")                                                   \
+    X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \
+    X(CLOSED, "the server closed the connection for a fault of ours")
+typedef enum pal_fault {
+#define X(code, text) PAL_FAULT_##code,
+    PAL_FAULT_TABLE(X)
+#undef X
+        PAL_FAULT_COUNT
+} pal_fault;
+const char *pal_fault_name(pal_fault fault);
+
+typedef struct pal_trainee pal_trainee;
+
+typedef struct pal_trainee_options {
+    const char *url, *name, *script; /* borrowed                                                */
+    int tool;                        /* index or PAL_WIRE_TOOL_ANY                              */
+    double rate_hz;                  /* of poses                                                */
+    double depth_m;                  /* of press and pull; 0: 8 % of the box, at most 10 mm     */
+    double up[3];
+    int index, n_client; /* which of several: each touches its own place            */
+    double read_bytes_s; /* > 0: slow reader                                        */
+    double stall_s;      /* > 0: reads nothing for this long, one second after the first cycle */
+} pal_trainee_options;
+
+typedef struct pal_trainee_result {
+    bool joined, stall_done;
+    int tool;                          /* held at the end, PAL_WIRE_TOOL_NONE        */
+    uint32_t joins, n_old_after_stall; /* cycles older than 100 ms behind the newest after a stall */
+    uint64_t n_frame, n_cycle, n_pose, bytes_in;
+    uint64_t fault[PAL_FAULT_COUNT];
+    char first_fault[256], closed[160];
+    double seconds; /* from hello to now                          */
+    double moved_m; /* largest distance of a vertex from its place in the first frame */
+    double force_N; /* largest force on the own tool              */
+    uint64_t asset_bytes;
+    pal_samples latency_ms, decode_ms, gap_ms; /* owned by the trainee */
+} pal_trainee_result;
+
+/* borrows loop and store until destroy; REFUSED: URL or script */
+pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_trainee_options *options,
+                         pal_note *note, pal_trainee **out);
+void pal_trainee_destroy(pal_trainee *t); /* after the loop is destroyed; NULL is fine */
+/* an asset of the store became ready or failed */
+void pal_trainee_asset(pal_trainee *t, const pal_stored_asset *asset);
+const pal_trainee_result *pal_trainee_look(pal_trainee *t);
+/* has the script been able to run: joined and (unless idle) holds a tool */
+bool pal_trainee_working(const pal_trainee *t);
+bool pal_trainee_ended(const pal_trainee *t); /* the link will not come back */
+#endif
