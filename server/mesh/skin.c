@@ -265,20 +265,28 @@ static bool frame_edge(const pal_skin *skin, size_t f, const double *x, const do
     return true;
 }
 
+static void update_frame(const pal_skin *skin, size_t f, const double *x, float *frames)
+{
+    double X[3], Y[3], Z[3];
+    int32_t a = skin->fan_start[f], n = skin->fan_start[f + 1] - a;
+    double squares = fan_normal(x, skin->frame[f], skin->fan + 2 * (size_t)a, n, X);
+    double length2 = pal_dot3(X, X);
+    if (!(length2 > LEAST_NORMAL_STEP * LEAST_NORMAL_STEP * squares) || !(length2 < 1e300)) return;
+    pal_scale3(X, 1 / sqrt(length2), X);
+    if (!frame_edge(skin, f, x, X, Y)) return;
+    pal_cross3(Z, X, Y);
+    float *to = frames + 16 * f;
+    for (int k = 0; k < 3; k++) to[k] = (float)X[k], to[4 + k] = (float)Y[k], to[8 + k] = (float)Z[k];
+}
+
 void pal_skin_frames(const pal_skin *skin, const double *x, void *frames)
 {
-    for (size_t f = 0; f < (size_t)skin->n_frame; f++) {
-        double X[3], Y[3], Z[3];
-        int32_t a = skin->fan_start[f], n = skin->fan_start[f + 1] - a;
-        double squares = fan_normal(x, skin->frame[f], skin->fan + 2 * (size_t)a, n, X);
-        double length2 = pal_dot3(X, X);
-        if (!(length2 > LEAST_NORMAL_STEP * LEAST_NORMAL_STEP * squares) || !(length2 < 1e300)) continue;
-        pal_scale3(X, 1 / sqrt(length2), X);
-        if (!frame_edge(skin, f, x, X, Y)) continue;
-        pal_cross3(Z, X, Y);
-        float *to = (float *)frames + 16 * f;
-        for (int k = 0; k < 3; k++) to[k] = (float)X[k], to[4 + k] = (float)Y[k], to[8 + k] = (float)Z[k];
-    }
+    for (size_t f = 0; f < (size_t)skin->n_frame; f++) update_frame(skin, f, x, frames);
+}
+
+void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames)
+{
+    for (int i = 0; i < n; i++) update_frame(skin, (size_t)list[i], x, frames);
 }
 
 void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out)

@@ -43,6 +43,8 @@ static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
 /* axes from node positions x [n_node][3]. A flat or inverted neighbourhood keeps the axes that the buffer holds from
  * the last call (so fill it once at rest). [sim] */
 void pal_skin_frames(const pal_skin *skin, const double *x, void *frames);
+/* the same for the n frames of list only [sim] */
+void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames);
 /* all shown vertices: out [n_vertex][3] float metres; writes the nodes' positions into frames. [sim] */
 void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out);
 /* one shown vertex. [sim] */
