@@ -59,7 +59,7 @@ typedef struct pal_frame_encoder pal_frame_encoder;
 int pal_frame_encoder_create(const float *rest_m, const pal_frame_order *order, pal_frame_encoder **out);
 void pal_frame_encoder_destroy(pal_frame_encoder *e); /* NULL allowed */
 /* [any] one whole FRAME message into dst; allocates nothing. NAN: a position is not finite; SPACE: cap is less than
- * needed (pal_frame_bound always suffices); RANGE: error_m, affine or a displacement beyond any use. On failure the
+ * pal_frame_bound(n_vertex); RANGE: error_m, affine or a displacement beyond any use. On failure the
  * encoder is as before the call. */
 int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *dst, size_t cap,
                   pal_frame_result *result);

@@ -10,9 +10,11 @@
 
 #include <stdint.h>
 
-#define PAL_ORDER_NEIGHBOURS 4
-#define PAL_ORDER_ONE        4096 /* weights are Q12; a vertex with a prediction has weights that sum exactly to this */
-#define PAL_ORDER_ABS_MAX    8191 /* largest allowed sum of |weight|: keeps the prediction inside int32               */
+#define PAL_ORDER_VERTEX_MAX   (1u << 22)
+#define PAL_ORDER_TRIANGLE_MAX (1u << 24)
+#define PAL_ORDER_NEIGHBOURS   4
+#define PAL_ORDER_ONE          4096 /* weights are Q12; a vertex with a prediction has weights that sum exactly to this */
+#define PAL_ORDER_ABS_MAX      8191 /* largest allowed sum of |weight|: keeps the prediction inside int32               */
 
 typedef struct pal_frame_order {
     uint32_t n_vertex;

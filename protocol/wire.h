@@ -16,10 +16,10 @@
 #define PAL_WIRE_MAGIC       0x314C4150u /* the bytes P A L 1 */
 
 #define PAL_WIRE_HEAD_BYTES            8
-#define PAL_WIRE_TOOL_MAX              32 /* tools of a session */
-#define PAL_WIRE_PART_MAX              16 /* mesh parts of a session */
-#define PAL_WIRE_PATCH_MAX             8  /* contact patches of a haptic model */
-#define PAL_WIRE_VERTEX_MAX            (1u << 22)
+#define PAL_WIRE_TOOL_MAX              32         /* tools of a session */
+#define PAL_WIRE_PART_MAX              16         /* mesh parts of a session */
+#define PAL_WIRE_PATCH_MAX             8          /* contact patches of a haptic model */
+#define PAL_WIRE_VERTEX_MAX            (1u << 22) /* shown vertices of a part, PAL_ORDER_VERTEX_MAX */
 #define PAL_WIRE_POSE_BYTES            152
 #define PAL_WIRE_ACK_BYTES             16
 #define PAL_WIRE_IN_MAX                PAL_WIRE_POSE_BYTES /* longest binary message a client may send */

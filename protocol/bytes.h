@@ -1,0 +1,58 @@
+/* Little-endian numbers in byte buffers, the same on any host. Private to this room. */
+#ifndef PAL_PROTOCOL_BYTES_H
+#define PAL_PROTOCOL_BYTES_H
+#include <stdint.h>
+#include <string.h>
+
+static inline void pal_put_u16(uint8_t *b, uint16_t v)
+{
+    b[0] = (uint8_t)v;
+    b[1] = (uint8_t)(v >> 8);
+}
+static inline void pal_put_u32(uint8_t *b, uint32_t v)
+{
+    for (int i = 0; i < 4; i++) b[i] = (uint8_t)(v >> (8 * i));
+}
+static inline void pal_put_u64(uint8_t *b, uint64_t v)
+{
+    for (int i = 0; i < 8; i++) b[i] = (uint8_t)(v >> (8 * i));
+}
+static inline void pal_put_f32(uint8_t *b, float v)
+{
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    pal_put_u32(b, bits);
+}
+static inline void pal_put_f64(uint8_t *b, double v)
+{
+    uint64_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    pal_put_u64(b, bits);
+}
+static inline uint16_t pal_get_u16(const uint8_t *b)
+{
+    return (uint16_t)(b[0] | b[1] << 8);
+}
+static inline uint32_t pal_get_u32(const uint8_t *b)
+{
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+static inline uint64_t pal_get_u64(const uint8_t *b)
+{
+    return pal_get_u32(b) | (uint64_t)pal_get_u32(b + 4) << 32;
+}
+static inline float pal_get_f32(const uint8_t *b)
+{
+    uint32_t bits = pal_get_u32(b);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+static inline double pal_get_f64(const uint8_t *b)
+{
+    uint64_t bits = pal_get_u64(b);
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+#endif

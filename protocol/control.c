@@ -1,0 +1,553 @@
+/* Control messages as tables of fields, one table per message, read by one reader and written by one writer, so that
+ * both directions agree by construction. The writer needs no memory; the reader hands text to cJSON only after its
+ * size, nesting, number of values and UTF-8 were checked, so what cJSON allocates is bounded. */
+#include "protocol/control.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DEPTH_MAX = 8, VALUES_IN = 256, VALUES_OUT = 4096 };
+#define INTEGER_MAX 9007199254740992.0 /* 2^53 */
+#define FIXED       ((size_t)-1)
+
+typedef enum field_type {
+    U16,
+    U32,
+    U64,
+    F64,
+    BOOL,
+    TEXT,    /* char[size]                                      */
+    ROLE,    /* pal_wire_role as its name                       */
+    TOOL,    /* int: index, -1 any, none as null or absent      */
+    NUMBERS, /* double[max], counted or FIXED                   */
+    TEXTS,   /* char[max][size], counted                        */
+    OBJECT,  /* sub, whose offsets are those of the outer struct */
+    OBJECTS, /* struct[max] of size bytes, counted              */
+    ARGS     /* object of numbers: pal_wire_arg[max], counted   */
+} field_type;
+
+typedef struct field {
+    const char *key; /* NULL ends a table */
+    field_type type;
+    bool required;
+    size_t offset, size;
+    size_t count; /* offset of the uint32_t count, or FIXED */
+    uint32_t max;
+    const struct field *sub;
+} field;
+
+#define AT(type, member)  offsetof(type, member)
+#define LEN(type, member) sizeof(((type *)0)->member)
+#define END                                                                                                            \
+    {                                                                                                                  \
+        0                                                                                                              \
+    }
+
+static const field part_fields[] = {
+    {"name", TEXT, true, AT(pal_wire_part_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"epoch", U32, true, AT(pal_wire_part_info, epoch), 0, 0, 0, NULL},
+    {"n_vertex", U32, true, AT(pal_wire_part_info, n_vertex), 0, 0, 0, NULL},
+    {"n_triangle", U32, true, AT(pal_wire_part_info, n_triangle), 0, 0, 0, NULL},
+    {"asset", TEXT, true, AT(pal_wire_part_info, asset), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
+    END};
+static const field tool_fields[] = {{"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+                                    {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
+                                    END};
+static const field you_fields[] = {{"id", U16, true, AT(pal_wire_hello, you_id), 0, 0, 0, NULL},
+                                   {"role", ROLE, true, AT(pal_wire_hello, you_role), 0, 0, 0, NULL},
+                                   {"name", TEXT, true, AT(pal_wire_hello, you_name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+                                   {"tool", TOOL, false, AT(pal_wire_hello, you_tool), 0, 0, 0, NULL},
+                                   END};
+static const field hello_fields[] = {
+    {"version", U32, true, AT(pal_wire_hello, version), 0, 0, 0, NULL},
+    {"session", TEXT, true, AT(pal_wire_hello, session), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"title", TEXT, true, AT(pal_wire_hello, title), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"organ", TEXT, true, AT(pal_wire_hello, organ), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"step_rate_hz", F64, true, AT(pal_wire_hello, step_rate_hz), 0, 0, 0, NULL},
+    {"frame_rate_hz", F64, true, AT(pal_wire_hello, frame_rate_hz), 0, 0, 0, NULL},
+    {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
+    {"box_min_m", NUMBERS, true, AT(pal_wire_hello, box_min_m), 0, FIXED, 3, NULL},
+    {"box_max_m", NUMBERS, true, AT(pal_wire_hello, box_max_m), 0, FIXED, 3, NULL},
+    {"parts", OBJECTS, true, AT(pal_wire_hello, part), sizeof(pal_wire_part_info), AT(pal_wire_hello, n_part),
+     PAL_WIRE_PART_MAX, part_fields},
+    {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),
+     PAL_WIRE_TOOL_MAX, tool_fields},
+    {"rows", TEXTS, true, AT(pal_wire_hello, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_row), PAL_WIRE_ROW_MAX,
+     NULL},
+    {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
+    END};
+static const field topology_fields[] = {{"parts", OBJECTS, true, AT(pal_wire_topology, part),
+                                         sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part), PAL_WIRE_PART_MAX,
+                                         part_fields},
+                                        END};
+static const field status_fields[] = {
+    {"tick", U64, true, AT(pal_wire_status, tick), 0, 0, 0, NULL},
+    {"sim_time_s", F64, true, AT(pal_wire_status, sim_time_s), 0, 0, 0, NULL},
+    {"paused", BOOL, true, AT(pal_wire_status, paused), 0, 0, 0, NULL},
+    {"frozen", BOOL, true, AT(pal_wire_status, frozen), 0, 0, 0, NULL},
+    {"step_rate_hz", F64, true, AT(pal_wire_status, step_rate_hz), 0, 0, 0, NULL},
+    {"slowdown", F64, true, AT(pal_wire_status, slowdown), 0, 0, 0, NULL},
+    {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
+    {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
+    {"row_ms", NUMBERS, true, AT(pal_wire_status, row_ms), 0, AT(pal_wire_status, n_row), PAL_WIRE_ROW_MAX, NULL},
+    {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
+    {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
+    {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
+    {"skipped", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
+    {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
+    {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
+    {"note", TEXT, false, AT(pal_wire_status, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    END};
+static const field member_fields[] = {{"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
+                                      {"role", ROLE, true, AT(pal_wire_member, role), 0, 0, 0, NULL},
+                                      {"name", TEXT, true, AT(pal_wire_member, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+                                      {"tool", TOOL, false, AT(pal_wire_member, tool), 0, 0, 0, NULL},
+                                      {"colour", U32, true, AT(pal_wire_member, colour), 0, 0, 0, NULL},
+                                      END};
+static const field members_fields[] = {{"members", OBJECTS, true, AT(pal_wire_members, member), sizeof(pal_wire_member),
+                                        AT(pal_wire_members, n_member), PAL_WIRE_MEMBER_MAX, member_fields},
+                                       END};
+static const field error_fields[] = {{"code", TEXT, true, AT(pal_wire_problem, code), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+                                     {"text", TEXT, true, AT(pal_wire_problem, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+                                     END};
+static const field join_fields[] = {{"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+                                    {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
+                                    {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
+                                    END};
+static const field command_fields[] = {
+    {"verb", TEXT, true, AT(pal_wire_order, verb), LEN(pal_wire_order, verb), 0, 0, NULL},
+    {"target", TEXT, false, AT(pal_wire_order, target), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"args", ARGS, false, AT(pal_wire_order, arg), 0, AT(pal_wire_order, n_arg), PAL_WIRE_ARG_MAX, NULL},
+    END};
+static const field take_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, END};
+static const field leave_fields[] = {END};
+static const field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
+
+static const struct {
+    const char *name;
+    bool from_server;
+    const field *fields;
+} message[PAL_CONTROL_COUNT] = {
+#define FIELDS_HELLO               hello_fields
+#define FIELDS_TOPOLOGY            topology_fields
+#define FIELDS_STATUS              status_fields
+#define FIELDS_MEMBERS             members_fields
+#define FIELDS_ERROR               error_fields
+#define FIELDS_PONG                stamp_fields
+#define FIELDS_JOIN                join_fields
+#define FIELDS_COMMAND             command_fields
+#define FIELDS_TAKE                take_fields
+#define FIELDS_LEAVE               leave_fields
+#define FIELDS_PING                stamp_fields
+#define X(name, text, from_server) {text, from_server, FIELDS_##name},
+    PAL_CONTROL_TABLE(X)
+#undef X
+};
+
+static const char *const role_name[PAL_WIRE_ROLE_COUNT] = {"viewer", "trainee", "instructor"};
+
+const char *pal_wire_role_name(pal_wire_role role)
+{
+    return (unsigned)role < PAL_WIRE_ROLE_COUNT ? role_name[role] : "unknown";
+}
+
+const char *pal_control_name(pal_control_type type)
+{
+    return (unsigned)type < PAL_CONTROL_COUNT ? message[type].name : NULL;
+}
+
+/* length of the well-formed UTF-8 sequence at s, 0 when there is none (overlong, surrogate, cut, beyond U+10FFFF) */
+static size_t utf8_length(const uint8_t *s, size_t n)
+{
+    uint8_t a = s[0];
+    size_t length = a < 0x80                ? 1
+                    : a >= 0xC2 && a < 0xE0 ? 2
+                    : a >= 0xE0 && a < 0xF0 ? 3
+                    : a >= 0xF0 && a < 0xF5 ? 4
+                                            : 0;
+    if (length == 0 || length > n) return 0;
+    for (size_t i = 1; i < length; i++)
+        if ((s[i] & 0xC0) != 0x80) return 0;
+    if ((a == 0xE0 && s[1] < 0xA0) || (a == 0xED && s[1] > 0x9F)) return 0;
+    if ((a == 0xF0 && s[1] < 0x90) || (a == 0xF4 && s[1] > 0x8F)) return 0;
+    return length;
+}
+
+/* is this what a string field may hold? */
+static bool good_text(const char *text, size_t n)
+{
+    for (size_t i = 0; i < n;) {
+        uint8_t c = (uint8_t)text[i];
+        size_t length = utf8_length((const uint8_t *)text + i, n - i);
+        if (length == 0 || c < 0x20 || c == 0x7F) return false;
+        i += length;
+    }
+    return true;
+}
+
+/* ---- writer ---- */
+
+typedef struct writer {
+    char *dst;
+    size_t cap, n;
+    int refusal;
+} writer;
+
+static void add(writer *w, const char *text, size_t n)
+{
+    if (w->refusal) return;
+    if (n >= w->cap - w->n) {
+        w->refusal = PAL_REFUSAL_SPACE;
+        return;
+    }
+    memcpy(w->dst + w->n, text, n);
+    w->n += n;
+    w->dst[w->n] = 0;
+}
+
+static void add_text(writer *w, const char *text, size_t size)
+{
+    size_t n = strnlen(text, size);
+    if (n == size || !good_text(text, n)) w->refusal = PAL_REFUSAL_FIELD;
+    add(w, "\"", 1);
+    for (size_t i = 0; i < n && !w->refusal; i++) {
+        if (text[i] == '"' || text[i] == '\\') add(w, "\\", 1);
+        add(w, text + i, 1);
+    }
+    add(w, "\"", 1);
+}
+
+/* the shortest of the usual forms that reads back as the same double */
+static void add_number(writer *w, double v)
+{
+    char digits[40];
+    if (!isfinite(v)) {
+        w->refusal = PAL_REFUSAL_NAN;
+        return;
+    }
+    for (int precision = 9; precision <= 17; precision += 4) {
+        snprintf(digits, sizeof digits, "%.*g", precision, v);
+        if (strtod(digits, NULL) == v) break;
+    }
+    add(w, digits, strlen(digits));
+}
+
+static void add_tool(writer *w, int tool)
+{
+    if (tool < PAL_WIRE_TOOL_NONE || tool >= PAL_WIRE_TOOL_MAX)
+        w->refusal = PAL_REFUSAL_RANGE;
+    else if (tool == PAL_WIRE_TOOL_NONE)
+        add(w, "null", 4);
+    else
+        add_number(w, tool);
+}
+
+static uint32_t counted(const field *f, const uint8_t *base, int *refusal)
+{
+    uint32_t n = f->max;
+    if (f->count != FIXED) memcpy(&n, base + f->count, sizeof n);
+    if (n > f->max) *refusal = PAL_REFUSAL_RANGE;
+    return n > f->max ? 0 : n;
+}
+
+static void add_key(writer *w, const char *key, bool first)
+{
+    if (!first) add(w, ",", 1);
+    add(w, "\"", 1);
+    add(w, key, strlen(key));
+    add(w, "\":", 2);
+}
+
+static void add_scalar(writer *w, const field *f, const uint8_t *at)
+{
+    uint16_t u16;
+    uint32_t u32;
+    uint64_t u64;
+    double f64;
+    pal_wire_role role;
+    int tool;
+    switch (f->type) {
+    case U16:
+        memcpy(&u16, at, sizeof u16);
+        add_number(w, u16);
+        break;
+    case U32:
+        memcpy(&u32, at, sizeof u32);
+        add_number(w, u32);
+        break;
+    case U64:
+        memcpy(&u64, at, sizeof u64);
+        if (u64 > (uint64_t)INTEGER_MAX) w->refusal = PAL_REFUSAL_RANGE;
+        add_number(w, (double)u64);
+        break;
+    case F64:
+        memcpy(&f64, at, sizeof f64);
+        add_number(w, f64);
+        break;
+    case ROLE:
+        memcpy(&role, at, sizeof role);
+        if ((unsigned)role >= PAL_WIRE_ROLE_COUNT) w->refusal = PAL_REFUSAL_RANGE;
+        add_text(w, pal_wire_role_name(role), PAL_WIRE_NAME_BYTES);
+        break;
+    default:
+        memcpy(&tool, at, sizeof tool);
+        add_tool(w, tool);
+    }
+}
+
+static void add_fields(writer *w, const field *f, const uint8_t *base, bool first);
+
+static void add_list(writer *w, const field *f, const uint8_t *base)
+{
+    uint32_t n = counted(f, base, &w->refusal);
+    const uint8_t *at = base + f->offset;
+    add(w, f->type == ARGS ? "{" : "[", 1);
+    for (uint32_t i = 0; i < n && !w->refusal; i++) {
+        if (i && f->type != ARGS) add(w, ",", 1);
+        if (f->type == NUMBERS) {
+            add_number(w, ((const double *)(const void *)at)[i]);
+        } else if (f->type == TEXTS) {
+            add_text(w, (const char *)at + i * f->size, f->size);
+        } else if (f->type == OBJECTS) {
+            add(w, "{", 1);
+            add_fields(w, f->sub, at + i * f->size, true);
+            add(w, "}", 1);
+        } else {
+            const pal_wire_arg *arg = (const pal_wire_arg *)(const void *)at + i;
+            if (i) add(w, ",", 1);
+            add_text(w, arg->key, sizeof arg->key);
+            add(w, ":", 1);
+            add_number(w, arg->value);
+        }
+    }
+    add(w, f->type == ARGS ? "}" : "]", 1);
+}
+
+static void add_fields(writer *w, const field *f, const uint8_t *base, bool first)
+{
+    for (; f->key && !w->refusal; f++, first = false) {
+        add_key(w, f->key, first);
+        if (f->type == BOOL) {
+            bool value;
+            memcpy(&value, base + f->offset, sizeof value);
+            add(w, value ? "true" : "false", value ? 4 : 5);
+        } else if (f->type == TEXT) {
+            add_text(w, (const char *)base + f->offset, f->size);
+        } else if (f->type == OBJECT) {
+            add(w, "{", 1);
+            add_fields(w, f->sub, base, true);
+            add(w, "}", 1);
+        } else if (f->type >= NUMBERS) {
+            add_list(w, f, base);
+        } else {
+            add_scalar(w, f, base + f->offset);
+        }
+    }
+}
+
+int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte)
+{
+    writer w = {dst, cap, 0, 0};
+    if ((unsigned)c->type >= PAL_CONTROL_COUNT) return PAL_REFUSAL_KIND;
+    size_t limit = message[c->type].from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX;
+    if (w.cap > limit + 1) w.cap = limit + 1;
+    if (w.cap == 0) return PAL_REFUSAL_SPACE;
+    add(&w, "{\"type\":\"", 9);
+    add(&w, message[c->type].name, strlen(message[c->type].name));
+    add(&w, "\"", 1);
+    add_fields(&w, message[c->type].fields, (const uint8_t *)&c->hello, false);
+    add(&w, "}", 1);
+    if (!w.refusal) *n_byte = w.n;
+    return w.refusal;
+}
+
+/* ---- reader ---- */
+
+/* size of the structure without parsing it: nesting, number of values, UTF-8 */
+static int scan(const char *text, size_t n, uint32_t n_value_max)
+{
+    uint32_t n_value = 0;
+    int depth = 0;
+    bool quoted = false;
+    for (size_t i = 0; i < n;) {
+        size_t length = utf8_length((const uint8_t *)text + i, n - i);
+        char c = text[i];
+        if (length == 0 || c == 0) return PAL_REFUSAL_JSON;
+        if (quoted) {
+            if (c == '"') quoted = false;
+            if (c == '\\') length++;
+        } else if (c == '"') {
+            quoted = true;
+        } else if (c == '{' || c == '[') {
+            n_value++;
+            if (++depth > DEPTH_MAX) return PAL_REFUSAL_JSON;
+        } else if (c == '}' || c == ']') {
+            depth--;
+        } else if (c == ',') {
+            n_value++;
+        }
+        if (n_value > n_value_max) return PAL_REFUSAL_JSON;
+        i += length;
+    }
+    return quoted || depth ? PAL_REFUSAL_JSON : PAL_REFUSAL_NONE;
+}
+
+static int read_text(const cJSON *item, char *dst, size_t size)
+{
+    const char *text = cJSON_GetStringValue(item);
+    if (!text) return PAL_REFUSAL_FIELD;
+    size_t n = strlen(text);
+    if (n >= size || !good_text(text, n)) return PAL_REFUSAL_FIELD;
+    memcpy(dst, text, n + 1);
+    return 0;
+}
+
+static int read_number(const cJSON *item, double *out)
+{
+    if (!cJSON_IsNumber(item)) return PAL_REFUSAL_FIELD;
+    if (!isfinite(item->valuedouble)) return PAL_REFUSAL_NAN;
+    *out = item->valuedouble;
+    return 0;
+}
+
+static int read_integer(const cJSON *item, double least, double most, double *out)
+{
+    double v;
+    int refusal = read_number(item, &v);
+    if (refusal) return refusal;
+    if (v < least || v > most || v != floor(v)) return PAL_REFUSAL_RANGE;
+    *out = v;
+    return 0;
+}
+
+static int read_role(const cJSON *item, pal_wire_role *out)
+{
+    const char *text = cJSON_GetStringValue(item);
+    for (int r = 0; text && r < PAL_WIRE_ROLE_COUNT; r++)
+        if (!strcmp(text, role_name[r])) {
+            *out = (pal_wire_role)r;
+            return 0;
+        }
+    return PAL_REFUSAL_FIELD;
+}
+
+static int read_scalar(const field *f, const cJSON *item, uint8_t *at)
+{
+    static const double most[] = {[U16] = 65535, [U32] = 4294967295.0, [U64] = INTEGER_MAX};
+    double v = 0;
+    int refusal = 0;
+    if (f->type <= U64) {
+        refusal = read_integer(item, 0, most[f->type], &v);
+        const uint64_t u64 = (uint64_t)v;
+        const uint32_t u32 = (uint32_t)v;
+        const uint16_t u16 = (uint16_t)v;
+        if (f->type == U16) memcpy(at, &u16, sizeof u16);
+        if (f->type == U32) memcpy(at, &u32, sizeof u32);
+        if (f->type == U64) memcpy(at, &u64, sizeof u64);
+    } else if (f->type == F64) {
+        refusal = read_number(item, &v);
+        memcpy(at, &v, sizeof v);
+    } else if (f->type == BOOL) {
+        const bool value = cJSON_IsTrue(item);
+        if (!cJSON_IsBool(item)) return PAL_REFUSAL_FIELD;
+        memcpy(at, &value, sizeof value);
+    } else if (f->type == ROLE) {
+        pal_wire_role role = PAL_WIRE_ROLE_VIEWER;
+        refusal = read_role(item, &role);
+        memcpy(at, &role, sizeof role);
+    } else {
+        refusal = read_integer(item, PAL_WIRE_TOOL_ANY, PAL_WIRE_TOOL_MAX - 1, &v);
+        const int tool = (int)v;
+        memcpy(at, &tool, sizeof tool);
+    }
+    return refusal;
+}
+
+static int read_fields(const field *f, const cJSON *object, uint8_t *base);
+
+static int read_list(const field *f, const cJSON *list, uint8_t *base)
+{
+    uint32_t n = 0;
+    int refusal = 0;
+    if (f->type == ARGS ? !cJSON_IsObject(list) : !cJSON_IsArray(list)) return PAL_REFUSAL_FIELD;
+    for (const cJSON *item = list->child; item && !refusal; item = item->next, n++) {
+        uint8_t *at = base + f->offset;
+        if (n >= f->max) return PAL_REFUSAL_COUNT;
+        if (f->type == NUMBERS) {
+            refusal = read_number(item, (double *)(void *)at + n);
+        } else if (f->type == TEXTS) {
+            refusal = read_text(item, (char *)at + n * f->size, f->size);
+        } else if (f->type == OBJECTS) {
+            refusal = read_fields(f->sub, item, at + n * f->size);
+        } else {
+            pal_wire_arg *arg = (pal_wire_arg *)(void *)at + n;
+            size_t length = strlen(item->string);
+            if (length >= sizeof arg->key || !good_text(item->string, length)) return PAL_REFUSAL_FIELD;
+            memcpy(arg->key, item->string, length + 1);
+            refusal = read_number(item, &arg->value);
+        }
+    }
+    if (refusal) return refusal;
+    if (f->count == FIXED) return n == f->max ? PAL_REFUSAL_NONE : PAL_REFUSAL_COUNT;
+    memcpy(base + f->count, &n, sizeof n);
+    return 0;
+}
+
+static int read_fields(const field *f, const cJSON *object, uint8_t *base)
+{
+    int refusal = cJSON_IsObject(object) ? PAL_REFUSAL_NONE : PAL_REFUSAL_FIELD;
+    for (; f->key && !refusal; f++) {
+        const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, f->key);
+        bool absent = !item || (f->type == TOOL && cJSON_IsNull(item));
+        if (absent) {
+            const int none = PAL_WIRE_TOOL_NONE;
+            if (f->type == TOOL) memcpy(base + f->offset, &none, sizeof none);
+            if (f->required) refusal = PAL_REFUSAL_FIELD;
+        } else if (f->type == TEXT) {
+            refusal = read_text(item, (char *)base + f->offset, f->size);
+        } else if (f->type == OBJECT) {
+            refusal = read_fields(f->sub, item, base);
+        } else if (f->type >= NUMBERS) {
+            refusal = read_list(f, item, base);
+        } else {
+            refusal = read_scalar(f, item, base + f->offset);
+        }
+    }
+    return refusal;
+}
+
+static int read_message(const cJSON *root, bool from_server, pal_control *c)
+{
+    const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(root, "type"));
+    if (!cJSON_IsObject(root) || !name) return PAL_REFUSAL_FIELD;
+    int type = 0;
+    while (type < PAL_CONTROL_COUNT && strcmp(message[type].name, name)) type++;
+    if (type == PAL_CONTROL_COUNT || message[type].from_server != from_server) return PAL_REFUSAL_KIND;
+    c->type = (pal_control_type)type;
+    return read_fields(message[type].fields, root, (uint8_t *)&c->hello);
+}
+
+int pal_control_get(const char *text, size_t n_byte, bool from_server, pal_control *out)
+{
+    if (n_byte > (from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX)) return PAL_REFUSAL_LONG;
+    int refusal = scan(text, n_byte, from_server ? VALUES_OUT : VALUES_IN);
+    if (refusal) return refusal;
+    const char *end = NULL;
+    cJSON *root = cJSON_ParseWithLengthOpts(text, n_byte, &end, false);
+    pal_control *c = calloc(1, sizeof *c);
+    if (!root || !c) {
+        refusal = root ? PAL_REFUSAL_MEMORY : PAL_REFUSAL_JSON;
+    } else {
+        for (; end < text + n_byte; end++)
+            if (*end != ' ' && *end != '\t' && *end != '\n' && *end != '\r') refusal = PAL_REFUSAL_JSON;
+        if (!refusal) refusal = read_message(root, from_server, c);
+        if (!refusal) *out = *c;
+    }
+    free(c);
+    cJSON_Delete(root);
+    return refusal;
+}
