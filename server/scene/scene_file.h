@@ -6,7 +6,8 @@
  *   "up": [0, 0, 1],
  *   "bodies": [{
  *     "name": "liver", "mesh": "liver.palmesh"            (relative to the scene file; or "surface": "x.stl" with
- *                                                          "units": "mm", "resolution": 24, prepared at load)
+ *                                                          "units": "mm", "resolution": 24, "label": 2,
+ *                                                          "triangles": 50000, prepared at load)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "model": {"name": "tet_springs", "k_distance_J": ...},
  *     "solver": {"name": "verlet"}, "output": {"name": "skin_out"},
@@ -15,6 +16,7 @@
  *   }],
  *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]
  * }
+ * and "gravity_m_s2": 9.81, "most_substep": 2000 beside step_s.
  * Absent keys take the defaults of pal_scene_default and pal_body_default. */
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
@@ -27,7 +29,7 @@ typedef struct pal_loaded_scene {
     int n_mesh;
 } pal_loaded_scene;
 
-/* at most 1 MiB of JSON, depth 16; *out is freed with pal_scene_free. IO, REFUSED, MEMORY */
+/* at most 1 MiB of JSON, depth 16; *out is freed with pal_scene_free. IO, REFUSED, BUDGET, MEMORY */
 pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note);
 /* folder: where relative mesh names are looked up; name: used in messages */
 pal_err pal_scene_parse(const char *name, const char *json, size_t n_byte, const char *folder, pal_loaded_scene **out,
@@ -35,10 +37,10 @@ pal_err pal_scene_parse(const char *name, const char *json, size_t n_byte, const
 void pal_scene_free(pal_loaded_scene *scene);
 /* how a bare surface or label volume is turned into a scene */
 typedef struct pal_surface_scene {
-    double unit_m;      /* 0: guess                                            */
-    int resolution;     /* 0: about 13,000 tetrahedra                          */
-    int label;          /* of a label volume; < 0: the most frequent           */
-    int target_tri;     /* shown triangles of a label volume's surface; 50,000 */
+    double unit_m;         /* 0: guess                                            */
+    int resolution;        /* 0: about 13,000 tetrahedra                          */
+    int label;             /* of a label volume; < 0: the most frequent           */
+    int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
     pal_material material; /* young_Pa 0: the default material                 */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
@@ -48,7 +50,7 @@ typedef struct pal_surface_scene_report {
     pal_surface_report surface;
     pal_prepare_report prepare;
     double unit_m;
-    const char *unit_name;     /* "mm", "m", "given", ... */
+    const char *unit_name; /* "mm", "m", "given", ... */
     double read_s;
     int resolution;
 } pal_surface_scene_report;
@@ -59,6 +61,9 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
 /* our own procedural organ as a scene, for when nothing else can be had */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note);
-/* writes DIR/scene.json and DIR/NAME.palmesh for every body; creates DIR; IO */
+/* writes DIR/scene.json and DIR/NAME.palmesh for every body, scene.json last; makes DIR; IO, and then nothing that this
+ * call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
+/* makes a folder and those above it; IO */
+pal_err pal_scene_make_folder(const char *folder, pal_note *note);
 #endif

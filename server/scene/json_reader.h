@@ -1,0 +1,42 @@
+/* Checked reading of a JSON tree for scene files (private to this room): every refusal is "file: entry.path: sentence".
+ * Thread: [load]. */
+#ifndef PAL_SCENE_JSON_READER_H
+#define PAL_SCENE_JSON_READER_H
+#include "server/base/err.h"
+
+#include <cjson/cJSON.h>
+#include <stdbool.h>
+
+enum { PAL_JSON_MOST = 1 << 20, PAL_JSON_DEPTH = 16, PAL_JSON_PATH = 96, PAL_JSON_KEYS = 64 };
+
+typedef struct pal_json {
+    const char *file; /* for messages */
+    pal_note *note;   /* may be NULL  */
+} pal_json;
+
+/* text -> tree, whose root is an object; size, depth, UTF-8 and what stands behind the root are checked before and
+ * after cJSON sees it; REFUSED names the line. The caller deletes *out. */
+pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out);
+
+/* "file: path: sentence", REFUSED */
+pal_err pal_json_bad(const pal_json *json, const char *path, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/* path of a key in an object ("" is the root) or of an entry in a list; returns out */
+const char *pal_json_key(char out[PAL_JSON_PATH], const char *path, const char *key);
+const char *pal_json_entry(char out[PAL_JSON_PATH], const char *path, int index);
+
+/* is it an object with no key beside those of the NULL-terminated list, and none twice? known NULL: any key */
+pal_err pal_json_object(const pal_json *json, const cJSON *object, const char *path, const char *const *known);
+/* a key of an object; *out keeps its value when the key is absent */
+pal_err pal_json_number(const pal_json *json, const cJSON *object, const char *path, const char *key, double low,
+                        double high, double *out);
+pal_err pal_json_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int low, int high,
+                       int *out);
+pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *path, const char *key, double out[3]);
+/* a text without control characters of at most n_byte - 1 bytes; empty only when allowed */
+pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,
+                      char *out, size_t n_byte);
+/* a list of at most `most` entries, NULL when the key is absent */
+pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int most,
+                      const cJSON **out);
+#endif

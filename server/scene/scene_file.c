@@ -1,0 +1,270 @@
+/* JSON -> pal_scene. Each kind of entry has one function that first refuses unknown keys and then reads its own; ranges
+ * that belong to the simulation are checked by pal_scene_check at the end. */
+#include "server/scene/scene_file.h"
+
+#include "server/mesh/mesh_file.h"
+#include "server/scene/json_reader.h"
+#include "server/scene/scene_make.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FOLDER = 1024 };
+
+static pal_err read_item(const pal_json *json, const cJSON *object, const char *path, pal_item *out)
+{
+    char at[PAL_JSON_PATH], name[PAL_ITEM_TEXT] = "";
+    pal_note why = {""};
+    PAL_TRY(pal_json_object(json, object, path, NULL));
+    PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
+    if (!*name) return pal_json_bad(json, path, "has no name");
+    pal_item_init(out, path, name);
+    for (const cJSON *child = object->child; child; child = child->next) {
+        double number[PAL_ITEM_NUMBERS];
+        char text[PAL_ITEM_TEXT];
+        pal_err err = PAL_ERR_OK;
+        if (!strcmp(child->string, "name")) continue;
+        pal_json_key(at, path, child->string);
+        if (cJSON_IsNumber(child)) {
+            err = pal_item_put_number(out, child->string, child->valuedouble, &why);
+        } else if (cJSON_IsBool(child)) {
+            err = pal_item_put_bool(out, child->string, cJSON_IsTrue(child), &why);
+        } else if (cJSON_IsString(child)) {
+            PAL_TRY(pal_json_text(json, object, path, child->string, true, text, sizeof text));
+            err = pal_item_put_text(out, child->string, text, &why);
+        } else if (cJSON_IsArray(child)) {
+            int n = 0;
+            for (const cJSON *entry = child->child; entry; entry = entry->next) {
+                if (n == PAL_ITEM_NUMBERS) return pal_json_bad(json, at, "more than %d numbers", PAL_ITEM_NUMBERS);
+                if (!cJSON_IsNumber(entry)) return pal_json_bad(json, at, "is not a list of numbers");
+                number[n++] = entry->valuedouble;
+            }
+            err = pal_item_put_numbers(out, child->string, number, n, &why);
+        } else {
+            return pal_json_bad(json, at, "is not a number, text, true, false or list of numbers");
+        }
+        if (err) return pal_note_set(json->note, err, "%s: %s", json->file, why.text);
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err read_item_at(const pal_json *json, const cJSON *object, const char *path, const char *key, pal_item *out)
+{
+    char at[PAL_JSON_PATH];
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    return item ? read_item(json, item, pal_json_key(at, path, key), out) : PAL_ERR_OK;
+}
+
+static pal_err read_material(const pal_json *json, const cJSON *body, const char *path, pal_material *m)
+{
+    static const char *const known[] = {"young_Pa", "poisson", "density_kg_m3", "damping_1_s", NULL};
+    char at[PAL_JSON_PATH];
+    const cJSON *object = cJSON_GetObjectItemCaseSensitive(body, "material");
+    if (!object) return PAL_ERR_OK;
+    pal_json_key(at, path, "material");
+    PAL_TRY(pal_json_object(json, object, at, known));
+    PAL_TRY(pal_json_number(json, object, at, "young_Pa", 1e-6, 1e12, &m->young_Pa));
+    PAL_TRY(pal_json_number(json, object, at, "poisson", -0.9999, 0.5, &m->poisson));
+    PAL_TRY(pal_json_number(json, object, at, "density_kg_m3", 1e-3, 1e6, &m->density_kg_m3));
+    return pal_json_number(json, object, at, "damping_1_s", 0, 1e6, &m->damping_1_s);
+}
+
+static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support *out)
+{
+    static const char *const known[] = {"lowest", "box", NULL}, *const corners[] = {"low_m", "high_m", NULL};
+    char at[PAL_JSON_PATH];
+    *out = (pal_support){.fraction = 0.05};
+    PAL_TRY(pal_json_object(json, object, path, known));
+    const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
+    out->lowest = cJSON_GetObjectItemCaseSensitive(object, "lowest") != NULL;
+    if (out->lowest == (box != NULL)) return pal_json_bad(json, path, "needs either lowest or box");
+    if (out->lowest) return pal_json_number(json, object, path, "lowest", 0, 1, &out->fraction);
+    pal_json_key(at, path, "box");
+    PAL_TRY(pal_json_object(json, box, at, corners));
+    if (!cJSON_GetObjectItemCaseSensitive(box, "low_m") || !cJSON_GetObjectItemCaseSensitive(box, "high_m"))
+        return pal_json_bad(json, at, "needs low_m and high_m");
+    PAL_TRY(pal_json_vector(json, box, at, "low_m", out->low_m));
+    PAL_TRY(pal_json_vector(json, box, at, "high_m", out->high_m));
+    for (int k = 0; k < 3; k++)
+        if (out->low_m[k] > out->high_m[k])
+            return pal_json_bad(json, at, "low_m[%d] %g is above high_m[%d] %g", k, out->low_m[k], k, out->high_m[k]);
+    return PAL_ERR_OK;
+}
+
+/* a file name of the scene: beside the scene file unless it is absolute */
+static pal_err place_of(const pal_json *json, const char *path, const char *folder, const char *name, char *out,
+                        size_t n_byte)
+{
+    int n = name[0] == '/' ? snprintf(out, n_byte, "%s", name) : snprintf(out, n_byte, "%s/%s", folder, name);
+    return n < 0 || (size_t)n >= n_byte ? pal_json_bad(json, path, "the path is too long") : PAL_ERR_OK;
+}
+
+static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder,
+                         pal_prepared *out)
+{
+    char name[FOLDER / 2] = "", units[16] = "", at[PAL_JSON_PATH], file[FOLDER + FOLDER / 2];
+    bool has_mesh = cJSON_GetObjectItemCaseSensitive(body, "mesh") != NULL;
+    bool has_surface = cJSON_GetObjectItemCaseSensitive(body, "surface") != NULL;
+    const char *key = has_mesh ? "mesh" : "surface";
+    if (has_mesh == has_surface) return pal_json_bad(json, path, "needs either mesh or surface");
+    PAL_TRY(pal_json_text(json, body, path, key, false, name, sizeof name));
+    pal_json_key(at, path, key);
+    PAL_TRY(place_of(json, at, folder, name, file, sizeof file));
+    pal_note why = {""};
+    pal_err err;
+    if (has_mesh) {
+        static const char *const only_surface[] = {"units", "resolution", "label", "triangles"};
+        for (int k = 0; k < 4; k++)
+            if (cJSON_GetObjectItemCaseSensitive(body, only_surface[k]))
+                return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
+        err = pal_prepared_load(file, out, &why);
+    } else {
+        pal_surface_scene options = {.label = -1};
+        PAL_TRY(pal_json_count(json, body, path, "resolution", 0, 1024, &options.resolution));
+        PAL_TRY(pal_json_count(json, body, path, "label", -1, 1 << 30, &options.label));
+        PAL_TRY(pal_json_count(json, body, path, "triangles", 0, 10000000, &options.target_tri));
+        PAL_TRY(pal_json_text(json, body, path, "units", false, units, sizeof units));
+        options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
+        if (*units && options.unit_m == 0)
+            return pal_json_bad(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
+        err = pal_scene_prepare_file(file, &options, out, NULL, NULL, &why);
+    }
+    return err ? pal_note_set(json->note, err, "%s: %s: %s", json->file, at, why.text) : PAL_ERR_OK;
+}
+
+static pal_err read_lists(const pal_json *json, const cJSON *object, const char *path, pal_body_def *body)
+{
+    char at[PAL_JSON_PATH], entry[PAL_JSON_PATH];
+    const cJSON *list;
+    PAL_TRY(pal_json_list(json, object, path, "supports", PAL_SUPPORT_MAX, &list));
+    if (list) body->n_support = 0;
+    for (const cJSON *child = list ? list->child : NULL; child; child = child->next, body->n_support++)
+        PAL_TRY(read_support(json, child, pal_json_entry(entry, pal_json_key(at, path, "supports"), body->n_support),
+                             &body->support[body->n_support]));
+    PAL_TRY(pal_json_list(json, object, path, "effects", PAL_ROW_ITEMS, &list));
+    if (list) body->n_effect = 0;
+    pal_json_key(at, path, "effects");
+    for (const cJSON *child = list ? list->child : NULL; child; child = child->next, body->n_effect++)
+        PAL_TRY(read_item(json, child, pal_json_entry(entry, at, body->n_effect), &body->effect[body->n_effect]));
+    /* default entries get their place in this scene as well */
+    for (int k = 0; k < body->n_effect && !list; k++)
+        snprintf(body->effect[k].path, sizeof body->effect[k].path, "%.40s", pal_json_entry(entry, at, k));
+    return PAL_ERR_OK;
+}
+
+static pal_err read_body(const pal_json *json, const cJSON *object, int index, const char *folder,
+                         pal_loaded_scene *scene)
+{
+    static const char *const known[] = {"name",     "mesh",  "surface", "units",  "resolution", "label",   "triangles",
+                                        "material", "model", "solver",  "output", "supports",   "effects", NULL};
+    char path[PAL_JSON_PATH], name[PAL_NAME];
+    pal_json_entry(path, "bodies", index);
+    PAL_TRY(pal_json_object(json, object, path, known));
+    snprintf(name, sizeof name, "body %d", index + 1);
+    PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
+    pal_body_def *body = &scene->scene.body[index];
+    pal_body_default(body, name, &scene->mesh[index]);
+    PAL_TRY(read_material(json, object, path, &body->material));
+    PAL_TRY(read_item_at(json, object, path, "model", &body->model));
+    PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
+    PAL_TRY(read_item_at(json, object, path, "output", &body->output));
+    PAL_TRY(read_lists(json, object, path, body));
+    PAL_TRY(read_mesh(json, object, path, folder, &scene->mesh[index]));
+    scene->n_mesh = index + 1;
+    return PAL_ERR_OK;
+}
+
+static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *scene)
+{
+    static const char *const known[] = {"name", "radius_m", "force_cap_N", NULL};
+    char path[PAL_JSON_PATH];
+    const cJSON *list;
+    PAL_TRY(pal_json_list(json, root, "", "tools", PAL_TOOL_MAX, &list));
+    if (!list) {
+        pal_tools_default(scene, 3);
+        return PAL_ERR_OK;
+    }
+    pal_tools_default(scene, cJSON_GetArraySize(list));
+    int t = 0;
+    for (const cJSON *child = list->child; child; child = child->next, t++) {
+        pal_tool_def *tool = &scene->tool[t];
+        pal_json_entry(path, "tools", t);
+        PAL_TRY(pal_json_object(json, child, path, known));
+        PAL_TRY(pal_json_text(json, child, path, "name", false, tool->name, sizeof tool->name));
+        PAL_TRY(pal_json_number(json, child, path, "radius_m", 0, 1, &tool->radius_m));
+        PAL_TRY(pal_json_number(json, child, path, "force_cap_N", 1e-3, 1000, &tool->force_cap_N));
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
+{
+    static const char *const known[] = {"name",         "title",        "source", "step_s", "up",
+                                        "gravity_m_s2", "most_substep", "bodies", "tools",  NULL};
+    pal_scene *scene = &loaded->scene;
+    char plain[PAL_NAME];
+    const cJSON *list;
+    pal_scene_default(scene);
+    PAL_TRY(pal_json_object(json, root, "", known));
+    PAL_TRY(pal_json_text(json, root, "", "name", false, scene->name, sizeof scene->name));
+    pal_scene_plain_name(scene->name, plain);
+    if (strcmp(plain, scene->name)) return pal_json_bad(json, "name", "has other characters than a-z 0-9 _ -");
+    PAL_TRY(pal_json_text(json, root, "", "title", true, scene->title, sizeof scene->title));
+    PAL_TRY(pal_json_text(json, root, "", "source", true, scene->source, sizeof scene->source));
+    PAL_TRY(pal_json_number(json, root, "", "step_s", 1e-4, 0.1, &scene->step_s));
+    PAL_TRY(pal_json_number(json, root, "", "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
+    PAL_TRY(pal_json_count(json, root, "", "most_substep", 1, 1000000, &scene->most_substep));
+    PAL_TRY(pal_json_vector(json, root, "", "up", scene->up));
+    PAL_TRY(read_tools(json, root, scene));
+    PAL_TRY(pal_json_list(json, root, "", "bodies", PAL_BODY_MAX, &list));
+    if (!list || !list->child) return pal_json_bad(json, "bodies", "a scene needs at least one body");
+    for (const cJSON *child = list->child; child; child = child->next, scene->n_body++)
+        PAL_TRY(read_body(json, child, scene->n_body, folder, loaded));
+    pal_note why = {""};
+    pal_err err = pal_scene_check(scene, &why);
+    return err ? pal_note_set(json->note, err, "%s: %s", json->file, why.text) : PAL_ERR_OK;
+}
+
+pal_err pal_scene_parse(const char *name, const char *text, size_t n_byte, const char *folder, pal_loaded_scene **out,
+                        pal_note *note)
+{
+    pal_json json = {name, note};
+    cJSON *root;
+    PAL_TRY(pal_json_parse(&json, text, n_byte, &root));
+    pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
+    pal_err err = loaded ? read_scene(&json, root, folder, loaded) : PAL_ERR_MEMORY;
+    cJSON_Delete(root);
+    if (!loaded) return pal_note_set(note, err, "%s: no memory for a scene", name);
+    if (err) {
+        pal_scene_free(loaded);
+        return err;
+    }
+    *out = loaded;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note)
+{
+    char folder[FOLDER];
+    const char *slash = strrchr(path, '/');
+    int n = slash == path ? snprintf(folder, sizeof folder, "/")
+            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
+                          : snprintf(folder, sizeof folder, ".");
+    if (n < 0 || (size_t)n >= sizeof folder)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
+    uint8_t *bytes;
+    size_t n_byte;
+    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, note));
+    pal_err err = pal_scene_parse(path, (const char *)bytes, n_byte, folder, out, note);
+    free(bytes);
+    return err;
+}
+
+void pal_scene_free(pal_loaded_scene *loaded)
+{
+    if (!loaded) return;
+    for (int k = 0; k < PAL_BODY_MAX; k++) pal_prepared_free(&loaded->mesh[k]);
+    free(loaded);
+}

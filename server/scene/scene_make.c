@@ -1,0 +1,290 @@
+/* Surfaces and label volumes -> prepared meshes and default scenes.
+ *
+ * Default resolution: about 13,000 tetrahedra, i.e. 2,600 kept voxels, whatever the shape. With V the volume, A the
+ * area and h the voxel edge, the inside voxels are V/h^3 and the border layer about 1.1 A/h^2 of them; that equation
+ * gives a first h, the fill then counts (it takes milliseconds at this size), and the resolution is corrected by the
+ * cube root of what is missing, at most three times. */
+#include "server/scene/scene_make.h"
+
+#include "server/base/clock.h"
+#include "server/base/utf8.h"
+#include "server/mesh/label_volume.h"
+#include "server/mesh/mesh_file.h"
+#include "server/mesh/organ.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { WANTED_VOXELS = 2600, WANTED_TRI = 50000, LABELS = 64 };
+static const double weld = 1e-6;         /* relative tolerance of surface files   */
+static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
+
+static void say(const pal_surface_scene *options, const char *what, double fraction)
+{
+    if (options->progress) options->progress(what, fraction, options->user);
+}
+
+/* ---- names ---- */
+
+void pal_scene_stem(const char *path, char *out, size_t n_byte)
+{
+    static const char *const endings[] = {".gz",  ".nii", ".inr", ".obj", ".stl", ".ply",
+                                          ".off", ".OBJ", ".STL", ".PLY", ".OFF", ".palmesh"};
+    const char *slash = strrchr(path, '/');
+    snprintf(out, n_byte, "%s", slash ? slash + 1 : path);
+    for (size_t k = 0; k < sizeof endings / sizeof endings[0]; k++) {
+        size_t n = strlen(out), m = strlen(endings[k]);
+        if (n > m && !strcmp(out + n - m, endings[k])) out[n - m] = 0;
+    }
+}
+
+void pal_scene_plain_name(const char *text, char out[PAL_NAME])
+{
+    size_t n = 0;
+    for (; *text && n < PAL_NAME - 1; text++) {
+        char c = (char)tolower((unsigned char)*text);
+        bool fine = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+        if (fine || c == ' ' || c == '.') out[n++] = fine ? c : '_';
+    }
+    out[n] = 0;
+    if (n == 0) snprintf(out, PAL_NAME, "organ");
+}
+
+/* what of a file name may be shown to people */
+static void shown_text(const char *from, char *out, size_t n_byte)
+{
+    size_t n = 0, n_from = strlen(from);
+    for (size_t at = 0; at < n_from;) {
+        uint32_t code;
+        int size = pal_utf8_next(from + at, n_from - at, &code);
+        if (size && pal_utf8_shown(code)) {
+            if (n + (size_t)size >= n_byte) break;
+            memcpy(out + n, from + at, (size_t)size);
+            n += (size_t)size;
+        }
+        at += size ? (size_t)size : 1;
+    }
+    out[n] = 0;
+}
+
+/* ---- resolution ---- */
+
+static int first_resolution(const pal_surface *surface)
+{
+    double low[3], high[3], longest = 0;
+    pal_surface_box(surface, low, high);
+    for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
+    double volume = fabs(pal_surface_volume(surface)), area = pal_surface_area(surface);
+    /* V n^3 + 1.1 A L n^2 = 2600 L^3 for n = L/h, rising in n: by bisection */
+    double few = 1, many = 512;
+    for (int k = 0; k < 60; k++) {
+        double n = 0.5 * (few + many), f = n / longest;
+        *(volume * f * f * f + border_factor * area * f * f < WANTED_VOXELS ? &few : &many) = n;
+    }
+    return (int)lround(few);
+}
+
+static int clamp(int n, int low, int high)
+{
+    return n < low ? low : n > high ? high : n;
+}
+
+/* the resolution whose kept voxels come nearest to 2,600 */
+static pal_err choose_resolution(const pal_surface *surface, int *out, pal_note *note)
+{
+    int n = clamp(first_resolution(surface), 4, 400), best = 0;
+    double best_miss = INFINITY;
+    for (int round = 0; round < 4; round++) {
+        pal_voxel_options options = {.resolution = n, .border = true};
+        pal_voxels voxels;
+        pal_voxel_report report;
+        pal_err err = pal_voxels_fill(surface, &options, &voxels, &report, note);
+        /* nothing inside at a coarse grid: try a finer one before believing it */
+        if (err == PAL_ERR_REFUSED && round < 3 && best == 0 && n < 100) {
+            n *= 2;
+            continue;
+        }
+        if (err && best == 0) return err;
+        if (err) break;
+        double kept = (double)(voxels.n_inside + voxels.n_border), miss = fabs(log(kept / WANTED_VOXELS));
+        pal_voxels_free(&voxels);
+        if (miss < best_miss) best_miss = miss, best = n;
+        int next = clamp((int)lround(n * cbrt(WANTED_VOXELS / kept)), 4, 400);
+        if (next == n || miss < 0.1) break;
+        n = next;
+    }
+    *out = best;
+    return PAL_ERR_OK;
+}
+
+/* ---- reading ---- */
+
+/* the label asked for, or the most frequent one */
+static pal_err read_volume(const char *path, const pal_surface_scene *options, pal_surface *out,
+                           pal_surface_report *report, int *label, pal_note *note)
+{
+    pal_label_volume volume;
+    pal_label_count count[LABELS];
+    PAL_TRY(pal_label_volume_read(path, &volume, note));
+    say(options, "label", 0);
+    int n = pal_label_volume_list(&volume, count, LABELS);
+    pal_err err =
+        n == 0 ? pal_note_set(note, PAL_ERR_REFUSED, "%s: the volume holds no label but 0", path) : PAL_ERR_OK;
+    if (!err) {
+        pal_label_surface_options surface = {
+            .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : WANTED_TRI};
+        pal_note why = {""};
+        *label = options->label >= 0 ? options->label : count[0].label;
+        err = pal_label_volume_surface(&volume, *label, &surface, out, &why);
+        if (err) pal_note_set(note, err, "%s: %s", path, why.text);
+    }
+    if (!err) {
+        snprintf(report->format, sizeof report->format, "%s", volume.format);
+        report->n_vertex_read = out->n_vertex;
+        report->n_tri_read = out->n_tri;
+    }
+    pal_label_volume_free(&volume);
+    return err;
+}
+
+static pal_err read_any(const char *path, const pal_surface_scene *options, pal_surface *out,
+                        pal_surface_scene_report *report, int *label, pal_note *note)
+{
+    double start = pal_clock_s();
+    say(options, "read", 0);
+    *label = -1;
+    pal_err err;
+    if (pal_label_volume_is(path)) {
+        report->unit_m = 1e-3;
+        report->unit_name = "mm";
+        err = read_volume(path, options, out, &report->surface, label, note);
+    } else if (options->label > 0) {
+        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
+                           options->label);
+    } else {
+        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = weld};
+        err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, note);
+    }
+    report->read_s = pal_clock_s() - start;
+    return err;
+}
+
+/* surface -> prepared mesh at the resolution asked for or chosen */
+static pal_err make(const char *name, const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,
+                    pal_surface_scene_report *report, pal_note *note)
+{
+    pal_note why = {""};
+    pal_voxel_options voxel = {.resolution = options->resolution, .border = true};
+    say(options, "fill", 0);
+    pal_err err = options->resolution ? PAL_ERR_OK : choose_resolution(surface, &voxel.resolution, &why);
+    say(options, "split and skin", 0);
+    if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
+    report->resolution = voxel.resolution;
+    return err ? pal_note_set(note, err, "%s: %s", name, why.text) : PAL_ERR_OK;
+}
+
+pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
+                               pal_surface_scene_report *report, int *label_used, pal_note *note)
+{
+    pal_surface_scene_report own = {0};
+    pal_surface surface = {0};
+    int label;
+    if (!report) report = &own;
+    PAL_TRY(read_any(path, options, &surface, report, &label, note));
+    pal_err err = make(path, &surface, options, out, report, note);
+    pal_surface_free(&surface);
+    if (!err && label_used) *label_used = label;
+    return err;
+}
+
+/* ---- scenes ---- */
+
+/* one body with defaults around the prepared mesh in mesh[0] */
+static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
+{
+    pal_scene *scene = &loaded->scene;
+    char plain[PAL_NAME];
+    pal_scene_plain_name(name, plain);
+    loaded->n_mesh = 1;
+    pal_scene_default(scene);
+    snprintf(scene->name, sizeof scene->name, "%s", plain);
+    pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
+    for (int k = 0; k < scene->body[0].n_effect; k++)
+        snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
+    if (options->material.young_Pa > 0) scene->body[0].material = options->material;
+    scene->n_body = 1;
+    pal_tools_default(scene, 3);
+    return pal_scene_check(scene, note);
+}
+
+/* an empty scene and report; NULL: out of memory */
+static pal_loaded_scene *begin(pal_surface_scene_report *report, const char *name, pal_note *note)
+{
+    *report = (pal_surface_scene_report){.unit_name = ""};
+    pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
+    if (!loaded) pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a scene", name);
+    return loaded;
+}
+
+pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
+                               pal_surface_scene_report *report, pal_note *note)
+{
+    pal_surface_scene_report own;
+    if (!report) report = &own;
+    pal_loaded_scene *loaded = begin(report, path, note);
+    if (!loaded) return PAL_ERR_MEMORY;
+    int label = -1;
+    char stem[256], shown[100];
+    const char *slash = strrchr(path, '/');
+    pal_scene_stem(path, stem, sizeof stem);
+    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, &label, note);
+    if (!err) err = dress(loaded, stem, options, note);
+    if (err) {
+        pal_scene_free(loaded);
+        return err;
+    }
+    pal_scene *scene = &loaded->scene;
+    shown_text(stem, shown, sizeof shown);
+    if (label >= 0)
+        snprintf(scene->title, sizeof scene->title, "%s, label %d", shown, label);
+    else
+        snprintf(scene->title, sizeof scene->title, "%s", shown);
+    shown_text(slash ? slash + 1 : path, scene->source, sizeof scene->source);
+    *out = loaded;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
+                             pal_note *note)
+{
+    pal_surface_scene_report own;
+    if (!report) report = &own;
+    pal_loaded_scene *loaded = begin(report, "procedural organ", note);
+    if (!loaded) return PAL_ERR_MEMORY;
+    pal_surface surface = {0};
+    double start = pal_clock_s();
+    say(options, "organ", 0);
+    pal_err err = pal_organ_make(options->target_tri ? options->target_tri : WANTED_TRI, &surface);
+    if (err) pal_note_set(note, err, "the procedural organ: %s", pal_err_text(err));
+    report->read_s = pal_clock_s() - start;
+    report->unit_m = 1;
+    report->unit_name = "m";
+    snprintf(report->surface.format, sizeof report->surface.format, "procedural");
+    report->surface.n_vertex_read = surface.n_vertex;
+    report->surface.n_tri_read = surface.n_tri;
+    if (!err) err = make("procedural organ", &surface, options, &loaded->mesh[0], report, note);
+    pal_surface_free(&surface);
+    if (!err) err = dress(loaded, "organ", options, note);
+    if (err) {
+        pal_scene_free(loaded);
+        return err;
+    }
+    snprintf(loaded->scene.title, sizeof loaded->scene.title, "Procedural organ");
+    snprintf(loaded->scene.source, sizeof loaded->scene.source,
+             "computed by Palpate, not from a patient: no scan was given");
+    *out = loaded;
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,14 @@
+/* Surface or label volume -> prepared mesh (private to this room). Thread: [load]. */
+#ifndef PAL_SCENE_SCENE_MAKE_H
+#define PAL_SCENE_SCENE_MAKE_H
+#include "server/scene/scene_file.h"
+
+/* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; label_used may be NULL:
+ * the label of a volume's surface, -1 for a surface file */
+pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
+                               pal_surface_scene_report *report, int *label_used, pal_note *note);
+/* text -> [a-z0-9_-], at most PAL_NAME - 1 characters, never empty */
+void pal_scene_plain_name(const char *text, char out[PAL_NAME]);
+/* file name without folder and endings: "/a/liver.inr.gz" -> "liver" */
+void pal_scene_stem(const char *path, char *out, size_t n_byte);
+#endif

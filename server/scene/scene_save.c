@@ -1,0 +1,167 @@
+/* pal_scene -> DIR/scene.json and DIR/NAME.palmesh. The meshes go first and scene.json last, so that a folder with a
+ * scene.json is whole; what was written is removed again when something fails. */
+#include "server/scene/scene_file.h"
+
+#include "server/mesh/mesh_file.h"
+#include "server/scene/scene_make.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH = 1200 };
+
+/* "liver.palmesh"; a number keeps two bodies of like names apart */
+static void mesh_name(const pal_scene *scene, int body, char out[PAL_NAME + 16])
+{
+    char plain[PAL_NAME], other[PAL_NAME];
+    bool twice = false;
+    pal_scene_plain_name(scene->body[body].name, plain);
+    for (int k = 0; k < scene->n_body; k++) {
+        pal_scene_plain_name(scene->body[k].name, other);
+        twice = twice || (k != body && !strcmp(plain, other));
+    }
+    if (twice)
+        snprintf(out, PAL_NAME + 16, "%s_%d.palmesh", plain, body);
+    else
+        snprintf(out, PAL_NAME + 16, "%s.palmesh", plain);
+}
+
+static void add_item(cJSON *parent, const char *key, const pal_item *item)
+{
+    cJSON *object = key ? cJSON_AddObjectToObject(parent, key) : cJSON_CreateObject();
+    if (!key) cJSON_AddItemToArray(parent, object);
+    cJSON_AddStringToObject(object, "name", item->name);
+    for (int k = 0; k < item->n_value; k++) {
+        const pal_value *v = &item->value[k];
+        switch (v->kind) {
+        case PAL_VALUE_NUMBER:
+            cJSON_AddNumberToObject(object, v->key, v->number[0]);
+            break;
+        case PAL_VALUE_BOOL:
+            cJSON_AddBoolToObject(object, v->key, v->flag);
+            break;
+        case PAL_VALUE_TEXT:
+            cJSON_AddStringToObject(object, v->key, v->text);
+            break;
+        case PAL_VALUE_NUMBERS:
+            cJSON_AddItemToObject(object, v->key, cJSON_CreateDoubleArray(v->number, v->n_number));
+            break;
+        }
+    }
+}
+
+static void add_supports(cJSON *object, const pal_body_def *body)
+{
+    cJSON *list = cJSON_AddArrayToObject(object, "supports");
+    for (int k = 0; k < body->n_support; k++) {
+        const pal_support *s = &body->support[k];
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, entry);
+        if (s->lowest) {
+            cJSON_AddNumberToObject(entry, "lowest", s->fraction);
+            continue;
+        }
+        cJSON *box = cJSON_AddObjectToObject(entry, "box");
+        cJSON_AddItemToObject(box, "low_m", cJSON_CreateDoubleArray(s->low_m, 3));
+        cJSON_AddItemToObject(box, "high_m", cJSON_CreateDoubleArray(s->high_m, 3));
+    }
+}
+
+static void add_body(cJSON *list, const pal_scene *scene, int index)
+{
+    const pal_body_def *body = &scene->body[index];
+    char name[PAL_NAME + 16];
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddItemToArray(list, object);
+    mesh_name(scene, index, name);
+    cJSON_AddStringToObject(object, "name", body->name);
+    cJSON_AddStringToObject(object, "mesh", name);
+    cJSON *material = cJSON_AddObjectToObject(object, "material");
+    cJSON_AddNumberToObject(material, "young_Pa", body->material.young_Pa);
+    cJSON_AddNumberToObject(material, "poisson", body->material.poisson);
+    cJSON_AddNumberToObject(material, "density_kg_m3", body->material.density_kg_m3);
+    cJSON_AddNumberToObject(material, "damping_1_s", body->material.damping_1_s);
+    add_item(object, "model", &body->model);
+    if (body->solver.name[0]) add_item(object, "solver", &body->solver);
+    add_item(object, "output", &body->output);
+    add_supports(object, body);
+    cJSON *effects = cJSON_AddArrayToObject(object, "effects");
+    for (int k = 0; k < body->n_effect; k++) add_item(effects, NULL, &body->effect[k]);
+}
+
+/* the scene as text, or NULL; the caller frees it */
+static char *scene_text(const pal_scene *scene)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "name", scene->name);
+    cJSON_AddStringToObject(root, "title", scene->title);
+    cJSON_AddStringToObject(root, "source", scene->source);
+    cJSON_AddNumberToObject(root, "step_s", scene->step_s);
+    cJSON_AddItemToObject(root, "up", cJSON_CreateDoubleArray(scene->up, 3));
+    cJSON_AddNumberToObject(root, "gravity_m_s2", scene->gravity_m_s2);
+    cJSON_AddNumberToObject(root, "most_substep", scene->most_substep);
+    cJSON *bodies = cJSON_AddArrayToObject(root, "bodies");
+    for (int k = 0; k < scene->n_body; k++) add_body(bodies, scene, k);
+    cJSON *tools = cJSON_AddArrayToObject(root, "tools");
+    for (int k = 0; k < scene->n_tool; k++) {
+        cJSON *tool = cJSON_CreateObject();
+        cJSON_AddItemToArray(tools, tool);
+        cJSON_AddStringToObject(tool, "name", scene->tool[k].name);
+        cJSON_AddNumberToObject(tool, "radius_m", scene->tool[k].radius_m);
+        cJSON_AddNumberToObject(tool, "force_cap_N", scene->tool[k].force_cap_N);
+    }
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    return text;
+}
+
+pal_err pal_scene_make_folder(const char *folder, pal_note *note)
+{
+    char path[PATH];
+    int n = snprintf(path, sizeof path, "%s", folder);
+    if (n < 1 || (size_t)n >= sizeof path)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s: not a folder's name", folder);
+    for (char *at = path + 1;; at++) {
+        char end = *at;
+        if (end != '/' && end != 0) continue;
+        *at = 0;
+        if (mkdir(path, 0777) && errno != EEXIST)
+            return pal_note_set(note, PAL_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+        if (end == 0) break;
+        *at = end;
+    }
+    struct stat facts;
+    if (stat(path, &facts) || !S_ISDIR(facts.st_mode))
+        return pal_note_set(note, PAL_ERR_IO, "%s: is there and not a folder", path);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
+{
+    const pal_scene *scene = &loaded->scene;
+    char name[PAL_NAME + 16], path[PATH];
+    int done = 0;
+    pal_err err = pal_scene_make_folder(folder, note);
+    if (err) return err;
+    for (; !err && done < scene->n_body; done += !err) {
+        mesh_name(scene, done, name);
+        snprintf(path, sizeof path, "%s/%s", folder, name);
+        err = pal_prepared_save(scene->body[done].mesh, path, note);
+    }
+    char *text = err ? NULL : scene_text(scene);
+    if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for scene.json", folder);
+    snprintf(path, sizeof path, "%s/scene.json", folder);
+    if (!err) err = pal_file_write(path, text, strlen(text), note);
+    cJSON_free(text);
+    for (int k = 0; err && k < done; k++) {
+        mesh_name(scene, k, name);
+        snprintf(path, sizeof path, "%s/%s", folder, name);
+        unlink(path);
+    }
+    return err;
+}

@@ -1,0 +1,346 @@
+/* Writer: one producer (the simulation thread), one consumer (the writer thread), a ring of bytes between them. Reader:
+ * plain functions on bytes in memory. */
+#include "server/session/input_log.h"
+
+#include "server/base/clock.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { VERSION = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
+static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
+
+struct pal_input_log {
+    int file;
+    pthread_t thread;
+    uint8_t *ring;
+    size_t n_ring;                /* a power of two                              */
+    _Atomic uint64_t filled, out; /* bytes put in, bytes written: only ever grow */
+    _Atomic bool stop, failed;
+    uint64_t n_dropped;
+};
+
+/* ---- little-endian ---- */
+
+static void put_u(uint8_t **at, uint64_t value, int n_byte)
+{
+    for (int k = 0; k < n_byte; k++) *(*at)++ = (uint8_t)(value >> 8 * k);
+}
+static uint64_t get_u(const uint8_t **at, int n_byte)
+{
+    uint64_t value = 0;
+    for (int k = 0; k < n_byte; k++) value |= (uint64_t) * (*at)++ << 8 * k;
+    return value;
+}
+static void put_f(uint8_t **at, const double *number, int n)
+{
+    for (int k = 0; k < n; k++) {
+        uint64_t bits;
+        memcpy(&bits, &number[k], 8);
+        put_u(at, bits, 8);
+    }
+}
+static void get_f(const uint8_t **at, double *number, int n)
+{
+    for (int k = 0; k < n; k++) {
+        uint64_t bits = get_u(at, 8);
+        memcpy(&number[k], &bits, 8);
+    }
+}
+
+static int payload_of(pal_input_kind kind)
+{
+    switch (kind) {
+    case PAL_INPUT_POSE:
+        return 88;
+    case PAL_INPUT_MATERIAL:
+        return 32;
+    case PAL_INPUT_HASH:
+        return 8;
+    case PAL_INPUT_END:
+        return 16;
+    case PAL_INPUT_LET_GO:
+    case PAL_INPUT_RESET:
+        return 0;
+    }
+    return -1;
+}
+
+/* ---- fingerprint: FNV-1a over 64-bit words and bytes ---- */
+
+static uint64_t mix_bytes(uint64_t h, const void *bytes, size_t n)
+{
+    const uint8_t *b = bytes;
+    for (size_t k = 0; k < n; k++) h = (h ^ b[k]) * 0x100000001b3u;
+    return h;
+}
+static uint64_t mix_text(uint64_t h, const char *text)
+{
+    return mix_bytes(h, text, strlen(text) + 1);
+}
+static uint64_t mix_item(uint64_t h, const pal_item *item)
+{
+    h = mix_text(h, item->name);
+    for (int k = 0; k < item->n_value; k++) {
+        const pal_value *v = &item->value[k];
+        int facts[3] = {(int)v->kind, v->flag, v->n_number};
+        h = mix_text(h, v->key);
+        h = mix_bytes(h, facts, sizeof facts);
+        h = mix_text(h, v->kind == PAL_VALUE_TEXT ? v->text : "");
+        if (v->kind == PAL_VALUE_NUMBER) h = mix_bytes(h, v->number, sizeof v->number[0]);
+        if (v->kind == PAL_VALUE_NUMBERS) h = mix_bytes(h, v->number, (size_t)v->n_number * sizeof v->number[0]);
+    }
+    return h;
+}
+static uint64_t mix_material(uint64_t h, const pal_material *m)
+{
+    double number[4] = {m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s};
+    return mix_bytes(h, number, sizeof number);
+}
+static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
+{
+    if (!mesh) return h;
+    int count[4] = {mesh->tets.n_node, mesh->tets.n_tet, mesh->surface.n_vertex, mesh->surface.n_tri};
+    h = mix_bytes(h, count, sizeof count);
+    h = mix_bytes(h, mesh->tets.x, (size_t)mesh->tets.n_node * 3 * sizeof(double));
+    h = mix_bytes(h, mesh->tets.tet, (size_t)mesh->tets.n_tet * 4 * sizeof(int32_t));
+    h = mix_bytes(h, mesh->surface.x, (size_t)mesh->surface.n_vertex * 3 * sizeof(double));
+    return mix_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
+}
+
+uint64_t pal_scene_fingerprint(const pal_scene *scene)
+{
+    uint64_t h = 0xcbf29ce484222325u;
+    h = mix_bytes(h, &scene->step_s, sizeof scene->step_s);
+    h = mix_bytes(h, scene->up, sizeof scene->up);
+    h = mix_bytes(h, &scene->gravity_m_s2, sizeof scene->gravity_m_s2);
+    h = mix_bytes(h, &scene->most_substep, sizeof scene->most_substep);
+    for (int b = 0; b < scene->n_body; b++) {
+        const pal_body_def *def = &scene->body[b];
+        h = mix_mesh(h, def->mesh);
+        h = mix_material(h, &def->material);
+        h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
+        for (int k = 0; k < def->n_support; k++) {
+            const pal_support *s = &def->support[k];
+            double number[8] = {s->lowest, s->lowest ? s->fraction : 0};
+            if (!s->lowest)
+                memcpy(number + 2, s->low_m, sizeof s->low_m), memcpy(number + 5, s->high_m, sizeof s->high_m);
+            h = mix_bytes(h, number, sizeof number);
+        }
+        for (int k = 0; k < def->n_effect; k++) h = mix_item(h, &def->effect[k]);
+    }
+    for (int t = 0; t < scene->n_tool; t++) {
+        double number[2] = {scene->tool[t].radius_m, scene->tool[t].force_cap_N};
+        h = mix_bytes(h, number, sizeof number);
+    }
+    return h;
+}
+
+/* ---- writer ---- */
+
+static bool write_all(int file, const uint8_t *bytes, size_t n)
+{
+    while (n > 0) {
+        ssize_t done = write(file, bytes, n);
+        if (done < 0 && errno == EINTR) continue;
+        if (done <= 0) return false;
+        bytes += done, n -= (size_t)done;
+    }
+    return true;
+}
+
+/* writes out what the ring holds, in at most two pieces */
+static void drain(pal_input_log *log)
+{
+    uint64_t out = atomic_load_explicit(&log->out, memory_order_relaxed);
+    uint64_t filled = atomic_load_explicit(&log->filled, memory_order_acquire);
+    while (out < filled) {
+        size_t place = (size_t)out & (log->n_ring - 1), n = (size_t)(filled - out);
+        if (n > log->n_ring - place) n = log->n_ring - place;
+        if (!atomic_load(&log->failed) && !write_all(log->file, log->ring + place, n)) atomic_store(&log->failed, true);
+        out += n;
+        atomic_store_explicit(&log->out, out, memory_order_release);
+    }
+}
+
+static void *writer(void *user)
+{
+    pal_input_log *log = user;
+    uint64_t when = pal_clock_ns();
+    while (!atomic_load(&log->stop)) {
+        drain(log);
+        when += FLUSH_NS;
+        pal_clock_sleep_until_ns(when);
+    }
+    drain(log);
+    return NULL;
+}
+
+static bool write_header(pal_input_log *log, const pal_scene *scene)
+{
+    uint8_t bytes[PAL_INPUT_HEADER], *at = bytes;
+    memcpy(at, magic, sizeof magic), at += sizeof magic;
+    put_u(&at, VERSION, 4);
+    put_u(&at, PAL_INPUT_HASH_STEPS, 4);
+    put_f(&at, &scene->step_s, 1);
+    put_u(&at, pal_scene_fingerprint(scene), 8);
+    put_u(&at, (uint64_t)scene->n_body, 4);
+    put_u(&at, (uint64_t)scene->n_tool, 4);
+    return write_all(log->file, bytes, sizeof bytes);
+}
+
+pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_note *note,
+                           pal_input_log **out)
+{
+    pal_input_log *log = calloc(1, sizeof *log);
+    size_t n_ring = 1024;
+    while (n_ring < (ring_byte ? ring_byte : RING_DEFAULT)) n_ring *= 2;
+    if (log) log->ring = calloc(1, n_ring);
+    if (!log || !log->ring) {
+        free(log);
+        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the input log");
+    }
+    log->n_ring = n_ring;
+    log->file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    sigset_t all, old;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    bool good = log->file >= 0 && write_header(log, scene) && pthread_create(&log->thread, NULL, writer, log) == 0;
+    int why = errno;
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    if (!good) {
+        if (log->file >= 0) close(log->file);
+        free(log->ring);
+        free(log);
+        return pal_note_set(note, PAL_ERR_IO, "%s: the input log cannot be written: %s", path, strerror(why));
+    }
+    *out = log;
+    return PAL_ERR_OK;
+}
+
+static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD])
+{
+    uint8_t *at = bytes;
+    put_u(&at, (uint64_t)record->kind, 1);
+    put_u(&at, (uint64_t)record->index, 1);
+    put_u(&at, (uint64_t)payload_of(record->kind), 2);
+    put_u(&at, 0, 4);
+    put_u(&at, record->step, 8);
+    if (record->kind == PAL_INPUT_POSE) {
+        put_f(&at, record->pose.position_m, 3);
+        put_f(&at, record->pose.quat, 4);
+        put_f(&at, record->pose.velocity_m_s, 3);
+        put_u(&at, record->pose.buttons, 4);
+        put_u(&at, record->pose.seq, 4);
+    } else if (record->kind == PAL_INPUT_MATERIAL) {
+        const pal_material *m = &record->material;
+        put_f(&at, (double[4]){m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s}, 4);
+    } else if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
+        put_u(&at, record->hash, 8);
+        if (record->kind == PAL_INPUT_END) put_u(&at, record->n_dropped, 8);
+    }
+    return (size_t)(at - bytes);
+}
+
+void pal_input_log_put(pal_input_log *log, const pal_input_record *record)
+{
+    uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
+    if (!log) return;
+    size_t n = encode(record, bytes);
+    uint64_t filled = atomic_load_explicit(&log->filled, memory_order_relaxed);
+    uint64_t out = atomic_load_explicit(&log->out, memory_order_acquire);
+    if (n > log->n_ring - (size_t)(filled - out)) {
+        log->n_dropped++;
+        return;
+    }
+    for (size_t k = 0; k < n; k++) log->ring[(size_t)(filled + k) & (log->n_ring - 1)] = bytes[k];
+    atomic_store_explicit(&log->filled, filled + n, memory_order_release);
+}
+
+uint64_t pal_input_log_dropped(const pal_input_log *log)
+{
+    return log ? log->n_dropped : 0;
+}
+
+pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
+{
+    uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
+    if (!log) return PAL_ERR_OK;
+    atomic_store(&log->stop, true);
+    pthread_join(log->thread, NULL);
+    pal_input_record end = {.kind = PAL_INPUT_END, .step = step, .hash = hash, .n_dropped = log->n_dropped};
+    bool good = !atomic_load(&log->failed) && write_all(log->file, bytes, encode(&end, bytes));
+    good = close(log->file) == 0 && good;
+    free(log->ring);
+    free(log);
+    return good ? PAL_ERR_OK : PAL_ERR_IO;
+}
+
+/* ---- reader ---- */
+
+pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
+                             pal_note *note)
+{
+    const uint8_t *from = bytes + sizeof magic;
+    if (n_byte < sizeof magic || memcmp(bytes, magic, sizeof magic) != 0)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 0: not an input log", name);
+    if (n_byte < PAL_INPUT_HEADER)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in its header", name, n_byte);
+    uint64_t version = get_u(&from, 4);
+    if (version != VERSION)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d", name,
+                            (unsigned long long)version, VERSION);
+    pal_input_header header = {.hash_steps = (uint32_t)get_u(&from, 4)};
+    get_f(&from, &header.step_s, 1);
+    header.fingerprint = get_u(&from, 8);
+    header.n_body = (uint32_t)get_u(&from, 4);
+    header.n_tool = (uint32_t)get_u(&from, 4);
+    if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MOST)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name,
+                            header.hash_steps, PAL_INPUT_HASH_MOST);
+    *out = header;
+    *at = PAL_INPUT_HEADER;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,
+                             pal_note *note)
+{
+    if (n_byte - *at < PAL_INPUT_HEAD)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut: it has no end record", name, *at);
+    const uint8_t *from = bytes + *at;
+    pal_input_record record = {.kind = (pal_input_kind)get_u(&from, 1)};
+    record.index = (int)get_u(&from, 1);
+    int n = (int)get_u(&from, 2);
+    uint64_t zero = get_u(&from, 4);
+    record.step = get_u(&from, 8);
+    if (payload_of(record.kind) != n || zero)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: no record of kind %d has %d bytes", name, *at,
+                            (int)record.kind, n);
+    if (n_byte - *at - PAL_INPUT_HEAD < (size_t)n)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in a record", name, *at);
+    if (record.kind == PAL_INPUT_POSE) {
+        get_f(&from, record.pose.position_m, 3);
+        get_f(&from, record.pose.quat, 4);
+        get_f(&from, record.pose.velocity_m_s, 3);
+        record.pose.buttons = (uint32_t)get_u(&from, 4);
+        record.pose.seq = (uint32_t)get_u(&from, 4);
+    } else if (record.kind == PAL_INPUT_MATERIAL) {
+        double number[4];
+        get_f(&from, number, 4);
+        record.material = (pal_material){number[0], number[1], number[2], number[3]};
+    } else if (record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END) {
+        record.hash = get_u(&from, 8);
+        if (record.kind == PAL_INPUT_END) record.n_dropped = get_u(&from, 8);
+    }
+    *at += PAL_INPUT_HEAD + (size_t)n;
+    *out = record;
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,70 @@
+/* The input log's bytes (private to this room): writer and reader of the records that replay.h speaks of.
+ *
+ * Little-endian. Header 40 bytes: "palinlog", u32 version 1, u32 hash interval in steps, f64 step_s, u64 fingerprint of
+ * the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or body), u16 payload bytes, u32 zero, u64
+ * steps taken since open, payload. A record takes effect before the next step. The last record is END; a file without
+ * it is cut.
+ *
+ *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
+ *   LET_GO    tool    0
+ *   RESET     0       0
+ *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
+ *   HASH      0       8  u64 world hash, at least every `hash interval` steps
+ *   END       0      16  u64 world hash, u64 records that were dropped (0: the log is whole)
+ *
+ * The writer's put functions copy into a ring of bytes and never wait, allocate or touch the file; a thread of its own
+ * writes it out. What does not fit is dropped and counted, and the log says that it is not whole. */
+#ifndef PAL_SESSION_INPUT_LOG_H
+#define PAL_SESSION_INPUT_LOG_H
+#include "server/sim/def.h"
+
+enum {
+    PAL_INPUT_HEADER = 40,
+    PAL_INPUT_HEAD = 16,
+    PAL_INPUT_PAYLOAD = 88,
+    PAL_INPUT_HASH_STEPS = 60,
+    PAL_INPUT_HASH_MOST = 3600
+};
+
+typedef enum pal_input_kind {
+    PAL_INPUT_POSE = 1,
+    PAL_INPUT_LET_GO,
+    PAL_INPUT_RESET,
+    PAL_INPUT_MATERIAL,
+    PAL_INPUT_HASH,
+    PAL_INPUT_END
+} pal_input_kind;
+
+typedef struct pal_input_record {
+    pal_input_kind kind;
+    int index;     /* tool or body                          */
+    uint64_t step; /* steps taken since open                */
+    pal_pose pose;
+    pal_material material;
+    uint64_t hash, n_dropped;
+} pal_input_record;
+
+/* a number for everything of a scene that decides the simulation: steps, meshes, materials, entries; not its texts */
+uint64_t pal_scene_fingerprint(const pal_scene *scene);
+
+typedef struct pal_input_log pal_input_log;
+/* creates the file and starts the writer thread; ring_byte 0: 4 MiB. IO, MEMORY. [load] */
+pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_note *note,
+                           pal_input_log **out);
+void pal_input_log_put(pal_input_log *log, const pal_input_record *record); /* [sim] NULL log is fine */
+uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [sim] */
+/* writes END with the world's last hash, joins the writer, closes the file; IO when anything could not be written
+ * [load] */
+pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
+
+typedef struct pal_input_header {
+    uint32_t hash_steps, n_body, n_tool;
+    double step_s;
+    uint64_t fingerprint;
+} pal_input_header;
+/* bounds-checked: *at moves on; REFUSED with the byte offset */
+pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
+                             pal_note *note);
+pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,
+                             pal_note *note);
+#endif

@@ -1,0 +1,445 @@
+/* The simulation thread: take commands and newest poses, step the world, publish a frame, sleep until the next absolute
+ * time. Nothing here waits for another thread: poses and frames go through trios, commands through a ring, and the only
+ * lock guards the one sentence of pal_session_last_note, which the thread touches when a command was refused or a body
+ * frozen, never in an ordinary step.
+ *
+ * Slowdown is real over simulated time since a mark that is between 1 and 1 + 1/16 s old. */
+#include "server/session/session.h"
+
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/base/ring.h"
+#include "server/base/trio.h"
+#include "server/session/input_log.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_COMMAND = 64, N_MARK = 16, SECOND_NS = 1000000000 };
+static const double reach_sizes = 100;    /* a pose may be this many body sizes from the origin */
+static const double late_part = 0.1;      /* a step is late when it begins this part of a step after its time */
+static const double young_most_Pa = 1e12; /* beyond any solid */
+
+typedef struct pose_slot {
+    pal_pose pose;
+    uint64_t arrived_ns;
+    bool present;
+} pose_slot;
+
+typedef struct tool_place {
+    pal_trio trio;
+    pose_slot slot[3];
+    /* the rest is the simulation thread's */
+    pal_pose pose;
+    uint64_t arrived_ns;
+    bool present;
+} tool_place;
+
+/* a moment and the steps taken until then */
+typedef struct mark {
+    uint64_t ns, step;
+} mark;
+
+struct pal_session {
+    const pal_scene *scene;
+    pal_session_options options; /* record_path is ours */
+    pal_world *world;
+    double reach_m;
+    uint64_t step_ns, lease_ns;
+    pal_row_info *row;
+    int n_row;
+    pal_shown part[PAL_BODY_MAX];
+    int n_part;
+    pthread_t thread;
+
+    /* crossing points */
+    tool_place tool[PAL_TOOL_MAX];
+    pal_ring *command;
+    pal_frame *frame[3];
+    pal_trio frames;
+    _Atomic bool stop;
+    _Atomic uint64_t beat_ns, n_refused;
+    pthread_mutex_t note_lock;
+    pal_note note;
+
+    /* the simulation thread's own */
+    pal_input_log *log;
+    bool paused;
+    int single;       /* steps asked for while paused        */
+    uint64_t step;    /* taken since open: resets do not count */
+    uint64_t n_late;  /* began late                          */
+    uint64_t work_ns; /* processor time of the last step     */
+    uint64_t end_ns;
+    mark marks[N_MARK + 2]; /* a ring, oldest at first              */
+    int first, n_marks;
+};
+
+/* ---- what the thread does ---- */
+
+static void say(pal_session *s, const pal_note *note)
+{
+    pthread_mutex_lock(&s->note_lock);
+    s->note = *note;
+    pthread_mutex_unlock(&s->note_lock);
+}
+
+static void forget_pace(pal_session *s)
+{
+    s->first = s->n_marks = 0;
+}
+
+/* a mark every 1/16 s; those older than the second are dropped, but the newest of them is kept */
+static void mark_pace(pal_session *s, uint64_t now)
+{
+    const int size = N_MARK + 2;
+    if (s->n_marks > 0) {
+        const mark *last = &s->marks[(s->first + s->n_marks - 1) % size];
+        if (now - last->ns < SECOND_NS / N_MARK) return;
+    }
+    while (s->n_marks > 1 && now - s->marks[(s->first + 1) % size].ns >= SECOND_NS) {
+        s->first = (s->first + 1) % size;
+        s->n_marks--;
+    }
+    if (s->n_marks == size) s->first = (s->first + 1) % size, s->n_marks--;
+    s->marks[(s->first + s->n_marks++) % size] = (mark){now, s->step};
+}
+
+/* needs a tenth of a second and one step to say anything */
+static double slowdown(const pal_session *s)
+{
+    if (s->n_marks == 0) return 1;
+    const mark *oldest = &s->marks[s->first];
+    uint64_t real = s->end_ns - oldest->ns, n = s->step - oldest->step;
+    if (s->end_ns <= oldest->ns || real < SECOND_NS / 10 || n == 0) return 1;
+    return (double)real / ((double)n * (double)s->step_ns);
+}
+
+static void publish(pal_session *s)
+{
+    pal_frame *frame = pal_trio_slot(&s->frames);
+    pal_world_frame(s->world, frame);
+    frame->end_ns = s->end_ns;
+    frame->step_ns = s->work_ns;
+    frame->paused = s->paused;
+    frame->slowdown = s->paused ? 1 : slowdown(s);
+    frame->n_late = s->n_late;
+    frame->n_refused = atomic_load_explicit(&s->n_refused, memory_order_relaxed);
+    for (int t = 0; t < frame->n_tool; t++) {
+        tool_place *place = &s->tool[t];
+        frame->tool[t].pose_ns = place->arrived_ns;
+        /* while paused tools are shown where they are held, though nothing feels them */
+        if (s->paused && place->present) {
+            frame->tool[t].present = true;
+            frame->tool[t].pose = place->pose;
+        }
+    }
+    pal_trio_publish(&s->frames);
+    if (s->options.wake) s->options.wake(s->options.user);
+}
+
+/* newest pose of every tool into the world; a silent holder's tool is let go. true when one changed */
+static bool take_poses(pal_session *s, uint64_t now)
+{
+    bool changed = false;
+    for (int t = 0; t < s->scene->n_tool; t++) {
+        tool_place *place = &s->tool[t];
+        const pose_slot *slot = pal_trio_take(&place->trio);
+        bool gone = place->present && now > place->arrived_ns && now - place->arrived_ns > s->lease_ns;
+        pal_input_record record = {.index = t, .step = s->step};
+        if (slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns)) {
+            if (pal_world_pose(s->world, t, &slot->pose)) {
+                atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+                continue;
+            }
+            place->pose = slot->pose;
+            place->arrived_ns = slot->arrived_ns;
+            place->present = true;
+            record.kind = PAL_INPUT_POSE;
+            record.pose = slot->pose;
+        } else if (place->present && (slot || gone)) {
+            pal_world_pose(s->world, t, NULL);
+            place->present = false;
+            record.kind = PAL_INPUT_LET_GO;
+        } else {
+            continue;
+        }
+        changed = true;
+        pal_input_log_put(s->log, &record);
+    }
+    return changed;
+}
+
+static void obey(pal_session *s, const pal_command *command)
+{
+    pal_note note = {""};
+    switch (command->kind) {
+    case PAL_COMMAND_PAUSE:
+        s->paused = true;
+        break;
+    case PAL_COMMAND_RESUME:
+        s->paused = false, s->single = 0;
+        break;
+    case PAL_COMMAND_STEP:
+        if (s->paused) s->single++;
+        break;
+    case PAL_COMMAND_RESET:
+        pal_world_reset(s->world);
+        say(s, &note);
+        for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = false;
+        pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
+        break;
+    case PAL_COMMAND_MATERIAL:
+        if (pal_world_material(s->world, command->body, &command->material, &note)) {
+            atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+        } else {
+            pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_MATERIAL,
+                                                          .index = command->body,
+                                                          .step = s->step,
+                                                          .material = command->material});
+            note.text[0] = 0;
+        }
+        say(s, &note);
+        break;
+    case PAL_COMMAND_COUNT:
+        break;
+    }
+}
+
+static bool take_commands(pal_session *s)
+{
+    pal_command command;
+    bool any = false, was_paused = s->paused;
+    for (; pal_ring_get(s->command, &command); any = true) obey(s, &command);
+    if (was_paused != s->paused) forget_pace(s);
+    return any;
+}
+
+static void step(pal_session *s)
+{
+    if (s->n_marks == 0) mark_pace(s, pal_clock_ns());
+    uint64_t before = pal_clock_thread_ns();
+    pal_err err = pal_world_step(s->world, s->scene->step_s);
+    s->work_ns = pal_clock_thread_ns() - before;
+    s->end_ns = pal_clock_ns();
+    s->step++;
+    mark_pace(s, s->end_ns);
+    if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
+        pal_input_log_put(
+            s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
+    if (err) {
+        pal_note note;
+        pal_note_set(&note, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
+        say(s, &note);
+    }
+}
+
+/* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
+static void pace(pal_session *s, uint64_t *due)
+{
+    *due += s->step_ns;
+    uint64_t now = pal_clock_ns();
+    if (s->options.unpaced && !s->paused) {
+        *due = now;
+        return;
+    }
+    if (now < *due) {
+        pal_clock_sleep_until_ns(*due);
+        now = pal_clock_ns();
+    }
+    if (!s->paused && now > *due + (uint64_t)(late_part * (double)s->step_ns)) s->n_late++;
+    if (now > *due + s->step_ns) *due = now;
+}
+
+static void *simulate(void *user)
+{
+    pal_session *s = user;
+    uint64_t due = pal_clock_ns();
+    s->end_ns = due;
+    publish(s);
+    while (!atomic_load_explicit(&s->stop, memory_order_acquire)) {
+        pace(s, &due);
+        bool changed = take_commands(s);
+        uint64_t now = pal_clock_ns();
+        atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
+        changed = take_poses(s, now) || changed;
+        if (!s->paused || s->single > 0) {
+            step(s);
+            if (s->single > 0) s->single--;
+            changed = true;
+        }
+        if (changed) publish(s);
+    }
+    return NULL;
+}
+
+/* ---- open and close ---- */
+
+static pal_err copy_plan(pal_session *s)
+{
+    s->n_row = pal_world_rows(s->world);
+    s->row = calloc((size_t)s->n_row + 1, sizeof *s->row);
+    if (!s->row) return PAL_ERR_MEMORY;
+    for (int k = 0; k < s->n_row; k++) {
+        pal_world_row(s->world, k, &s->row[k]);
+        s->row[k].spent_ns = 0;
+    }
+    s->n_part = pal_world_parts(s->world);
+    for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
+    for (int b = 0; b < pal_world_bodies(s->world); b++)
+        s->reach_m = fmax(s->reach_m, reach_sizes * pal_world_body(s->world, b)->size_m);
+    return PAL_ERR_OK;
+}
+
+static pal_err prepare(pal_session *s, pal_note *note)
+{
+    PAL_TRY(pal_world_create(s->scene, note, &s->world));
+    pal_err err = copy_plan(s);
+    s->command = pal_ring_create(N_COMMAND, sizeof(pal_command));
+    bool whole = !err && s->command;
+    for (int k = 0; k < 3; k++) whole = (s->frame[k] = pal_frame_create(s->world)) && whole;
+    if (!whole) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the session's frames");
+    pal_trio_init(&s->frames, s->frame[0], s->frame[1], s->frame[2]);
+    for (int t = 0; t < PAL_TOOL_MAX; t++)
+        pal_trio_init(&s->tool[t].trio, &s->tool[t].slot[0], &s->tool[t].slot[1], &s->tool[t].slot[2]);
+    if (s->options.record_path) return pal_input_log_open(s->options.record_path, s->scene, 0, note, &s->log);
+    return PAL_ERR_OK;
+}
+
+static void release(pal_session *s)
+{
+    for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
+    pal_ring_destroy(s->command);
+    pal_world_destroy(s->world);
+    pthread_mutex_destroy(&s->note_lock);
+    free((void *)(uintptr_t)s->options.record_path);
+    free(s->row);
+    free(s);
+}
+
+pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_note *note, pal_session **out)
+{
+    pal_session *s = calloc(1, sizeof *s);
+    if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a session");
+    pthread_mutex_init(&s->note_lock, NULL);
+    s->scene = scene;
+    if (options) s->options = *options;
+    if (s->options.record_path) s->options.record_path = strdup(s->options.record_path);
+    s->step_ns = (uint64_t)(scene->step_s * SECOND_NS + 0.5);
+    s->lease_ns = (uint64_t)((s->options.lease_s > 0 ? s->options.lease_s : 0.25) * SECOND_NS);
+    s->paused = s->options.start_paused;
+    atomic_init(&s->beat_ns, pal_clock_ns());
+    pal_err err = prepare(s, note);
+    if (!err) {
+        /* signals belong to the thread that waits for them */
+        sigset_t all, old;
+        sigfillset(&all);
+        pthread_sigmask(SIG_SETMASK, &all, &old);
+        if (pthread_create(&s->thread, NULL, simulate, s))
+            err = pal_note_set(note, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
+        pthread_sigmask(SIG_SETMASK, &old, NULL);
+        if (err && s->log) pal_input_log_close(s->log, 0, 0);
+    }
+    if (err) {
+        release(s);
+        return err;
+    }
+    *out = s;
+    return PAL_ERR_OK;
+}
+
+void pal_session_close(pal_session *s)
+{
+    if (!s) return;
+    atomic_store_explicit(&s->stop, true, memory_order_release);
+    pthread_join(s->thread, NULL);
+    if (s->log) {
+        uint64_t n_dropped = pal_input_log_dropped(s->log);
+        if (pal_input_log_close(s->log, s->step, pal_world_hash(s->world)))
+            pal_log(PAL_LOG_ERROR, "record", "%s: the input log could not be written", s->options.record_path);
+        else if (n_dropped)
+            pal_log(PAL_LOG_WARN, "record", "%s: %llu records did not fit and are missing: the log cannot be replayed",
+                    s->options.record_path, (unsigned long long)n_dropped);
+    }
+    release(s);
+}
+
+/* ---- any thread ---- */
+
+const pal_scene *pal_session_scene(const pal_session *s)
+{
+    return s->scene;
+}
+
+int pal_session_rows(const pal_session *s)
+{
+    return s->n_row;
+}
+
+void pal_session_row(const pal_session *s, int row, pal_row_info *out)
+{
+    *out = row >= 0 && row < s->n_row ? s->row[row] : (pal_row_info){"", "", "", 0, 0};
+}
+
+int pal_session_parts(const pal_session *s)
+{
+    return s->n_part;
+}
+
+void pal_session_shown(const pal_session *s, int part, pal_shown *out)
+{
+    *out = part >= 0 && part < s->n_part ? s->part[part] : (pal_shown){.name = ""};
+}
+
+static pal_err refuse(pal_session *s)
+{
+    atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+    return PAL_ERR_REFUSED;
+}
+
+pal_err pal_session_put_pose(pal_session *s, int tool, const pal_pose *pose)
+{
+    if (tool < 0 || tool >= s->scene->n_tool || (pose && !pal_pose_ok(pose, s->reach_m))) return refuse(s);
+    pose_slot *slot = pal_trio_slot(&s->tool[tool].trio);
+    slot->present = pose != NULL;
+    if (pose) slot->pose = *pose;
+    slot->arrived_ns = pal_clock_ns();
+    pal_trio_publish(&s->tool[tool].trio);
+    return PAL_ERR_OK;
+}
+
+static bool material_ok(const pal_material *m)
+{
+    return m->young_Pa > 0 && m->young_Pa <= young_most_Pa && m->poisson > -1 && m->poisson < 0.5 &&
+           m->density_kg_m3 > 0 && isfinite(m->density_kg_m3) && m->damping_1_s >= 0 && isfinite(m->damping_1_s);
+}
+
+pal_err pal_session_command(pal_session *s, const pal_command *command)
+{
+    if ((int)command->kind < 0 || command->kind >= PAL_COMMAND_COUNT) return refuse(s);
+    if (command->kind == PAL_COMMAND_MATERIAL &&
+        (command->body < 0 || command->body >= s->scene->n_body || !material_ok(&command->material)))
+        return refuse(s);
+    return pal_ring_put(s->command, command);
+}
+
+const pal_frame *pal_session_take_frame(pal_session *s)
+{
+    return pal_trio_take(&s->frames);
+}
+
+bool pal_session_alive(const pal_session *s)
+{
+    uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = pal_clock_ns();
+    return now < beat || now - beat < SECOND_NS;
+}
+
+void pal_session_last_note(pal_session *s, pal_note *out)
+{
+    pthread_mutex_lock(&s->note_lock);
+    *out = s->note;
+    pthread_mutex_unlock(&s->note_lock);
+}
