@@ -46,6 +46,17 @@ void pal_surface_box(const pal_surface *surface, double low_m[3], double high_m[
         }
 }
 
+void pal_surface_recentre(pal_surface *surface)
+{
+    double low[3], high[3];
+    pal_surface_box(surface, low, high);
+    for (size_t a = 0; a < 3; a++) {
+        double middle = (low[a] + high[a]) / 2;
+        for (size_t i = 0; i < (size_t)surface->n_vertex; i++) surface->x[3 * i + a] -= middle;
+        surface->origin_m[a] += middle;
+    }
+}
+
 /* twice the area vector of a triangle */
 static void area_vector(const pal_surface *surface, int t, double r[3])
 {

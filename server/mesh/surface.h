@@ -37,6 +37,9 @@ pal_err pal_surface_copy(const pal_surface *from, pal_surface *to);
  * to report. In place. REFUSED when no triangle is left, MEMORY. */
 pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_note *note);
 
+/* moves the box centre to zero and adds it to origin_m */
+void pal_surface_recentre(pal_surface *surface);
+
 /* axis-aligned box; diagonal = |high - low| */
 void pal_surface_box(const pal_surface *surface, double low_m[3], double high_m[3]);
 double pal_surface_area(const pal_surface *surface);   /* m^2 */

@@ -197,13 +197,7 @@ static void compact(cleaner *k)
     }
     s->n_vertex = n;
     for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) s->tri[c] = k->map[s->tri[c]];
-    double low[3], high[3];
-    pal_surface_box(s, low, high);
-    for (int a = 0; a < 3; a++) {
-        double middle = (low[a] + high[a]) / 2;
-        for (int i = 0; i < n; i++) s->x[3 * (size_t)i + (size_t)a] -= middle;
-        s->origin_m[a] += middle;
-    }
+    pal_surface_recentre(s);
 }
 
 /* box of the usable vertices in use: the welding distance and the cells' corner */
