@@ -9,7 +9,7 @@ typedef struct pal_server pal_server;
 typedef struct pal_server_options {
     const char *listen; /* "127.0.0.1"; any other address needs allow_remote                         */
     int port;           /* 8090; 0: any free port, see pal_server_port                               */
-    bool allow_remote;
+    bool allow_remote;  /* also: take requests under any Host name (a proxy before us), not only loopback names */
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int most_clients;          /* 0: 200                                                                    */
@@ -20,10 +20,11 @@ typedef struct pal_server_options {
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_note *note,
                         pal_server **out);
 /* the wake callback that sessions are opened with: user is a pal_server_gate, made before the sessions because they
- * start before the server exists; waking an unconnected gate does nothing */
+ * start before the server exists; waking an unconnected gate does nothing. A server that closes disconnects its gate
+ * first, so that sessions may be closed before or after it. */
 typedef struct pal_server_gate pal_server_gate;
-pal_server_gate *pal_server_gate_create(void);
-void pal_server_gate_destroy(pal_server_gate *gate);
+pal_server_gate *pal_server_gate_create(void);                      /* NULL: out of memory */
+void pal_server_gate_destroy(pal_server_gate *gate);                /* after the sessions that wake it */
 void pal_server_gate_wake(void *gate);                              /* [any] */
 void pal_server_connect(pal_server *server, pal_server_gate *gate); /* [load] */
 
@@ -31,4 +32,9 @@ pal_err pal_server_run(pal_server *server); /* returns after pal_server_stop; th
 void pal_server_stop(pal_server *server);   /* [any], also from a signal handler's thread */
 int pal_server_port(const pal_server *server);
 void pal_server_close(pal_server *server); /* [load] */
+
+/* road "mem" only: the transport for pal_mem_connect, and one turn of the loop at a time of the caller's choosing
+ * (instead of pal_server_run). This thread is [net]. */
+struct pal_transport *pal_server_transport(pal_server *server);
+void pal_server_turn(pal_server *server, uint64_t now_ns);
 #endif

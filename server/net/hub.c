@@ -1,0 +1,452 @@
+/* The hub's peers: coming, going, and what each is sent next (streaming.md 1.6, 2.3). */
+#include "server/net/hub_parts.h"
+
+#include "server/base/log.h"
+#include "server/net/plain_text.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define JOIN_NS        5000000000u
+#define STALL_NS       10000000000u
+#define TIER_WINDOW_NS 2000000000u
+#define TIER_CLEAN_NS  10000000000u
+
+uint32_t pal_hub_colour(int id)
+{
+    static const uint32_t colours[] = {0xFF8C42, 0x3FA7D6, 0x59CD90, 0xEE6352, 0xB388EB, 0xFAC05E,
+                                       0x2EC4B6, 0xF15BB5, 0x9BC53D, 0x5C7AEA, 0xD4A373, 0x8D99AE};
+    return colours[(unsigned)(id - 1) % (sizeof colours / sizeof *colours)];
+}
+
+static void empty(pal_client *c)
+{
+    for (; c->n_queue; c->n_queue--) {
+        pal_packet_drop(c->queue[c->queue_begin]);
+        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
+    }
+    for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
+    c->out_begin = c->n_out = 0;
+    pal_packet_replace(&c->haptic, NULL);
+    c->members_due = c->status_due = false;
+}
+
+/* the member is gone for the others as soon as it is dropped, not when its socket is */
+static void leave_room(pal_hub *hub, pal_client *c)
+{
+    pal_hub_room *room = c->room;
+    empty(c);
+    if (!c->id) return;
+    pal_member_entry *member = pal_members_find(&room->members, c->id);
+    int tool = member ? member->tool : -1;
+    pal_members_leave(&room->members, c->id);
+    if (tool >= 0) pal_hub_release_tool(room, tool);
+    room->tier_users[c->tier]--;
+    c->id = 0;
+    pal_hub_members_changed(hub, room);
+}
+
+void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
+{
+    char reason[PAL_PEER_REASON];
+    va_list args;
+    if (client->peer->drop_code) return;
+    va_start(args, format);
+    vsnprintf(reason, sizeof reason, format, args);
+    va_end(args);
+    pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
+    pal_peer_drop(client->peer, code, "%s", reason);
+    leave_room(hub, client);
+}
+
+static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
+{
+    if (c->n_queue == PAL_HUB_QUEUE || !packet) {
+        pal_packet_drop(packet);
+        hub->count.n_overflow++;
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
+        return;
+    }
+    c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
+    c->peer->ops->ready(c->peer);
+}
+
+static pal_packet *encode(pal_hub *hub, const pal_control *control)
+{
+    size_t n = 0;
+    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
+    if (refusal) {
+        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(control->type),
+                pal_refusal_text(refusal));
+        return NULL;
+    }
+    return pal_packet_create(hub->text, n, true);
+}
+
+void pal_hub_say(pal_hub *hub, pal_client *client, const pal_control *control)
+{
+    if (client->peer->drop_code) return;
+    queue(hub, client, encode(hub, control));
+}
+
+void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+{
+    char text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_ERROR;
+    pal_plain_text(hub->control->problem.code, sizeof hub->control->problem.code, code);
+    pal_plain_text(hub->control->problem.text, sizeof hub->control->problem.text, text);
+    pal_hub_say(hub, client, hub->control);
+}
+
+void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
+{
+    for (int i = 0; i < hub->most_clients; i++) {
+        pal_client *c = &hub->client[i];
+        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+        c->members_due = true;
+        c->peer->ops->ready(c->peer);
+    }
+}
+
+void pal_hub_set_tier(pal_hub *hub, pal_client *client, int tier)
+{
+    pal_hub_room *room = client->room;
+    (void)hub;
+    if (tier == client->tier) return;
+    room->tier_users[client->tier]--;
+    client->tier = tier;
+    if (room->tier_users[tier]++ == 0) pal_stream_begin_tier(room->stream, tier);
+    /* everything of the new tier is news */
+    memset(client->sent_frame, 0, sizeof client->sent_frame);
+    if (client->sent_cycle == room->stream->cycle) client->sent_cycle--;
+}
+
+/* ---- what is sent next ---- */
+
+static bool wants_cycle(const pal_client *c)
+{
+    return c->id && c->room->stream->tools && c->room->stream->cycle != c->sent_cycle && pal_credit_free(&c->credit);
+}
+
+static bool client_waiting(void *user, const pal_peer *peer)
+{
+    const pal_client *c = peer->client;
+    (void)user;
+    if (!c || peer->drop_code) return false;
+    return c->n_queue || c->members_due || c->status_due || c->haptic || c->out_begin < c->n_out || wants_cycle(c);
+}
+
+static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
+{
+    pal_wire_members *m = &hub->control->members;
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_MEMBERS;
+    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
+        const pal_member_entry *from = &room->members.member[i];
+        if (!from->id) continue;
+        pal_wire_member *to = &m->member[m->n_member++];
+        to->id = (uint16_t)from->id;
+        to->role = (pal_wire_role)from->role;
+        to->tool = from->tool >= 0 ? from->tool : PAL_WIRE_TOOL_NONE;
+        to->colour = pal_hub_colour(from->id);
+        pal_plain_text(to->name, sizeof to->name, from->name);
+    }
+    return encode(hub, hub->control);
+}
+
+static pal_packet *status_message(pal_hub *hub, pal_client *c)
+{
+    const pal_stream *s = c->room->stream;
+    const pal_frame *f = s->frame;
+    uint64_t now = pal_loop_now_ns(hub->loop);
+    pal_wire_status *w = &hub->control->status;
+    pal_note note = {""};
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_STATUS;
+    w->n_member = (uint32_t)c->room->members.n_member;
+    w->rtt_ms = c->credit.rtt_s * 1e3;
+    w->n_skipped = (uint32_t)c->n_skipped;
+    if (c->status_ns && now > c->status_ns)
+        w->bytes_s = (double)(c->n_byte - c->status_byte) / ((double)(now - c->status_ns) * 1e-9);
+    c->status_ns = now;
+    c->status_byte = c->n_byte;
+    pal_session_last_note(c->room->session, &note);
+    pal_plain_text(w->note, sizeof w->note, note.text);
+    w->step_rate_hz = s->step_rate_hz;
+    w->step_ms = s->step_ms;
+    w->slowdown = 1;
+    if (f) {
+        w->tick = f->tick;
+        w->sim_time_s = f->time_s;
+        w->paused = f->paused;
+        for (int p = 0; p < f->n_part; p++) w->frozen |= f->part[p].frozen;
+        if (isfinite(f->slowdown) && f->slowdown > 0) w->slowdown = f->slowdown;
+        w->substeps = f->n_substep > 0 ? (uint32_t)f->n_substep : 0;
+        w->n_row = (uint32_t)f->n_row;
+        for (int r = 0; r < f->n_row; r++) w->row_ms[r] = s->row_ms[r];
+        w->n_late = f->n_late;
+        w->n_refused = f->n_refused;
+    }
+    return encode(hub, hub->control);
+}
+
+/* the newest of what this client has not got, as one cycle */
+static void begin_cycle(pal_hub *hub, pal_client *c)
+{
+    const pal_stream *s = c->room->stream;
+    c->out_begin = c->n_out = 0;
+    for (int p = 0; p < s->n_part; p++) {
+        const pal_stream_part *part = &s->part[p];
+        if (!part->frame[c->tier] || part->frame_cycle[c->tier] == c->sent_frame[p]) continue;
+        c->out[c->n_out++] = pal_packet_hold(part->frame[c->tier]);
+        c->sent_frame[p] = part->frame_cycle[c->tier];
+        hub->count.n_frame++;
+    }
+    c->out[c->n_out++] = pal_packet_hold(s->tools);
+    if (c->n_cycle && s->cycle > c->sent_cycle + 1) {
+        c->n_skipped += s->cycle - c->sent_cycle - 1;
+        hub->count.n_skipped += s->cycle - c->sent_cycle - 1;
+    }
+    c->n_cycle++;
+    c->out_cycle = c->sent_cycle = s->cycle;
+}
+
+static pal_packet *take_next(pal_hub *hub, pal_client *c)
+{
+    pal_packet *p = NULL;
+    if (c->n_queue) {
+        p = c->queue[c->queue_begin];
+        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
+        c->n_queue--;
+        return p;
+    }
+    if (c->members_due) {
+        c->members_due = false;
+        if ((p = members_message(hub, c->room))) return p;
+    }
+    if (c->status_due) {
+        c->status_due = false;
+        if ((p = status_message(hub, c))) return p;
+    }
+    if (c->haptic) {
+        p = c->haptic;
+        c->haptic = NULL;
+        return p;
+    }
+    if (c->out_begin == c->n_out && wants_cycle(c)) begin_cycle(hub, c);
+    if (c->out_begin == c->n_out) return NULL;
+    p = c->out[c->out_begin++];
+    if (c->out_begin == c->n_out) pal_credit_sent(&c->credit, c->out_cycle, pal_loop_now_ns(hub->loop));
+    return p;
+}
+
+static pal_packet *client_next(void *user, pal_peer *peer)
+{
+    pal_hub *hub = user;
+    pal_client *c = peer->client;
+    if (!c || peer->drop_code) return NULL;
+    pal_packet *p = take_next(hub, c);
+    if (!p) return NULL;
+    c->n_byte += p->n_byte;
+    hub->count.n_byte += p->n_byte;
+    return p;
+}
+
+/* ---- coming and going ---- */
+
+static pal_hub_room *find_room(pal_hub *hub, const char *session)
+{
+    if (!*session) return &hub->room[0];
+    for (int i = 0; i < hub->n_room; i++)
+        if (!strcmp(pal_session_scene(hub->room[i].session)->name, session)) return &hub->room[i];
+    return NULL;
+}
+
+static void client_opened(void *user, pal_peer *peer, const char *session)
+{
+    pal_hub *hub = user;
+    pal_hub_room *room = find_room(hub, session);
+    int i = 0;
+    if (hub->leaving || !room) {
+        hub->count.n_refused_join++;
+        if (hub->leaving)
+            pal_peer_drop(peer, PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
+        else
+            pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
+        return;
+    }
+    while (i < hub->most_clients && hub->client[i].peer) i++;
+    if (i == hub->most_clients) {
+        hub->count.n_refused_join++;
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->most_clients);
+        return;
+    }
+    pal_client *c = &hub->client[i];
+    uint64_t now = pal_loop_now_ns(hub->loop);
+    memset(c, 0, sizeof *c);
+    c->peer = peer;
+    c->room = room;
+    c->opened_ns = now;
+    /* 600 a second as the protocol says; half a second's depth, so that a hiccup of ours closes nobody */
+    pal_bucket_begin(&c->bucket, 600, 300, now);
+    pal_credit_begin(&c->credit, pal_stream_rate_hz(room->stream));
+    peer->client = c;
+    hub->n_client++;
+}
+
+static void client_closed(void *user, pal_peer *peer)
+{
+    pal_hub *hub = user;
+    pal_client *c = peer->client;
+    if (!c) return;
+    leave_room(hub, c);
+    peer->client = NULL;
+    c->peer = NULL;
+    hub->n_client--;
+}
+
+/* ---- frames and housekeeping ---- */
+
+static void offer_cycle(pal_hub *hub, pal_hub_room *room)
+{
+    for (int i = 0; i < hub->most_clients; i++) {
+        pal_client *c = &hub->client[i];
+        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+        pal_member_entry *m = pal_members_find(&room->members, c->id);
+        if (m && m->tool >= 0 && room->stream->haptic[m->tool])
+            pal_packet_replace(&c->haptic, pal_packet_hold(room->stream->haptic[m->tool]));
+        if (client_waiting(hub, c->peer)) c->peer->ops->ready(c->peer);
+    }
+}
+
+static void hub_wake(void *user)
+{
+    pal_hub *hub = user;
+    uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
+    for (int r = 0; r < hub->n_room; r++) {
+        pal_hub_room *room = &hub->room[r];
+        bool used[PAL_STREAM_TIER];
+        uint64_t next = room->stream->cycle ? room->stream->cycle_ns + apart : now;
+        if (now < next) {
+            if (!due || next < due) due = next;
+            continue;
+        }
+        for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = t == 0 || room->tier_users[t] > 0;
+        if (pal_stream_turn(room->stream, now, used, room->tool)) offer_cycle(hub, room);
+    }
+    if (due) pal_loop_due(hub->loop, due);
+}
+
+/* a client that skips more than a quarter of the cycles for 2 s gets coarser frames, after 10 s without finer ones */
+static void judge_tier(pal_hub *hub, pal_client *c, uint64_t now)
+{
+    if (now - c->tier_ns < TIER_WINDOW_NS) return;
+    uint64_t sent = c->n_cycle - c->tier_cycle, skipped = c->n_skipped - c->tier_skipped;
+    bool first = c->tier_ns == 0;
+    c->tier_ns = now;
+    c->tier_cycle = c->n_cycle;
+    c->tier_skipped = c->n_skipped;
+    if (first || skipped > 0) c->clean_ns = now;
+    if (first) return;
+    if (4 * skipped > sent + skipped && c->tier + 1 < PAL_STREAM_TIER)
+        pal_hub_set_tier(hub, c, c->tier + 1);
+    else if (c->tier > 0 && now - c->clean_ns >= TIER_CLEAN_NS) {
+        pal_hub_set_tier(hub, c, c->tier - 1);
+        c->clean_ns = now;
+    }
+}
+
+static void hub_tick(void *user)
+{
+    pal_hub *hub = user;
+    uint64_t now = pal_loop_now_ns(hub->loop);
+    hub_wake(hub);
+    for (int r = 0; r < hub->n_room; r++) pal_stream_measure(hub->room[r].stream, now);
+    for (int i = 0; i < hub->most_clients; i++) {
+        pal_client *c = &hub->client[i];
+        if (!c->peer || c->peer->drop_code) continue;
+        if (!c->id) {
+            if (now - c->opened_ns > JOIN_NS) pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
+            continue;
+        }
+        if (pal_credit_stalled(&c->credit, now, STALL_NS)) {
+            hub->count.n_stalled++;
+            pal_hub_drop(hub, c, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
+            continue;
+        }
+        judge_tier(hub, c, now);
+        c->status_due = true;
+        c->peer->ops->ready(c->peer);
+    }
+}
+
+pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
+                       pal_note *note, pal_hub **out)
+{
+    pal_hub *hub = calloc(1, sizeof *hub);
+    pal_err err = PAL_ERR_OK;
+    if (!hub) return PAL_ERR_MEMORY;
+    hub->loop = loop;
+    hub->site = options->site;
+    hub->most_clients = options->most_clients > 0 ? options->most_clients : 200;
+    hub->room = calloc((size_t)n_session, sizeof *hub->room);
+    hub->client = calloc((size_t)hub->most_clients, sizeof *hub->client);
+    hub->control = malloc(sizeof *hub->control);
+    hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
+    if (!hub->room || !hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
+    for (int i = 0; !err && i < n_session; i++) {
+        pal_hub_room *room = &hub->room[i];
+        const pal_scene *scene = pal_session_scene(session[i]);
+        room->session = session[i];
+        pal_members_init(&room->members, scene->n_tool);
+        for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
+        err = pal_stream_open(session[i], options->error_m, note, &room->stream);
+        if (!err) hub->n_room++;
+    }
+    if (err) return pal_hub_destroy(hub), err;
+    pal_loop_listen(loop, &(pal_loop_events){hub_wake, hub_tick, hub});
+    *out = hub;
+    return PAL_ERR_OK;
+}
+
+void pal_hub_destroy(pal_hub *hub)
+{
+    if (!hub) return;
+    for (int i = 0; i < hub->n_room; i++) pal_stream_close(hub->room[i].stream);
+    free(hub->room);
+    free(hub->client);
+    free(hub->control);
+    free(hub->text);
+    free(hub);
+}
+
+void pal_hub_events(pal_hub *hub, pal_peer_events *out)
+{
+    *out = (pal_peer_events){.opened = client_opened,
+                             .received = pal_hub_received,
+                             .waiting = client_waiting,
+                             .next = client_next,
+                             .closed = client_closed,
+                             .get = pal_hub_get,
+                             .user = hub};
+}
+
+void pal_hub_goodbye(pal_hub *hub)
+{
+    hub->leaving = true;
+    for (int i = 0; i < hub->most_clients; i++)
+        if (hub->client[i].peer) pal_hub_drop(hub, &hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
+}
+
+int pal_hub_clients(const pal_hub *hub)
+{
+    return hub->n_client;
+}

@@ -1,0 +1,27 @@
+/* The hub: peers to sessions. It knows what messages mean, who may do what, and what each peer is to be sent next.
+ *
+ * Sending, in this order: control (hello, errors, pongs, members, status), contact models, then cycles as far as credit
+ * goes. Per client there wait at most 32 queued control messages, one contact model and the cycle that is being sent;
+ * all else is made when the road asks for it from the newest that the session's stream holds. Thread: [net]. */
+#ifndef PAL_NET_HUB_H
+#define PAL_NET_HUB_H
+#include "server/net/site.h"
+#include "server/net/stream.h"
+#include "server/net/transport.h"
+
+typedef struct pal_hub pal_hub;
+
+typedef struct pal_hub_options {
+    double error_m;
+    int most_clients;
+    pal_site *site; /* borrowed; NULL: no files */
+} pal_hub_options;
+
+/* builds the streams; borrows loop and sessions; listens to the loop. [load] */
+pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
+                       pal_note *note, pal_hub **out);
+void pal_hub_destroy(pal_hub *hub);                      /* after its roads; NULL is fine. [load] */
+void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_ops.open */
+void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with 1001; no new ones */
+int pal_hub_clients(const pal_hub *hub);
+#endif

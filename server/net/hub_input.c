@@ -1,0 +1,273 @@
+/* The hub's input: every message of a client is counted, decoded (untrusted), checked against who may do what, and
+ * handed to the session. A malformed message closes the connection with its refusal's sentence; a well-formed one that
+ * cannot be granted is answered with `error`; poses of a tool that the sender does not hold are ignored. */
+#include "server/net/hub_parts.h"
+
+#include "server/base/clock.h"
+#include "server/net/plain_text.h"
+
+#include <string.h>
+
+#define SCOLD_NS 1000000000u
+
+void pal_hub_release_tool(pal_hub_room *room, int tool)
+{
+    room->tool[tool] = (pal_stream_tool){0};
+    (void)pal_session_put_pose(room->session, tool, NULL);
+}
+
+static void malformed(pal_hub *hub, pal_client *c, int refusal)
+{
+    hub->count.n_malformed++;
+    pal_hub_drop(hub, c, PAL_WIRE_CLOSE_PROTOCOL, "%s", pal_refusal_text(refusal));
+}
+
+/* takes a tool and says so to nobody */
+static pal_err take_tool(pal_client *c, int wanted)
+{
+    pal_hub_room *room = c->room;
+    int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
+    PAL_TRY(pal_members_take(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
+    if (before == taken) return PAL_ERR_OK;
+    if (before >= 0) pal_hub_release_tool(room, before);
+    room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_clock_ns()};
+    return PAL_ERR_OK;
+}
+
+static void explain_take(pal_hub *hub, pal_client *c, int wanted, pal_err err)
+{
+    pal_member_list *members = &c->room->members;
+    int holder = wanted >= 0 && wanted < members->n_tool ? members->holder[wanted] : 0;
+    if (err == PAL_ERR_STATE && holder)
+        pal_hub_complain(hub, c, "tool_taken", "tool %d is held by %s", wanted,
+                         pal_members_find(members, holder)->name);
+    else if (err == PAL_ERR_STATE)
+        pal_hub_complain(hub, c, "tool_taken", "no tool is free");
+    else if (pal_members_find(members, c->id)->role == PAL_MEMBER_VIEWER)
+        pal_hub_complain(hub, c, "role", "a viewer holds no tool");
+    else
+        pal_hub_complain(hub, c, "tool", "there is no tool %d", wanted);
+}
+
+static void say_hello(pal_hub *hub, pal_client *c)
+{
+    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    pal_wire_hello *hello = &hub->control->hello;
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_HELLO;
+    pal_stream_hello(c->room->stream, hello);
+    hello->credit = (uint32_t)c->credit.most;
+    hello->you_id = (uint16_t)m->id;
+    hello->you_role = (pal_wire_role)m->role;
+    hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;
+    pal_plain_text(hello->you_name, sizeof hello->you_name, m->name);
+    pal_hub_say(hub, c, hub->control);
+}
+
+static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
+{
+    static const pal_member_role roles[PAL_WIRE_ROLE_COUNT] = {PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE,
+                                                               PAL_MEMBER_INSTRUCTOR};
+    pal_hub_room *room = c->room;
+    if (c->id) {
+        pal_hub_complain(hub, c, "joined", "you have joined already");
+        return;
+    }
+    if (pal_members_join(&room->members, roles[wanted->role], wanted->name, &c->id)) {
+        c->id = 0;
+        hub->count.n_refused_join++;
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_FULL, "the session has its %d members", PAL_MEMBER_LIST_MAX);
+        return;
+    }
+    hub->count.n_joined++;
+    room->tier_users[c->tier]++;
+    /* hello says which tool was given; a refusal follows it */
+    pal_err err = PAL_ERR_OK;
+    if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
+    say_hello(hub, c);
+    if (err && c->id) explain_take(hub, c, wanted->tool, err);
+    pal_hub_members_changed(hub, room);
+}
+
+static void take(pal_hub *hub, pal_client *c, int tool)
+{
+    pal_err err = take_tool(c, tool);
+    if (err)
+        explain_take(hub, c, tool, err);
+    else
+        pal_hub_members_changed(hub, c->room);
+}
+
+static void leave(pal_hub *hub, pal_client *c)
+{
+    pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    int tool = m->tool;
+    if (tool < 0) return;
+    pal_members_give_back(&c->room->members, c->id);
+    pal_hub_release_tool(c->room, tool);
+    pal_packet_replace(&c->haptic, NULL);
+    pal_hub_members_changed(hub, c->room);
+}
+
+/* fills the command's material from what holds now and the numbers given; false: complained */
+static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_command *command)
+{
+    const pal_scene *scene = pal_session_scene(c->room->session);
+    int body = order->target[0] ? -1 : 0;
+    for (int i = 0; i < scene->n_body; i++)
+        if (!strcmp(scene->body[i].name, order->target)) body = i;
+    if (body < 0) {
+        pal_hub_complain(hub, c, "target", "there is no body %s", order->target);
+        return false;
+    }
+    pal_material m = c->room->material[body];
+    for (uint32_t i = 0; i < order->n_arg; i++) {
+        const char *key = order->arg[i].key;
+        double *to = !strcmp(key, "young_Pa")        ? &m.young_Pa
+                     : !strcmp(key, "poisson")       ? &m.poisson
+                     : !strcmp(key, "density_kg_m3") ? &m.density_kg_m3
+                     : !strcmp(key, "damping_1_s")   ? &m.damping_1_s
+                                                     : NULL;
+        if (!to) {
+            pal_hub_complain(hub, c, "args", "a material has no %s", key);
+            return false;
+        }
+        *to = order->arg[i].value;
+    }
+    command->body = body;
+    command->material = m;
+    return true;
+}
+
+static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    static const char *const verbs[PAL_COMMAND_COUNT] = {"pause", "resume", "step", "reset", "material"};
+    pal_command command = {.kind = PAL_COMMAND_COUNT};
+    if (!pal_members_may_command(&c->room->members, c->id)) {
+        pal_hub_complain(hub, c, "role", "a viewer gives no commands");
+        return;
+    }
+    for (int i = 0; i < PAL_COMMAND_COUNT; i++)
+        if (!strcmp(order->verb, verbs[i])) command.kind = (pal_command_kind)i;
+    if (command.kind == PAL_COMMAND_COUNT) {
+        pal_hub_complain(hub, c, "verb", "there is no command %s", order->verb);
+        return;
+    }
+    if (command.kind == PAL_COMMAND_MATERIAL && !read_material(hub, c, order, &command)) return;
+    pal_err err = pal_session_command(c->room->session, &command);
+    if (err)
+        pal_hub_complain(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", order->verb, pal_err_text(err));
+    else if (command.kind == PAL_COMMAND_MATERIAL)
+        c->room->material[command.body] = command.material;
+}
+
+static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+{
+    /* read into a copy of its own: answers are made in hub->control */
+    static pal_control in; /* about 20 KiB, [net] only */
+    int refusal = pal_control_get((const char *)bytes, n_byte, false, &in);
+    hub->count.n_control++;
+    if (refusal) {
+        malformed(hub, c, refusal);
+        return;
+    }
+    if (!c->id && in.type != PAL_CONTROL_JOIN && in.type != PAL_CONTROL_PING) {
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "join comes first");
+        return;
+    }
+    switch (in.type) {
+    case PAL_CONTROL_JOIN:
+        join(hub, c, &in.join);
+        break;
+    case PAL_CONTROL_TAKE:
+        take(hub, c, in.tool);
+        break;
+    case PAL_CONTROL_LEAVE:
+        leave(hub, c);
+        break;
+    case PAL_CONTROL_COMMAND:
+        command(hub, c, &in.order);
+        break;
+    case PAL_CONTROL_PING:
+        memset(hub->control, 0, sizeof *hub->control);
+        hub->control->type = PAL_CONTROL_PONG;
+        hub->control->stamp_ms = in.stamp_ms;
+        pal_hub_say(hub, c, hub->control);
+        break;
+    default:
+        malformed(hub, c, PAL_REFUSAL_KIND);
+        break;
+    }
+}
+
+static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+{
+    pal_wire_pose w;
+    uint64_t now = pal_loop_now_ns(hub->loop);
+    int refusal = pal_wire_get_pose(bytes, n_byte, &w);
+    hub->count.n_pose++;
+    if (refusal) {
+        malformed(hub, c, refusal);
+        return;
+    }
+    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    if (m->tool < 0 || m->tool != w.tool) {
+        hub->count.n_pose_ignored++;
+        if (m->role == PAL_MEMBER_VIEWER && (c->scold_ns == 0 || now - c->scold_ns > SCOLD_NS)) {
+            c->scold_ns = now;
+            pal_hub_complain(hub, c, "role", "a viewer moves no tool");
+        }
+        return;
+    }
+    if (w.flags & PAL_WIRE_POSE_AWAY) {
+        (void)pal_session_put_pose(c->room->session, m->tool, NULL);
+        return;
+    }
+    pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRAB, .seq = w.seq, .stamp_us = w.stamp_us};
+    for (int i = 0; i < 3; i++) {
+        p.position_m[i] = w.position_m[i];
+        p.velocity_m_s[i] = w.velocity_m_s[i];
+    }
+    for (int i = 0; i < 4; i++) p.quat[i] = w.quaternion[i];
+    if (pal_session_put_pose(c->room->session, m->tool, &p)) hub->count.n_pose_refused++;
+}
+
+static void acknowledge(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+{
+    pal_wire_ack ack;
+    int refusal = pal_wire_get_ack(bytes, n_byte, &ack);
+    hub->count.n_ack++;
+    if (!refusal && !pal_credit_acknowledge(&c->credit, ack.cycle, pal_loop_now_ns(hub->loop)))
+        refusal = PAL_REFUSAL_RANGE;
+    if (refusal)
+        malformed(hub, c, refusal);
+    else
+        c->peer->ops->ready(c->peer);
+}
+
+void pal_hub_received(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text)
+{
+    pal_hub *hub = user;
+    pal_client *c = peer->client;
+    pal_wire_head head;
+    if (!c || peer->drop_code) return;
+    if (!pal_bucket_take(&c->bucket, pal_loop_now_ns(hub->loop))) {
+        hub->count.n_flood++;
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_RATE, "more than 600 messages a second");
+        return;
+    }
+    if (text) {
+        control(hub, c, bytes, n_byte);
+        return;
+    }
+    int refusal = pal_wire_get_head(bytes, n_byte, &head);
+    if (!refusal && head.kind != PAL_WIRE_POSE && head.kind != PAL_WIRE_ACK) refusal = PAL_REFUSAL_KIND;
+    if (refusal)
+        malformed(hub, c, refusal);
+    else if (!c->id)
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "join comes first");
+    else if (head.kind == PAL_WIRE_POSE)
+        pose(hub, c, bytes, n_byte);
+    else
+        acknowledge(hub, c, bytes, n_byte);
+}

@@ -1,0 +1,79 @@
+/* What hub.c, hub_input.c and hub_pages.c share: the hub's records. Private to these three. Thread: [net]. */
+#ifndef PAL_NET_HUB_PARTS_H
+#define PAL_NET_HUB_PARTS_H
+#include "server/net/credit.h"
+#include "server/net/hub.h"
+
+enum { PAL_HUB_QUEUE = 32 };
+
+struct pal_hub_room;
+
+/* one peer that has come; a free place has peer NULL */
+typedef struct pal_client {
+    pal_peer *peer;
+    struct pal_hub_room *room;
+    int id; /* member, 0: has not joined */
+    uint64_t opened_ns;
+    pal_bucket bucket;
+    pal_credit credit;
+    int tier;
+    /* control that waits, oldest first, and what is made when asked for */
+    pal_packet *queue[PAL_HUB_QUEUE];
+    int queue_begin, n_queue;
+    bool members_due, status_due;
+    pal_packet *haptic; /* newest, unsent */
+    /* the cycle that is being sent: frames of parts, then tools */
+    pal_packet *out[PAL_BODY_MAX + 1];
+    int n_out, out_begin;
+    uint32_t out_cycle, sent_cycle;
+    uint32_t sent_frame[PAL_BODY_MAX]; /* cycle of the frame of each part sent last */
+    /* figures */
+    uint64_t n_byte, n_cycle, n_skipped;
+    uint64_t status_byte, status_ns;                      /* at the last status                   */
+    uint64_t tier_cycle, tier_skipped, tier_ns, clean_ns; /* of the tier's window   */
+    uint64_t scold_ns;                                    /* last error about poses               */
+} pal_client;
+
+/* one session as the hub sees it */
+typedef struct pal_hub_room {
+    pal_session *session;
+    pal_stream *stream;
+    pal_member_list members;
+    pal_stream_tool tool[PAL_TOOL_MAX];
+    pal_material material[PAL_BODY_MAX]; /* as last asked for */
+    int tier_users[PAL_STREAM_TIER];
+} pal_hub_room;
+
+typedef struct pal_hub_count {
+    uint64_t n_frame, n_skipped, n_byte, n_joined, n_refused_join;
+    uint64_t n_pose, n_ack, n_control;
+    uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
+} pal_hub_count;
+
+struct pal_hub {
+    pal_loop *loop;
+    pal_site *site;
+    int n_room, most_clients, n_client;
+    bool leaving;
+    pal_hub_room *room;   /* [n_room] */
+    pal_client *client;   /* [most_clients] */
+    pal_control *control; /* scratch: it is large */
+    char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
+    pal_hub_count count;
+};
+
+/* hub.c */
+void pal_hub_say(pal_hub *hub, pal_client *client, const pal_control *control); /* queues; overflow drops the client */
+void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room);
+void pal_hub_set_tier(pal_hub *hub, pal_client *client, int tier);
+uint32_t pal_hub_colour(int id);
+/* hub_input.c */
+void pal_hub_received(void *hub, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
+void pal_hub_release_tool(pal_hub_room *room, int tool); /* nobody holds it any more: it is lifted out */
+/* hub_pages.c */
+void pal_hub_get(void *hub, const char *path, pal_reply *reply);
+#endif

@@ -1,0 +1,157 @@
+/* The server puts loop, hub and road together. */
+#include "server/net/server.h"
+
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/net/hub.h"
+
+#include <arpa/inet.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define GOODBYE_NS 500000000u
+
+/* users counts the threads inside wake: disconnecting waits for them, wake waits for nobody */
+struct pal_server_gate {
+    _Atomic(pal_loop *) loop;
+    _Atomic int users;
+};
+
+struct pal_server {
+    pal_loop *loop;
+    pal_hub *hub;
+    pal_site *site;
+    const pal_transport_ops *road;
+    pal_transport *transport;
+    pal_server_gate *gate;
+};
+
+pal_server_gate *pal_server_gate_create(void)
+{
+    return calloc(1, sizeof(pal_server_gate));
+}
+
+void pal_server_gate_destroy(pal_server_gate *gate)
+{
+    free(gate);
+}
+
+void pal_server_gate_wake(void *gate)
+{
+    pal_server_gate *g = gate;
+    atomic_fetch_add(&g->users, 1);
+    pal_loop *loop = atomic_load(&g->loop);
+    if (loop) pal_loop_wake(loop);
+    atomic_fetch_sub(&g->users, 1);
+}
+
+void pal_server_connect(pal_server *server, pal_server_gate *gate)
+{
+    server->gate = gate;
+    atomic_store(&gate->loop, server->loop);
+    /* frames published before */
+    pal_loop_wake(server->loop);
+}
+
+static void disconnect(pal_server *server)
+{
+    if (!server->gate) return;
+    atomic_store(&server->gate->loop, NULL);
+    while (atomic_load(&server->gate->users)) sched_yield();
+}
+
+static bool is_loopback(const char *listen)
+{
+    struct in_addr v4;
+    if (!strcmp(listen, "::1")) return true;
+    return inet_pton(AF_INET, listen, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
+}
+
+static pal_err make_url(const pal_server_options *options, char *url, size_t cap, pal_note *note)
+{
+    const char *listen = options->listen && options->listen[0] ? options->listen : "127.0.0.1";
+    if (!strcmp(listen, "localhost")) listen = "127.0.0.1";
+    if (!options->allow_remote && !is_loopback(listen))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "listening on %s lets other machines in, without password or encryption: add "
+                            "--allow-remote if that is meant",
+                            listen);
+    snprintf(url, cap, strchr(listen, ':') ? "ws://[%.80s]:%d%s" : "ws://%.80s:%d%s", listen, options->port,
+             options->allow_remote ? "?hosts=any" : "");
+    return PAL_ERR_OK;
+}
+
+static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_session **session, int n_session,
+                          pal_note *note)
+{
+    char url[160];
+    pal_hub_options hub = {.error_m = options->error_m,
+                           .most_clients = options->most_clients > 0 ? options->most_clients : 200};
+    pal_peer_events events;
+    PAL_TRY(make_url(options, url, sizeof url, note));
+    if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, note, &s->site));
+    hub.site = s->site;
+    /* besides the clients: page loads, and what lws needs itself */
+    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, note, &s->loop));
+    PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, note, &s->hub));
+    pal_hub_events(s->hub, &events);
+    return s->road->open(s->loop, url, &events, note, &s->transport);
+}
+
+pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_note *note,
+                        pal_server **out)
+{
+    if (n_session < 1) return pal_note_set(note, PAL_ERR_REFUSED, "a server needs a session");
+    pal_server *s = calloc(1, sizeof *s);
+    if (!s) return PAL_ERR_MEMORY;
+    s->road = options->road && !strcmp(options->road, pal_mem_road.scheme) ? &pal_mem_road : &pal_ws_road;
+    pal_err err = open_parts(s, options, session, n_session, note);
+    if (err) return pal_server_close(s), err;
+    *out = s;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_server_run(pal_server *server)
+{
+    pal_err err = pal_loop_run(server->loop);
+    if (err) return err;
+    /* clients are told why; those that do not listen are left after GOODBYE_NS */
+    uint64_t end = pal_clock_ns() + GOODBYE_NS;
+    pal_hub_goodbye(server->hub);
+    while (pal_hub_clients(server->hub) && pal_clock_ns() < end) pal_loop_step(server->loop, end);
+    return PAL_ERR_OK;
+}
+
+void pal_server_stop(pal_server *server)
+{
+    pal_loop_stop(server->loop);
+}
+
+int pal_server_port(const pal_server *server)
+{
+    return server->road->port(server->transport);
+}
+
+void pal_server_close(pal_server *server)
+{
+    if (!server) return;
+    disconnect(server);
+    if (server->transport) server->road->close(server->transport);
+    pal_hub_destroy(server->hub);
+    pal_loop_destroy(server->loop);
+    pal_site_close(server->site);
+    free(server);
+}
+
+pal_transport *pal_server_transport(pal_server *server)
+{
+    return server->transport;
+}
+
+void pal_server_turn(pal_server *server, uint64_t now_ns)
+{
+    pal_loop_turn(server->loop, now_ns);
+}

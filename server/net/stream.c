@@ -1,0 +1,360 @@
+/* Streams: streaming.md 1.4 and 1.6. Encoding is done here on the network thread (0.4 ms per part and cycle). */
+#include "server/net/stream.h"
+
+#include "protocol/asset.h"
+#include "protocol/frame_codec.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/net/plain_text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define STALE_NS 250000000u
+
+static const double tier_factor[PAL_STREAM_TIER] = {1, 2, 5};
+
+struct pal_stream_coder {
+    pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER];
+    uint32_t seq[PAL_BODY_MAX]; /* per part, all tiers together */
+    uint8_t *buffer;            /* [cap] */
+    size_t cap;
+    uint32_t haptic_seq;
+    uint64_t rate_tick, rate_ns;
+};
+
+static pal_err refuse(pal_note *note, int refusal, const char *part, const char *what)
+{
+    return pal_note_set(note, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED, "part %s: %s: %s", part,
+                        what, pal_refusal_text(refusal));
+}
+
+/* asset and encoders of one part */
+static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_note *note)
+{
+    pal_stream_part *part = &s->part[index];
+    pal_frame_order *order = NULL;
+    uint8_t *bytes = NULL;
+    size_t n_byte = 0;
+    char hash[PAL_ASSET_HASH_CHARS];
+    pal_err err = PAL_ERR_OK;
+    const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are not negative */
+
+    int refusal = pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
+    if (refusal) return refuse(note, refusal, shown->name, "no vertex order");
+    refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
+    if (refusal) err = refuse(note, refusal, shown->name, "no asset");
+    for (int t = 0; !err && t < PAL_STREAM_TIER; t++) {
+        refusal = pal_frame_encoder_create(shown->rest_m, order, &s->coder->encoder[index][t]);
+        if (refusal) err = refuse(note, refusal, shown->name, "no encoder");
+    }
+    if (!err && !(part->asset = pal_packet_create(bytes, n_byte, false))) err = PAL_ERR_MEMORY;
+    if (!err) {
+        pal_asset_hash(bytes, n_byte, hash);
+        snprintf(part->info.asset, sizeof part->info.asset, "/asset/%s", hash);
+        pal_plain_text(part->info.name, sizeof part->info.name, shown->name);
+        part->info.epoch = 1;
+        part->info.n_vertex = (uint32_t)shown->n_vertex;
+        part->info.n_triangle = (uint32_t)shown->n_tri;
+    }
+    free(bytes);
+    pal_frame_order_destroy(order);
+    return err;
+}
+
+static void widen_box(pal_stream *s, const pal_shown *shown)
+{
+    for (int i = 0; i < 3 * shown->n_vertex; i++) {
+        double x = shown->rest_m[i];
+        s->box_min_m[i % 3] = fmin(s->box_min_m[i % 3], x);
+        s->box_max_m[i % 3] = fmax(s->box_max_m[i % 3], x);
+    }
+}
+
+static pal_err open_parts(pal_stream *s, double error_m, pal_note *note)
+{
+    uint32_t most = 0;
+    double side = 0;
+    for (int c = 0; c < 3; c++) s->box_min_m[c] = HUGE_VAL, s->box_max_m[c] = -HUGE_VAL;
+    for (int p = 0; p < s->n_part; p++) {
+        pal_shown shown;
+        pal_session_shown(s->session, p, &shown);
+        if (shown.n_vertex < 1 || (uint32_t)shown.n_vertex > PAL_WIRE_VERTEX_MAX)
+            return pal_note_set(note, PAL_ERR_BUDGET, "part %s: %d shown vertices, 1 to %u can be streamed", shown.name,
+                                shown.n_vertex, PAL_WIRE_VERTEX_MAX);
+        PAL_TRY(open_part(s, p, &shown, note));
+        widen_box(s, &shown);
+        if (s->part[p].info.n_vertex > most) most = s->part[p].info.n_vertex;
+    }
+    for (int c = 0; c < 3; c++) side = fmax(side, s->box_max_m[c] - s->box_min_m[c]);
+    s->error_m = error_m > 0 ? error_m : side > 0 ? fmin(5e-5, side / 3000) : 5e-5;
+    for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
+    s->coder->cap = pal_frame_bound(most);
+    if (s->coder->cap < PAL_WIRE_TOOLS_MAX) s->coder->cap = PAL_WIRE_TOOLS_MAX;
+    s->coder->buffer = malloc(s->coder->cap);
+    return s->coder->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pal_stream **out)
+{
+    pal_stream *s = calloc(1, sizeof *s);
+    if (!s) return PAL_ERR_MEMORY;
+    s->session = session;
+    s->scene = pal_session_scene(session);
+    s->n_part = pal_session_parts(session);
+    s->part = calloc((size_t)(s->n_part ? s->n_part : 1), sizeof *s->part);
+    s->coder = calloc(1, sizeof *s->coder);
+    pal_err err = s->part && s->coder ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (!err && (s->n_part < 1 || s->n_part > PAL_BODY_MAX))
+        err = pal_note_set(note, PAL_ERR_REFUSED, "session %s shows %d parts, 1 to %d can be streamed", s->scene->name,
+                           s->n_part, PAL_BODY_MAX);
+    if (!err) err = open_parts(s, error_m, note);
+    if (err) return pal_stream_close(s), err;
+    *out = s;
+    return PAL_ERR_OK;
+}
+
+void pal_stream_close(pal_stream *stream)
+{
+    if (!stream) return;
+    for (int p = 0; stream->part && p < stream->n_part; p++) {
+        pal_packet_drop(stream->part[p].asset);
+        for (int t = 0; t < PAL_STREAM_TIER; t++) {
+            pal_packet_drop(stream->part[p].frame[t]);
+            if (stream->coder && p < PAL_BODY_MAX) pal_frame_encoder_destroy(stream->coder->encoder[p][t]);
+        }
+    }
+    for (int t = 0; t < PAL_TOOL_MAX; t++) pal_packet_drop(stream->haptic[t]);
+    pal_packet_drop(stream->tools);
+    if (stream->coder) free(stream->coder->buffer);
+    free(stream->coder);
+    free(stream->part);
+    free(stream);
+}
+
+double pal_stream_tier_error_m(const pal_stream *stream, int tier)
+{
+    return stream->error_m * tier_factor[tier];
+}
+
+double pal_stream_rate_hz(const pal_stream *stream)
+{
+    return fmin(1 / stream->scene->step_s, PAL_STREAM_RATE_HZ);
+}
+
+static uint64_t time_us(const pal_frame *frame)
+{
+    return frame->time_s > 0 ? (uint64_t)(frame->time_s * 1e6) : 0;
+}
+
+/* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest */
+static void encode_part(pal_stream *s, int p, int tier)
+{
+    pal_stream_part *part = &s->part[p];
+    const pal_frame_part *from = &s->frame->part[p];
+    pal_frame_given given = {.part = (uint16_t)p,
+                             .epoch = part->info.epoch,
+                             .seq = s->coder->seq[p] + 1,
+                             .cycle = s->cycle,
+                             .sim_time_us = time_us(s->frame),
+                             .error_m = pal_stream_tier_error_m(s, tier),
+                             .position_m = from->position_m};
+    pal_frame_result result;
+    uint64_t begin = pal_clock_ns();
+    if (from->n_vertex != (int)part->info.n_vertex) return;
+    int refusal = pal_frame_put(s->coder->encoder[p][tier], &given, s->coder->buffer, s->coder->cap, &result);
+    s->count.n_encode++;
+    s->count.encode_ns += pal_clock_ns() - begin;
+    if (refusal) {
+        if (s->count.n_refused_frame++ == 0)
+            pal_log(PAL_LOG_ERROR, "frame", "part %s is not streamed: %s", part->info.name, pal_refusal_text(refusal));
+        return;
+    }
+    if (!result.changed && part->frame[tier]) return;
+    pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
+    if (!packet) return;
+    pal_packet_replace(&part->frame[tier], packet);
+    part->frame_cycle[tier] = s->cycle;
+    s->coder->seq[p]++;
+    s->count.n_frame_byte += result.n_byte;
+}
+
+static void copy_f3(float to[3], const double from[3])
+{
+    for (int i = 0; i < 3; i++) to[i] = isfinite(from[i]) ? (float)from[i] : 0;
+}
+
+static void copy_quat(float to[4], const double from[4])
+{
+    double n = 0;
+    for (int i = 0; i < 4; i++) n += from[i] * from[i];
+    bool good = fabs(n - 1) <= 1e-3;
+    for (int i = 0; i < 4; i++) to[i] = good ? (float)from[i] : i == 0;
+}
+
+/* the pose that the step has used is the holder's own, not that of the one who held the tool before */
+static bool echoes(const pal_frame_tool *f, const pal_stream_tool *t)
+{
+    return f->present && t->holder && f->pose_ns >= t->taken_ns && f->pose_ns;
+}
+
+static uint32_t hold_us(const pal_frame_tool *f, uint64_t clock_ns)
+{
+    uint64_t us = clock_ns > f->pose_ns ? (clock_ns - f->pose_ns) / 1000 : 0;
+    return us > UINT32_MAX ? UINT32_MAX : (uint32_t)us;
+}
+
+static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
+{
+    pal_wire_tools w = {.cycle = s->cycle, .n_tool = (uint32_t)s->frame->n_tool, .sim_time_us = time_us(s->frame)};
+    uint64_t clock_ns = pal_clock_ns();
+    for (int i = 0; i < s->frame->n_tool; i++) {
+        const pal_frame_tool *f = &s->frame->tool[i];
+        pal_wire_tool *to = &w.tool[i];
+        to->holder = (uint16_t)tool[i].holder;
+        to->colour = tool[i].holder ? tool[i].colour : 0;
+        to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_TOUCHES : 0) |
+                               (f->holding ? PAL_WIRE_TOOL_GRABS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
+                               (f->present && clock_ns > f->pose_ns + STALE_NS ? PAL_WIRE_TOOL_STALE : 0));
+        to->radius_m = (float)f->radius_m;
+        copy_f3(to->position_m, f->pose.position_m);
+        copy_quat(to->quaternion, f->pose.quat);
+        copy_f3(to->force_N, f->force_N);
+        if (!echoes(f, &tool[i])) continue;
+        to->echo_seq = f->pose.seq;
+        to->echo_stamp_us = f->pose.stamp_us;
+        to->hold_us = hold_us(f, clock_ns);
+    }
+    size_t n = pal_wire_put_tools(s->coder->buffer, s->coder->cap, &w);
+    pal_packet *packet = n ? pal_packet_create(s->coder->buffer, n, false) : NULL;
+    if (packet) pal_packet_replace(&s->tools, packet);
+}
+
+static void copy_patch(pal_wire_patch *to, const pal_patch *from, const double origin[3])
+{
+    double p[3];
+    for (int i = 0; i < 3; i++) p[i] = from->point_m[i] - origin[i];
+    to->id = (uint16_t)from->id;
+    to->group = (uint16_t)from->group;
+    copy_f3(to->p_m, p);
+    copy_f3(to->n, from->normal);
+    copy_f3(to->v_m_s, from->velocity_m_s);
+    to->k1_N_m = (float)from->k1_N_m;
+    to->k2_N_m2 = (float)from->k2_N_m2;
+    to->b_N_s_m = (float)from->b_Ns_m;
+    to->kt_N_m = (float)from->kt_N_m;
+    to->mu_s = (float)from->mu_static;
+    to->mu_d = (float)from->mu_dynamic;
+    to->radius_m = (float)from->radius_m;
+}
+
+/* contact model of a held tool (haptics.md 2.3, 5); its origin is the tool's own position, so floats suffice */
+static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
+{
+    const pal_frame_tool *f = &s->frame->tool[i];
+    uint64_t clock_ns = pal_clock_ns();
+    bool frozen = false;
+    for (int p = 0; p < s->n_part; p++) frozen |= s->frame->part[p].frozen;
+    if (!f->present || !tool->holder) {
+        pal_packet_replace(&s->haptic[i], NULL);
+        return;
+    }
+    pal_wire_haptic w = {.tool = (uint16_t)i,
+                         .seq = ++s->coder->haptic_seq,
+                         .flags =
+                             (s->frame->paused ? PAL_WIRE_HAPTIC_FREEZE : 0) | (frozen ? PAL_WIRE_HAPTIC_FORCE_OFF : 0),
+                         .stamp_us = clock_ns / 1000,
+                         .frame_us = (uint32_t)(1e6 / pal_stream_rate_hz(s)),
+                         .has_grip = f->has_grip,
+                         .grip_b_N_s_m = (float)f->grip_b_Ns_m};
+    if (echoes(f, tool)) {
+        w.echo_stamp_us = f->pose.stamp_us;
+        w.echo_seq = f->pose.seq;
+        w.hold_us = hold_us(f, clock_ns);
+    }
+    double x0[3];
+    for (int c = 0; c < 3; c++) {
+        w.origin_m[c] = f->pose.position_m[c];
+        x0[c] = f->has_grip ? f->grip_x0_m[c] - w.origin_m[c] : 0;
+    }
+    copy_f3(w.f_ref_N, f->force_N);
+    copy_f3(w.grip_x0_m, x0);
+    copy_f3(w.grip_f0_N, f->grip_f0_N);
+    copy_f3(w.grip_k_N_m, f->grip_k_N_m);
+    copy_f3(w.grip_k_N_m + 3, f->grip_k_N_m + 3);
+    for (int k = 0; k < f->n_patch && k < PAL_PATCH_MAX; k++)
+        copy_patch(&w.patch[w.n_patch++], &f->patch[k], w.origin_m);
+    size_t n = pal_wire_put_haptic(s->coder->buffer, s->coder->cap, &w);
+    pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->coder->buffer, n, false) : NULL);
+}
+
+bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+                     const pal_stream_tool tool[PAL_TOOL_MAX])
+{
+    const pal_frame *frame = pal_session_take_frame(stream->session);
+    if (!frame) return false;
+    stream->frame = frame;
+    stream->cycle++;
+    stream->cycle_ns = now_ns;
+    for (int p = 0; p < stream->n_part; p++)
+        for (int t = 0; t < PAL_STREAM_TIER; t++)
+            if (used[t]) encode_part(stream, p, t);
+    put_tools(stream, tool);
+    for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
+    for (int r = 0; r < frame->n_row; r++) stream->row_ms[r] += 0.2 * (frame->row_ns[r] * 1e-6 - stream->row_ms[r]);
+    stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
+    return true;
+}
+
+void pal_stream_begin_tier(pal_stream *stream, int tier)
+{
+    if (!stream->frame) return;
+    for (int p = 0; p < stream->n_part; p++) encode_part(stream, p, tier);
+}
+
+void pal_stream_measure(pal_stream *stream, uint64_t now_ns)
+{
+    struct pal_stream_coder *c = stream->coder;
+    if (!stream->frame) return;
+    uint64_t tick = stream->frame->tick;
+    double past_s = (double)(now_ns - c->rate_ns) * 1e-9;
+    if (c->rate_ns && tick >= c->rate_tick && past_s > 0) stream->step_rate_hz = (double)(tick - c->rate_tick) / past_s;
+    c->rate_tick = tick;
+    c->rate_ns = now_ns;
+}
+
+void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
+{
+    const pal_scene *scene = stream->scene;
+    memset(out, 0, sizeof *out);
+    out->version = PAL_PROTOCOL_VERSION;
+    pal_plain_text(out->session, sizeof out->session, scene->name);
+    pal_plain_text(out->title, sizeof out->title, scene->title);
+    pal_plain_text(out->organ, sizeof out->organ, scene->source);
+    out->step_rate_hz = 1 / scene->step_s;
+    out->frame_rate_hz = pal_stream_rate_hz(stream);
+    double size = 0;
+    for (int c = 0; c < 3; c++) {
+        out->box_min_m[c] = stream->box_min_m[c];
+        out->box_max_m[c] = stream->box_max_m[c];
+        size += pow(stream->box_max_m[c] - stream->box_min_m[c], 2);
+    }
+    out->n_part = (uint32_t)stream->n_part;
+    for (int p = 0; p < stream->n_part; p++) out->part[p] = stream->part[p].info;
+    out->n_tool = (uint32_t)scene->n_tool;
+    for (int t = 0; t < scene->n_tool; t++) {
+        pal_plain_text(out->tool[t].name, sizeof out->tool[t].name, scene->tool[t].name);
+        /* the world's own radius when a frame tells it, else the rule of pal_tool_def */
+        out->tool[t].radius_m = stream->frame && t < stream->frame->n_tool ? stream->frame->tool[t].radius_m
+                                : scene->tool[t].radius_m > 0              ? scene->tool[t].radius_m
+                                                                           : 0.04 * sqrt(size);
+    }
+    int n_row = pal_session_rows(stream->session);
+    for (int r = 0; r < n_row && r < PAL_WIRE_ROW_MAX; r++) {
+        pal_row_info row;
+        pal_session_row(stream->session, r, &row);
+        pal_plain_text(out->row[out->n_row++], PAL_WIRE_NAME_BYTES, row.name);
+    }
+}

@@ -1,0 +1,71 @@
+/* The outgoing side of one session: assets built once, every frame encoded once, the newest messages kept.
+ *
+ * A cycle is one simulation output (protocol/README.md, "Cycles and credit"): FRAME messages of the parts that look
+ * different, one TOOLS message. Frames stand alone, so the newest messages serve everybody: the client that keeps up,
+ * the one that skipped cycles, and the one that has just come. Tiers are accuracies of the same part; a tier that
+ * nobody uses is not encoded.
+ * Thread: [net], except open and close [load]. */
+#ifndef PAL_NET_STREAM_H
+#define PAL_NET_STREAM_H
+#include "protocol/control.h"
+#include "server/net/packet.h"
+#include "server/session/members.h"
+#include "server/session/session.h"
+
+enum { PAL_STREAM_TIER = 3 };   /* 0: error_m; then 2 and 5 times that */
+#define PAL_STREAM_RATE_HZ 60.0 /* cycles per second at most */
+
+typedef struct pal_stream_part {
+    pal_wire_part_info info;
+    pal_packet *asset;
+    pal_packet *frame[PAL_STREAM_TIER];    /* newest, NULL before the first          */
+    uint32_t frame_cycle[PAL_STREAM_TIER]; /* cycle that made it                     */
+} pal_stream_part;
+
+typedef struct pal_stream_count { /* totals for metrics */
+    uint64_t n_encode, encode_ns, n_frame_byte, n_refused_frame;
+} pal_stream_count;
+
+typedef struct pal_stream {
+    pal_session *session;
+    const pal_scene *scene;
+    const pal_frame *frame; /* newest taken, NULL before the first; the session's memory */
+    uint32_t cycle;         /* grows by one per frame taken; 0: none yet                  */
+    uint64_t cycle_ns;      /* when the last cycle was made                               */
+    int n_part;
+    pal_stream_part *part;            /* [n_part] */
+    pal_packet *tools;                /* closes the newest cycle */
+    pal_packet *haptic[PAL_TOOL_MAX]; /* newest contact model of each tool in the scene, NULL: none */
+    double box_min_m[3], box_max_m[3];
+    double error_m;
+    /* smoothed figures for status */
+    double row_ms[PAL_FRAME_ROWS], step_ms, step_rate_hz;
+    pal_stream_count count;
+    struct pal_stream_coder *coder; /* encoders and their buffer */
+} pal_stream;
+
+/* builds assets (about a second for 50,000 shown vertices) and encoders; borrows the session; error_m 0: 1/3000 of the
+ * longest side of the box, at most 0.05 mm. [load] */
+pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pal_stream **out);
+void pal_stream_close(pal_stream *stream); /* NULL is fine. [load] */
+
+/* what the hub knows of a tool and a step does not */
+typedef struct pal_stream_tool {
+    int holder; /* member id, 0: nobody                                                       */
+    uint32_t colour;
+    uint64_t taken_ns; /* pal_clock_ns when the holder took it: older poses are not his to echo     */
+} pal_stream_tool;
+
+/* takes the session's newest frame, if there is a new one, and makes a cycle of it: encodes the tiers of which used[]
+ * is true, tools, contact models. false: nothing new. */
+bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+                     const pal_stream_tool tool[PAL_TOOL_MAX]);
+/* a tier begins to be used: its newest frames are encoded from the newest positions (same cycle) */
+void pal_stream_begin_tier(pal_stream *stream, int tier);
+double pal_stream_tier_error_m(const pal_stream *stream, int tier);
+double pal_stream_rate_hz(const pal_stream *stream); /* of cycles: the scene's steps, at most PAL_STREAM_RATE_HZ */
+/* measured steps per second; call about three times a second */
+void pal_stream_measure(pal_stream *stream, uint64_t now_ns);
+/* fills hello but for `you` and credit */
+void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out);
+#endif
