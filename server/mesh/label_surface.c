@@ -6,7 +6,8 @@
  *
  * No staircase: a surface that is nearly parallel to the slices is a flight of terraces one voxel high and many wide,
  * which no small blur removes. Smoothing here is therefore long, and held back only by what the voxels say: no vertex
- * moves farther than half a voxel's extent along its normal (after Gibson's constrained elastic nets, 1998). */
+ * moves farther than three quarters of a voxel's extent along its normal (after Gibson's constrained elastic nets,
+ * 1998). */
 #include "server/base/vec3.h"
 #include "server/mesh/contour.h"
 #include "server/mesh/decimate.h"
@@ -17,9 +18,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DEFAULT_ROUNDS = 40, N_BIN = 1 << 16, MOST_RADIUS = 64 };
+enum { DEFAULT_ROUNDS = 60, LAST_ROUNDS = 5, N_BIN = 1 << 16, MOST_RADIUS = 64 };
 /* triangles of the contour for each one wanted in the end, and of the lattice for each squared spacing */
 static const double surplus = 3, per_spacing2 = 9;
+/* how far smoothing may move a vertex along its normal, as part of a voxel: half a voxel that the scan leaves open, and
+ * what the blur has moved */
+static const double voxel_reach = 0.75;
 
 typedef struct crop {
     int low[3], n[3]; /* voxels of the volume [low, low + n), one layer of others around the label */
@@ -384,7 +388,7 @@ static pal_err keep_largest_component(pal_surface *s)
     return err;
 }
 
-/* half a voxel's extent along the normal, for every vertex */
+/* relaxes every vertex within voxel_reach of a voxel's extent along its normal */
 static pal_err smooth_within_voxels(pal_surface *s, const double m[12], int rounds)
 {
     double *normal = malloc((4 * (size_t)s->n_vertex + 4) * sizeof *normal);
@@ -395,12 +399,12 @@ static pal_err smooth_within_voxels(pal_surface *s, const double m[12], int roun
         reach[i] = 0;
         for (int a = 0; a < 3; a++) {
             const double e[3] = {m[a], m[4 + a], m[8 + a]};
-            reach[i] = fmax(reach[i], fabs(pal_dot3(normal + 3 * i, e)) / 2);
+            reach[i] = fmax(reach[i], voxel_reach * fabs(pal_dot3(normal + 3 * i, e)));
         }
     }
-    pal_err err = pal_surface_smooth_within(s, rounds, reach);
+    pal_err err = pal_surface_relax(s, rounds, reach);
     free(normal);
-    return err;
+    return err ? err : pal_surface_smooth(s, rounds > 0 ? LAST_ROUNDS : 0);
 }
 
 /* moves all vertices along their normals until the volume is the wanted one */

@@ -32,14 +32,14 @@ int pal_label_volume_list(const pal_label_volume *volume, pal_label_count *out, 
 
 typedef struct pal_label_surface_options {
     double blur_m;       /* Gaussian sigma; < 0: one voxel of the coarsest axis           */
-    int smooth_rounds;   /* Taubin rounds (no shrinkage); < 0: 10                         */
+    int smooth_rounds;   /* rounds of smoothing, within 3/4 of a voxel; < 0: 60           */
     int target_tri;      /* decimate to about this many triangles; 0: keep all            */
     bool all_components; /* false: keep only the largest component and drop its cavities  */
 } pal_label_surface_options;
 
 /* closed, manifold, outward-oriented surface of one label: crop, blur the 0/1 field, contour at the level that keeps
- * the label's voxel volume, smooth, decimate. The volume error against the voxel count is within 2 % for any body of
- * more than 1000 voxels. REFUSED with the labels that exist when this one does not; MEMORY. */
+ * the label's voxel volume, smooth, decimate, set the volume. The volume error against the voxel count is within 2 %
+ * for any body of more than 1000 voxels. REFUSED with the labels that exist when this one does not; MEMORY. */
 pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
                                  const pal_label_surface_options *options, pal_surface *out, pal_note *note);
 #endif

@@ -41,40 +41,43 @@ static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, u
     for (int i = 0; i < s->n_vertex; i++) held[i] = balance[i] != 0;
 }
 
-/* pulls every vertex back to within its reach of its start */
-static void hold_back(pal_surface *s, const double *start, const double *reach_m)
+/* pulls every vertex back to within its reach of its start, measured along its normal there, and to within twice that
+ * across it: sliding along the surface does not change the shape */
+static void hold_back(pal_surface *s, const double *start, const double *normal, const double *reach_m)
 {
     for (size_t i = 0; i < (size_t)s->n_vertex; i++) {
-        double d[3], length;
+        const double *n = normal + 3 * i;
+        double d[3], most = reach_m[i];
         pal_sub3(d, s->x + 3 * i, start + 3 * i);
-        length = pal_norm3(d);
-        if (length <= reach_m[i]) continue;
+        double along = pal_dot3(d, n);
+        pal_axpy3(d, -along, n);
+        double across = pal_norm3(d), part = across > 2 * most ? 2 * most / across : 1;
         pal_copy3(s->x + 3 * i, start + 3 * i);
-        pal_axpy3(s->x + 3 * i, reach_m[i] / length, d);
+        pal_axpy3(s->x + 3 * i, fmin(fmax(along, -most), most), n);
+        pal_axpy3(s->x + 3 * i, part, d);
     }
 }
 
-pal_err pal_surface_smooth(pal_surface *surface, int rounds)
-{
-    return pal_surface_smooth_within(surface, rounds, NULL);
-}
-
-pal_err pal_surface_smooth_within(pal_surface *surface, int rounds, const double *reach_m)
+/* relaxes when there is a reach, else smooths without shrinkage */
+static pal_err run(pal_surface *surface, int rounds, const double *reach_m)
 {
     size_t n = (size_t)surface->n_vertex + 1;
     double *sum = malloc(3 * n * sizeof *sum);
     int32_t *degree = malloc(n * sizeof *degree);
     int64_t *balance = malloc(n * sizeof *balance);
     uint8_t *held = malloc(n);
-    double *start = malloc(3 * n * sizeof *start);
+    double *start = malloc(6 * n * sizeof *start), *normal = start ? start + 3 * n : NULL;
     pal_err err = sum && degree && balance && held && start ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) {
         memcpy(start, surface->x, 3 * (size_t)surface->n_vertex * sizeof *start);
+        pal_surface_normals(surface, normal);
         find_held(surface, degree, balance, held);
         for (int k = 0; k < rounds; k++) {
             step(surface, there, sum, degree, held);
-            step(surface, back, sum, degree, held);
-            if (reach_m) hold_back(surface, start, reach_m);
+            if (reach_m)
+                hold_back(surface, start, normal, reach_m);
+            else
+                step(surface, back, sum, degree, held);
         }
     }
     free(start);
@@ -83,4 +86,14 @@ pal_err pal_surface_smooth_within(pal_surface *surface, int rounds, const double
     free(balance);
     free(held);
     return err;
+}
+
+pal_err pal_surface_smooth(pal_surface *surface, int rounds)
+{
+    return run(surface, rounds, NULL);
+}
+
+pal_err pal_surface_relax(pal_surface *surface, int rounds, const double *reach_m)
+{
+    return run(surface, rounds, reach_m);
 }
