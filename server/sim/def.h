@@ -64,6 +64,8 @@ void pal_scene_default(pal_scene *scene);
 void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh);
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
+/* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 is taken as 0.4999 and note says so */
+pal_err pal_material_check(pal_material *material, pal_note *note);
 /* REFUSED names the entry: no body, bad numbers, two bodies of one name, tool radius, step outside [1e-4, 0.1] s */
 pal_err pal_scene_check(const pal_scene *scene, pal_note *note);
 #endif

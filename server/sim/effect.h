@@ -3,7 +3,8 @@
  *
  * Order of a step: for every sub-step CONTACT rows, then SOLVE (which calls pal_gather, and that the FORCE rows, as
  * often as it likes); then once ADAPT, GUARD and OUTPUT rows. The number of sub-steps is
- * ceil(step / limit of the SOLVE rows), so that a step may be any length.
+ * ceil(step / limit of the SOLVE rows), so that a step may be any length; what remains of the step is split again when
+ * the limit falls within it.
  * Effect files include this header and mesh or num headers, never world.h and never each other. */
 #ifndef PAL_SIM_EFFECT_H
 #define PAL_SIM_EFFECT_H
@@ -29,11 +30,16 @@ typedef struct pal_step {
     pal_body *body;
     pal_tools *tools;
     pal_arena *scratch; /* fixed; emptied after every sub-step       */
-    pal_row *force;     /* this body's FORCE rows          [n_force] */
+    pal_row *force;     /* this body's FORCE rows         [n_force]   */
     int n_force;
-    double dt_s;    /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT */
-    double time_s;  /* at its end                                                         */
-    int sub, n_sub; /* this sub-step's number and how many there are                      */
+    pal_row *contact; /* this body's CONTACT rows       [n_contact]; for their stiffness only */
+    int n_contact;
+    bool drag_apart; /* set by a solver that applies the rows' drag itself: pal_gather leaves those rows out */
+    double dt_s;     /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT */
+    double time_s;   /* at its end                                                         */
+    int sub, n_sub;  /* this sub-step's number and how many there are; n_sub may grow in a step that deforms a lot */
+    bool heavy;      /* the budget of sub-steps is used up and dt_s is beyond the limit: the solver adds mass to the
+                        nodes that ask for it instead of letting them diverge                       */
 } pal_step;
 
 /* what make may use: everything that exists at load */
@@ -49,17 +55,25 @@ typedef struct pal_build {
 typedef struct pal_effect {
     const char *name; /* as written in scene files */
     pal_stage stage;
+    bool internal; /* FORCE: zero at rest, no net force, no net torque, whatever the deformation (tested) */
     /* reads and checks the item's keys (pal_item_done at the end), allocates self from build->arena. [load] */
     pal_err (*make)(pal_item *item, pal_build *build, void **self);
     /* FORCE rows add to body->f, CONTACT rows to body->load and the tools' forces. [sim] */
     pal_err (*run)(void *self, pal_step *step);
     /* optional, NULL when there is nothing to do or say */
     double (*energy)(void *self, const pal_body *body); /* J; run = -gradient of it (tests)                          */
-    void (*stiffness)(void *self, const pal_body *body, double *bound_N_m); /* += Gershgorin row sums [n_dof], eq. of
-                                                                               numerics.md 1 B                        */
-    double (*limit)(void *self, pal_step *step); /* SOLVE: largest stable sub-step, s, at the current state         */
-    pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note); /* live edit */
-    void (*reset)(void *self, const pal_body *body); /* the body is back at rest                                      */
+    /* FORCE, CONTACT: += Gershgorin row sums of the stiffness (numerics.md 1 B) and of the explicit damping at the
+     * current state, [n_dof] each: bound_N_m, bound_Ns_m */
+    void (*stiffness)(void *self, const pal_body *body, double *bound_N_m);
+    void (*damping)(void *self, const pal_body *body, double *bound_Ns_m);
+    /* FORCE: the row is nothing but -m rate v; the rate, 1/s, for solvers that apply it implicitly (drag_apart) */
+    double (*drag)(void *self);
+    /* SOLVE: largest stable sub-step at the current state, s; NaN: the state is not finite. Asked before every
+     * sub-step, so it is cheap while little has moved. [sim] */
+    double (*limit)(void *self, pal_step *step);
+    /* live edit: constants that the scene did not give are derived again. REFUSED: nothing changed */
+    pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note);
+    void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
 } pal_effect;
 
 struct pal_row {
@@ -69,6 +83,7 @@ struct pal_row {
     size_t n_byte;     /* memory it took at load                                                              */
 };
 
-/* f = load, then every FORCE row adds, then g = f for held-free dofs (rows see held nodes too); [sim] */
+/* f = load, then every FORCE row adds (those with drag only when drag_apart is false), then g = f; held nodes have
+ * forces too: what the support bears. Counts each row's spent_ns. [sim] */
 pal_err pal_gather(pal_step *step);
 #endif

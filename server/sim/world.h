@@ -5,7 +5,7 @@
  * meshes' origin_m. Poses and frames use it. */
 #ifndef PAL_SIM_WORLD_H
 #define PAL_SIM_WORLD_H
-#include "server/sim/body.h"
+#include "server/sim/effect.h"
 #include "server/sim/frame.h"
 
 typedef struct pal_world pal_world;
@@ -33,12 +33,18 @@ void pal_world_destroy(pal_world *world);  /* [load] */
 /* the pose a tool shall have at the end of the next step; NULL: let go. REFUSED (state untouched) for a number that is
  * not finite, a position farther than 100 body sizes, a tool that does not exist. [sim] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
-/* moves on by dt_s (split into equal sub-steps); FROZEN when a body diverged in this step and was frozen. [sim] */
+/* moves on by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number; BUDGET: more sub-steps than
+ * scene->most_substep even at rest (both: nothing moved); FROZEN when a body diverged in this step and was frozen.
+ * Where deformation alone asks for more than the budget, the step goes on with heavier nodes (pal_body.n_heavy). [sim]
+ */
 pal_err pal_world_step(pal_world *world, double dt_s);
 /* every body back to rest, tools let go, time 0. [sim] */
 void pal_world_reset(pal_world *world);
 /* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
+/* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body
+ * takes memory. REFUSED: not finite, no such node; MEMORY. [load] */
+pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
 void pal_frame_destroy(pal_frame *frame);
@@ -49,10 +55,13 @@ int pal_world_rows(const pal_world *world);
 void pal_world_row(const pal_world *world, int row, pal_row_info *out);
 int pal_world_parts(const pal_world *world);
 void pal_world_shown(const pal_world *world, int part, pal_shown *out);
-double pal_world_limit_s(const pal_world *world); /* largest stable sub-step of the last step */
-int pal_world_substeps(const pal_world *world);
+double pal_world_limit_s(const pal_world *world);  /* largest stable sub-step at the end of the last step */
+int pal_world_substeps(const pal_world *world);    /* of the last step; before it: of the scene's step at rest */
+double pal_world_energy_J(const pal_world *world); /* kinetic and of every row that has one */
+size_t pal_world_bytes(const pal_world *world);    /* memory of the world's arenas           */
 /* for tests, tools and the lab: the bodies themselves [sim] */
 int pal_world_bodies(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
+const pal_row *pal_world_effect(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
 #endif

@@ -1,0 +1,49 @@
+/* Body arrays and sums over them. */
+#include "server/sim/body.h"
+
+#include <math.h>
+
+pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
+{
+    size_t n3 = 3 * (size_t)n_node;
+    double *x = PAL_NEW(arena, double, n3), *v = PAL_NEW(arena, double, n3), *f = PAL_NEW(arena, double, n3);
+    double *load = PAL_NEW(arena, double, n3), *rest = PAL_NEW(arena, double, n3);
+    double *mass = PAL_NEW(arena, double, n_node);
+    uint8_t *held = PAL_NEW(arena, uint8_t, n_node);
+    if (!x || !v || !f || !load || !rest || !mass || !held) return PAL_ERR_MEMORY;
+    body->n_dof = body->n_node = n_node;
+    body->x = body->d = x;
+    body->v = body->dv = v;
+    body->f = body->g = f;
+    body->load = load;
+    body->x_rest = rest;
+    body->mass_kg = mass;
+    body->held = held;
+    return PAL_ERR_OK;
+}
+
+double pal_body_kinetic_J(const pal_body *body)
+{
+    double sum = 0;
+    for (int i = 0; i < body->n_dof; i++) {
+        const double *v = body->v + 3 * i;
+        sum += 0.5 * body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
+    return sum;
+}
+
+void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3])
+{
+    double sum[3] = {0, 0, 0};
+    for (int i = 0; i < body->n_dof; i++)
+        for (int c = 0; c < 3; c++) sum[c] += body->mass_kg[i] * body->v[3 * i + c];
+    for (int c = 0; c < 3; c++) momentum_kg_m_s[c] = sum[c];
+}
+
+bool pal_body_finite(const pal_body *body)
+{
+    /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells */
+    double sum = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) sum += 0 * body->x[i] + 0 * body->v[i];
+    return sum == 0;
+}

@@ -1,0 +1,128 @@
+/* Scene defaults and checks. */
+#include "server/sim/def.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+void pal_scene_default(pal_scene *scene)
+{
+    memset(scene, 0, sizeof *scene);
+    snprintf(scene->name, sizeof scene->name, "organ");
+    snprintf(scene->title, sizeof scene->title, "Organ");
+    scene->step_s = 1.0 / 60;
+    scene->up[2] = 1;
+    scene->gravity_m_s2 = 9.81;
+    scene->most_substep = 2000;
+}
+
+void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh)
+{
+    static const char *const effects[] = {"gravity", "tool_push", "tool_grab", "finite_guard"};
+    memset(body, 0, sizeof *body);
+    snprintf(body->name, sizeof body->name, "%s", name);
+    body->mesh = mesh;
+    body->material = (pal_material){.young_Pa = 5000, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
+    pal_item_init(&body->model, "model", "tet_springs");
+    pal_item_init(&body->solver, "solver", "");
+    pal_item_init(&body->output, "output", "skin_out");
+    body->n_support = 1;
+    body->support[0] = (pal_support){.lowest = true, .fraction = 0.05};
+    body->n_effect = (int)(sizeof effects / sizeof effects[0]);
+    for (int i = 0; i < body->n_effect; i++) {
+        char path[PAL_ITEM_TEXT];
+        snprintf(path, sizeof path, "effects[%d]", i);
+        pal_item_init(&body->effect[i], path, effects[i]);
+    }
+}
+
+void pal_tools_default(pal_scene *scene, int n_tool)
+{
+    if (n_tool > PAL_TOOL_MAX) n_tool = PAL_TOOL_MAX;
+    scene->n_tool = n_tool;
+    for (int i = 0; i < n_tool; i++) {
+        scene->tool[i] = (pal_tool_def){.radius_m = 0, .force_cap_N = 15};
+        snprintf(scene->tool[i].name, sizeof scene->tool[i].name, "probe %d", i + 1);
+    }
+}
+
+pal_err pal_material_check(pal_material *material, pal_note *note)
+{
+    const struct {
+        const char *key;
+        double value, low, high;
+    } range[] = {{"young_Pa", material->young_Pa, 1e-6, 1e15},
+                 {"poisson", material->poisson, -0.9999, 0.5},
+                 {"density_kg_m3", material->density_kg_m3, 1e-12, 1e18},
+                 {"damping_1_s", material->damping_1_s, 0, 1e9}};
+    for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
+        if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
+            return pal_note_set(note, PAL_ERR_REFUSED, "material.%s: %g is outside [%g, %g]", range[i].key,
+                                range[i].value, range[i].low, range[i].high);
+    if (material->poisson > 0.4999) {
+        pal_note_set(note, PAL_ERR_OK, "material.poisson: %g taken as 0.4999", material->poisson);
+        material->poisson = 0.4999;
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err check_support(const pal_body_def *body, int index, pal_note *note)
+{
+    const pal_support *s = &body->support[index];
+    if (s->lowest && !(s->fraction >= 0 && s->fraction <= 1))
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]",
+                            body->name, index, s->fraction);
+    for (int c = 0; c < 3 && !s->lowest; c++)
+        if (!(s->low_m[c] <= s->high_m[c]))
+            return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: box from %g to %g", body->name, index,
+                                s->low_m[c], s->high_m[c]);
+    return PAL_ERR_OK;
+}
+
+static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
+{
+    const pal_body_def *body = &scene->body[index];
+    if (!body->name[0]) return pal_note_set(note, PAL_ERR_REFUSED, "bodies[%d]: no name", index);
+    for (int i = 0; i < index; i++)
+        if (!strcmp(scene->body[i].name, body->name))
+            return pal_note_set(note, PAL_ERR_REFUSED, "bodies[%d]: the name \"%s\" is there twice", index, body->name);
+    if (!body->mesh || body->mesh->tets.n_node < 1)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": no mesh", body->name);
+    if (body->n_support < 0 || body->n_support > PAL_SUPPORT_MAX || body->n_effect < 0 ||
+        body->n_effect > PAL_ROW_ITEMS)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": %d supports, %d effects, at most %d and %d",
+                            body->name, body->n_support, body->n_effect, PAL_SUPPORT_MAX, PAL_ROW_ITEMS);
+    for (int i = 0; i < body->n_support; i++) PAL_TRY(check_support(body, i, note));
+    pal_material material = body->material;
+    pal_note why = {{0}};
+    if (pal_material_check(&material, &why))
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" %s", body->name, why.text);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scene_check(const pal_scene *scene, pal_note *note)
+{
+    if (!(scene->step_s >= 1e-4 && scene->step_s <= 0.1))
+        return pal_note_set(note, PAL_ERR_REFUSED, "step_s: %g is outside [1e-4, 0.1]", scene->step_s);
+    double up2 = scene->up[0] * scene->up[0] + scene->up[1] * scene->up[1] + scene->up[2] * scene->up[2];
+    if (!(fabs(up2 - 1) < 1e-3))
+        return pal_note_set(note, PAL_ERR_REFUSED, "up: length %g, wanted a unit vector", sqrt(up2));
+    if (!(fabs(scene->gravity_m_s2) <= 1e4))
+        return pal_note_set(note, PAL_ERR_REFUSED, "gravity_m_s2: %g is outside [-1e4, 1e4]", scene->gravity_m_s2);
+    if (scene->most_substep < 1 || scene->most_substep > 1000000)
+        return pal_note_set(note, PAL_ERR_REFUSED, "most_substep: %d is outside [1, 1000000]", scene->most_substep);
+    if (scene->n_body < 1 || scene->n_body > PAL_BODY_MAX)
+        return pal_note_set(note, PAL_ERR_REFUSED, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);
+    if (scene->n_tool < 0 || scene->n_tool > PAL_TOOL_MAX)
+        return pal_note_set(note, PAL_ERR_REFUSED, "tools: %d, wanted 0 to %d", scene->n_tool, PAL_TOOL_MAX);
+    for (int i = 0; i < scene->n_body; i++) PAL_TRY(check_body(scene, i, note));
+    for (int i = 0; i < scene->n_tool; i++) {
+        const pal_tool_def *tool = &scene->tool[i];
+        if (!(tool->radius_m >= 0 && tool->radius_m <= 1e9))
+            return pal_note_set(note, PAL_ERR_REFUSED, "tools[%d].radius_m: %g is not a radius", i, tool->radius_m);
+        if (!(tool->force_cap_N > 0 && tool->force_cap_N <= 1e9))
+            return pal_note_set(note, PAL_ERR_REFUSED, "tools[%d].force_cap_N: %g is outside (0, 1e9]", i,
+                                tool->force_cap_N);
+    }
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,43 @@
+/* Row gravity: f = -m g up, energy m g (up . x). Key: acceleration_m_s2 (the scene's gravity_m_s2). */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+
+typedef struct gravity {
+    double g[3]; /* m/s^2 */
+} gravity;
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    double size = build->scene->gravity_m_s2;
+    PAL_TRY(pal_item_number(item, "acceleration_m_s2", -1e4, 1e4, &size, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    gravity *row = PAL_NEW(build->arena, gravity, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    pal_scale3(row->g, -size, build->scene->up);
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    const gravity *row = self;
+    const double *m = step->body->mass_kg, gx = row->g[0], gy = row->g[1], gz = row->g[2];
+    double *f = step->body->f;
+    for (int i = 0; i < step->body->n_node; i++) {
+        f[3 * i] += m[i] * gx;
+        f[3 * i + 1] += m[i] * gy;
+        f[3 * i + 2] += m[i] * gz;
+    }
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    const gravity *row = self;
+    double sum = 0;
+    for (int i = 0; i < body->n_node; i++) sum -= body->mass_kg[i] * pal_dot3(row->g, body->d + 3 * i);
+    return sum;
+}
+
+const pal_effect pal_effect_gravity = {
+    .name = "gravity", .stage = PAL_STAGE_FORCE, .make = make, .run = run, .energy = energy};

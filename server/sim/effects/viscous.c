@@ -1,0 +1,58 @@
+/* Row viscous: f = -k_damp v with k_damp = rate m, paper B 4.1's drag. Key: rate_1_s (the material's damping_1_s).
+ *
+ * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead, which
+ * no rate can upset (numerics.md 1 B). */
+#include "server/sim/effect_list.h"
+
+typedef struct viscous {
+    double rate_1_s;
+    bool given;
+} viscous;
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    double rate = build->def->material.damping_1_s;
+    bool given = pal_item_has(item, "rate_1_s");
+    PAL_TRY(pal_item_number(item, "rate_1_s", 0, 1e9, &rate, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    viscous *row = PAL_NEW(build->arena, viscous, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *row = (viscous){.rate_1_s = rate, .given = given};
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    const viscous *row = self;
+    const pal_body *body = step->body;
+    for (int i = 0; i < body->n_node; i++)
+        for (int c = 0; c < 3; c++) body->f[3 * i + c] -= row->rate_1_s * body->mass_kg[i] * body->dv[3 * i + c];
+    return PAL_ERR_OK;
+}
+
+static double drag(void *self)
+{
+    return ((const viscous *)self)->rate_1_s;
+}
+
+static void damping(void *self, const pal_body *body, double *bound_Ns_m)
+{
+    for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += drag(self) * body->mass_kg[i];
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    viscous *row = self;
+    (void)body, (void)note;
+    if (!row->given) row->rate_1_s = to->damping_1_s;
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_viscous = {.name = "viscous",
+                                       .stage = PAL_STAGE_FORCE,
+                                       .make = make,
+                                       .run = run,
+                                       .damping = damping,
+                                       .drag = drag,
+                                       .material = material};

@@ -1,0 +1,32 @@
+/* Frames: memory for what a step shows. */
+#include "server/sim/frame.h"
+
+#include "server/sim/world.h"
+
+#include <stdlib.h>
+
+pal_frame *pal_frame_create(const pal_world *world)
+{
+    pal_frame *frame = calloc(1, sizeof *frame);
+    if (!frame) return NULL;
+    frame->slowdown = 1;
+    for (int i = 0; i < pal_world_parts(world); i++) {
+        pal_shown shown;
+        pal_world_shown(world, i, &shown);
+        pal_frame_part *part = &frame->part[frame->n_part++];
+        part->n_vertex = shown.n_vertex;
+        part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
+        if (!part->position_m) {
+            pal_frame_destroy(frame);
+            return NULL;
+        }
+    }
+    return frame;
+}
+
+void pal_frame_destroy(pal_frame *frame)
+{
+    if (!frame) return;
+    for (int i = 0; i < frame->n_part; i++) free(frame->part[i].position_m);
+    free(frame);
+}

@@ -1,0 +1,212 @@
+/* Scene -> bodies and ordered rows. */
+#include "server/sim/plan.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* what one body's entries ask for, in order, before rows are made */
+typedef struct wish {
+    const pal_effect *effect;
+    pal_item *item;
+} wish;
+enum { WISH_MAX = 2 * PAL_ROW_ITEMS + 2 };
+
+typedef struct build_state {
+    pal_build build;
+    pal_recipe recipe;
+    pal_item own[PAL_ROW_ITEMS + 3]; /* copies of the scene's items: reading marks them */
+    wish wish[WISH_MAX];
+    int n_wish;
+} build_state;
+
+const char *pal_stage_name(pal_stage stage)
+{
+    static const char *const names[] = {"contact", "force", "solve", "adapt", "guard", "output"};
+    return (unsigned)stage < PAL_STAGE_COUNT ? names[stage] : "?";
+}
+
+static pal_err add_wish(build_state *s, pal_item *item, bool replaces)
+{
+    const pal_effect *effect = pal_effect_find(item->name);
+    const char *body = s->build.body->name;
+    if (!effect)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\" %s: there is no effect \"%s\"", body,
+                            item->path, item->name);
+    for (int i = 0; i < s->n_wish; i++) {
+        bool solver = effect->stage == PAL_STAGE_SOLVE && s->wish[i].effect->stage == PAL_STAGE_SOLVE;
+        if (s->wish[i].effect != effect && !solver) continue;
+        bool models = s->wish[i].item >= s->recipe.row && s->wish[i].item < s->recipe.row + PAL_ROW_ITEMS;
+        if (!replaces || !models)
+            return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
+                                item->path, item->name);
+        s->wish[i] = (wish){effect, item};
+        return PAL_ERR_OK;
+    }
+    if (s->n_wish == WISH_MAX)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body, WISH_MAX);
+    s->wish[s->n_wish++] = (wish){effect, item};
+    return PAL_ERR_OK;
+}
+
+/* the entry `solver` or `output`; an empty name asks for nothing */
+static pal_err add_named(build_state *s, pal_item *own, const pal_item *item, pal_stage stage)
+{
+    if (!item->name[0]) return PAL_ERR_OK;
+    *own = *item;
+    PAL_TRY(add_wish(s, own, true));
+    if (pal_effect_find(own->name)->stage != stage)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\" %s: \"%s\" is not of stage %s",
+                            s->build.body->name, own->path, own->name, pal_stage_name(stage));
+    return PAL_ERR_OK;
+}
+
+static void hold(pal_body *body, const pal_body_def *def, const double up[3])
+{
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < body->n_dof; i++) {
+        double z = pal_dot3(body->x_rest + 3 * i, up);
+        low = fmin(low, z), high = fmax(high, z);
+    }
+    for (int s = 0; s < def->n_support; s++) {
+        const pal_support *support = &def->support[s];
+        /* a hair above, so that rounding does not part nodes of one height */
+        double top = low + (support->fraction + 1e-9) * (high - low);
+        for (int i = 0; i < body->n_dof; i++) {
+            const double *x = body->x_rest + 3 * i;
+            bool in = support->lowest ? pal_dot3(x, up) <= top : true;
+            for (int c = 0; c < 3 && !support->lowest; c++)
+                in = in && x[c] >= support->low_m[c] && x[c] <= support->high_m[c];
+            if (in) body->held[i] = 1;
+        }
+    }
+}
+
+static double box_diagonal(const pal_body *body)
+{
+    double low[3], high[3];
+    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
+    for (int i = 0; i < body->n_dof; i++)
+        for (int c = 0; c < 3; c++) {
+            low[c] = fmin(low[c], body->x_rest[3 * i + c]);
+            high[c] = fmax(high[c], body->x_rest[3 * i + c]);
+        }
+    return pal_dist3(low, high);
+}
+
+/* arrays, supports and the ordered wishes of one body */
+static pal_err build_body(build_state *s, const pal_scene *scene)
+{
+    const pal_body_def *def = s->build.def;
+    pal_body *body = s->build.body;
+    char *name = pal_arena_take(s->build.arena, PAL_NAME);
+    if (!name) return PAL_ERR_MEMORY;
+    memcpy(name, def->name, PAL_NAME);
+    body->name = name;
+    const pal_model *model = pal_model_find(def->model.name);
+    if (!model)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", body->name,
+                            def->model.name);
+    pal_item *own = s->own;
+    *own = def->model;
+    PAL_TRY(model->build(own, &s->build, &s->recipe));
+    hold(body, def, scene->up);
+    body->size_m = box_diagonal(body);
+    body->load_cap_N = 10 * def->material.young_Pa * body->h_m * body->h_m;
+    for (int c = 0; c < 3; c++) body->offset_m[c] = def->mesh->tets.origin_m[c] - scene->body[0].mesh->tets.origin_m[c];
+
+    s->n_wish = 0;
+    for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
+    for (int i = 0; i < def->n_effect; i++) {
+        *++own = def->effect[i];
+        PAL_TRY(add_wish(s, own, true));
+    }
+    PAL_TRY(add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE));
+    return add_named(s, ++own, &def->output, PAL_STAGE_OUTPUT);
+}
+
+static pal_err make_rows(build_state *s, pal_row *row, int *n_row)
+{
+    int n_solve = 0;
+    /* the OUTPUT row first: its make says what the body shows, which is what tools touch */
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < s->n_wish; i++) {
+            if ((s->wish[i].effect->stage == PAL_STAGE_OUTPUT) != (pass == 0)) continue;
+            size_t before = pal_arena_used(s->build.arena);
+            pal_row *r = &row[(*n_row)++];
+            r->effect = s->wish[i].effect;
+            PAL_TRY(r->effect->make(s->wish[i].item, &s->build, &r->self));
+            r->n_byte = pal_arena_used(s->build.arena) - before;
+            n_solve += r->effect->stage == PAL_STAGE_SOLVE;
+        }
+    if (n_solve != 1)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": %d solvers, wanted one", s->build.body->name,
+                            n_solve);
+    return PAL_ERR_OK;
+}
+
+/* rows made body by body -> by stage, then body */
+static void sort_rows(pal_plan *plan, const pal_row *made, const int *made_body)
+{
+    int n = 0;
+    for (int stage = 0; stage < PAL_STAGE_COUNT; stage++)
+        for (int b = 0; b < plan->n_body; b++) {
+            plan->first[stage][b] = n;
+            for (int i = 0; i < plan->n_row; i++)
+                if (made_body[i] == b && made[i].effect->stage == (pal_stage)stage) {
+                    plan->row[n] = made[i];
+                    plan->row_body[n++] = b;
+                }
+            plan->n_of[stage][b] = n - plan->first[stage][b];
+        }
+}
+
+static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, build_state *s, pal_plan *out)
+{
+    pal_row made[PAL_BODY_MAX * WISH_MAX] = {{0}};
+    int made_body[PAL_BODY_MAX * WISH_MAX];
+    out->n_body = scene->n_body;
+    out->body = PAL_NEW(arena, pal_body, scene->n_body);
+    if (!out->body) return PAL_ERR_MEMORY;
+    for (int b = 0; b < scene->n_body; b++) {
+        s->build =
+            (pal_build){.scene = scene, .def = &scene->body[b], .body = &out->body[b], .arena = arena, .note = note};
+        int before = out->n_row;
+        PAL_TRY(build_body(s, scene));
+        PAL_TRY(make_rows(s, made, &out->n_row));
+        for (int i = before; i < out->n_row; i++) made_body[i] = b;
+        if (s->build.scratch_byte > out->scratch_byte) out->scratch_byte = s->build.scratch_byte;
+    }
+    out->row = PAL_NEW(arena, pal_row, out->n_row);
+    out->row_body = PAL_NEW(arena, int, out->n_row);
+    if (!out->row || !out->row_body) return PAL_ERR_MEMORY;
+    sort_rows(out, made, made_body);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note, pal_plan *out)
+{
+    build_state *s = calloc(1, sizeof *s);
+    if (!s) return PAL_ERR_MEMORY;
+    *out = (pal_plan){0};
+    pal_err err = build_all(scene, arena, note, s, out);
+    free(s);
+    return err;
+}
+
+size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte)
+{
+    size_t used = 0;
+    if (n_byte > 0) text[0] = 0;
+    for (int i = 0; i < plan->n_row; i++) {
+        size_t left = used < n_byte ? n_byte - used : 0;
+        const pal_row *row = &plan->row[i];
+        used += (size_t)snprintf(left ? text + used : NULL, left, "%-8s %-16s %-16s %9.1f kB\n",
+                                 pal_stage_name(row->effect->stage), row->effect->name,
+                                 plan->body[plan->row_body[i]].name, 1e-3 * (double)row->n_byte);
+    }
+    return used;
+}

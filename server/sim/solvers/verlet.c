@@ -1,0 +1,135 @@
+/* Solver verlet: v += dt f/m, x += dt v (paper B 4.1's Verlet in its velocity form, numerics.md 1 B).
+ *
+ * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks. The
+ * sub-step is 0.5 of the stability limit that Gershgorin's bound gives: with K and C the row sums of stiffness and
+ * explicit damping, 0.5 * 2/w is the largest dt with dt^2 K + dt C <= m at every free node. The bound is taken at the
+ * current state once a step, and again whenever a node may have moved a fifth of an element since. A node moves at most
+ * 0.2 S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same
+ * inequality is met by adding mass to the nodes that break it. */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+
+#include <string.h>
+
+typedef struct verlet {
+    double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
+    double limit_s;
+    double way_m; /* no node has moved farther since the bound was taken */
+    bool known;   /* limit_s holds                                       */
+} verlet;
+
+static const double most_way_h = 0.2, most_move_S = 0.2;
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    PAL_TRY(pal_item_done(item, build->note));
+    verlet *row = PAL_NEW(build->arena, verlet, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->stiff = PAL_NEW(build->arena, double, build->body->n_dof);
+    row->damp = PAL_NEW(build->arena, double, build->body->n_dof);
+    if (!row->stiff || !row->damp) return PAL_ERR_MEMORY;
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+static void add_bounds(verlet *row, const pal_row *rows, int n, const pal_body *body)
+{
+    for (int i = 0; i < n; i++) {
+        const pal_effect *effect = rows[i].effect;
+        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
+        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
+    }
+}
+
+/* the smallest over free nodes of the positive root of dt^2 K + dt C = m */
+static double limit(void *self, pal_step *step)
+{
+    verlet *row = self;
+    const pal_body *body = step->body;
+    if (row->known && step->sub > 0 && row->way_m <= most_way_h * body->h_m) return row->limit_s;
+    size_t n_byte = sizeof(double) * (size_t)body->n_dof;
+    memset(row->stiff, 0, n_byte);
+    memset(row->damp, 0, n_byte);
+    add_bounds(row, step->force, step->n_force, body);
+    add_bounds(row, step->contact, step->n_contact, body);
+    double least = INFINITY, sum = 0;
+    for (int i = 0; i < body->n_dof; i++) {
+        double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
+        sum += 0 * k + 0 * c;
+        if (body->held[i] || k + c == 0) continue;
+        double dt = 2 * m / (c + sqrt(c * c + 4 * k * m));
+        if (dt < least) least = dt;
+    }
+    row->limit_s = sum == 0 ? least : NAN;
+    row->way_m = 0;
+    row->known = true;
+    return row->limit_s;
+}
+
+static double drag_rate(const pal_step *step)
+{
+    double rate = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
+    return rate;
+}
+
+/* shortens moves longer than most_m; [sim] */
+static void clamp_moves(pal_body *body, double dt_s, double most_m)
+{
+    for (int i = 0; i < body->n_dof; i++) {
+        double *v = body->v + 3 * i, move = pal_norm3(v) * dt_s;
+        if (move > most_m) {
+            pal_scale3(v, most_m / move, v);
+            body->n_clamped++;
+        }
+    }
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    verlet *row = self;
+    pal_body *body = step->body;
+    double dt = step->dt_s, keep = 1 / (1 + dt * drag_rate(step)), most2 = 0;
+    step->drag_apart = true;
+    PAL_TRY(pal_gather(step));
+
+    /* velocities */
+    for (int i = 0; i < body->n_dof; i++) {
+        double *v = body->v + 3 * i, m = body->mass_kg[i];
+        const double *g = body->g + 3 * i;
+        if (step->heavy) m = fmax(m, dt * (dt * row->stiff[i] + row->damp[i]));
+        double s = body->held[i] ? 0 : dt / m, k = body->held[i] ? 0 : keep;
+        for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
+        double v2 = pal_dot3(v, v);
+        most2 = v2 > most2 ? v2 : most2;
+    }
+    double way = sqrt(most2) * dt, most = most_move_S * body->size_m;
+    if (way > most) clamp_moves(body, dt, most);
+    row->way_m += way < most ? way : most;
+
+    /* positions */
+    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += dt * body->v[i];
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    ((verlet *)self)->known = false;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    (void)to, (void)note;
+    reset(self, body);
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_verlet = {.name = "verlet",
+                                      .stage = PAL_STAGE_SOLVE,
+                                      .make = make,
+                                      .run = run,
+                                      .limit = limit,
+                                      .material = material,
+                                      .reset = reset};

@@ -1,0 +1,548 @@
+/* The world: steps a plan. Reading order: pal_world_step at the end. */
+#include "server/sim/world.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/sim/plan.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* shown surface of a body, fixed while its revision is */
+typedef struct part {
+    int n_vertex, n_tri;
+    float *rest_m;
+    int32_t *tri;
+} part;
+
+struct pal_world {
+    pal_arena *arena, *scratch;
+    pal_plan plan;
+    pal_tools tools;
+    pal_pose asked[PAL_TOOL_MAX];
+    bool has_asked[PAL_TOOL_MAX];
+    uint64_t pose_ns[PAL_TOOL_MAX];
+    pal_material material[PAL_BODY_MAX];
+    part part[PAL_BODY_MAX];
+    double step_s, time_s, limit_s, rest_limit_s;
+    int most_substep, n_substep;
+    uint64_t tick, step_ns, end_ns;
+};
+
+/* ---- load ---- */
+
+static pal_step step_of(pal_world *w, int b)
+{
+    pal_plan *p = &w->plan;
+    return (pal_step){.body = &p->body[b],
+                      .tools = &w->tools,
+                      .scratch = w->scratch,
+                      .force = p->row + p->first[PAL_STAGE_FORCE][b],
+                      .n_force = p->n_of[PAL_STAGE_FORCE][b],
+                      .contact = p->row + p->first[PAL_STAGE_CONTACT][b],
+                      .n_contact = p->n_of[PAL_STAGE_CONTACT][b],
+                      .time_s = w->time_s};
+}
+
+/* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is no number is frozen */
+static double find_limit(pal_world *w, int sub)
+{
+    double least = INFINITY;
+    for (int b = 0; b < w->plan.n_body; b++) {
+        pal_step step = step_of(w, b);
+        step.sub = sub;
+        const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        if (step.body->frozen || !solve->effect->limit) continue;
+        double limit = solve->effect->limit(solve->self, &step);
+        step.body->dt_limit_s = limit;
+        if (!(limit > 0))
+            step.body->frozen = true;
+        else if (limit < least)
+            least = limit;
+    }
+    w->limit_s = least;
+    return least;
+}
+
+/* sub-steps for a time; beyond the budget: budget + 1 */
+static int count_substeps(const pal_world *w, double time_s, double limit_s)
+{
+    double n = ceil(time_s / limit_s * (1 - 1e-12));
+    return n < 1 ? 1 : n > w->most_substep ? w->most_substep + 1 : (int)n;
+}
+
+/* the limit that holds at rest, whatever the bodies do now; leaves every solver's knowledge of its limit empty */
+static double find_rest_limit(pal_world *w)
+{
+    double least = INFINITY, limit_s = w->limit_s;
+    for (int b = 0; b < w->plan.n_body; b++) {
+        pal_body *body = &w->plan.body[b];
+        const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        if (!solve->effect->limit) continue;
+        double *x = body->x, *d = body->d;
+        body->x = body->d = body->x_rest;
+        pal_step step = step_of(w, b);
+        step.n_contact = 0;
+        double limit = solve->effect->limit(solve->self, &step);
+        body->x = x, body->d = d;
+        if (solve->effect->reset) solve->effect->reset(solve->self, body);
+        if (!(limit >= least)) least = limit;
+    }
+    w->limit_s = limit_s;
+    return least;
+}
+
+static pal_err check_budget(pal_world *w, pal_note *note)
+{
+    double limit = find_rest_limit(w);
+    int n = count_substeps(w, w->step_s, limit);
+    if (!(limit > 0) || n > w->most_substep)
+        return pal_note_set(note, PAL_ERR_BUDGET,
+                            "a step of %g s needs %.0f sub-steps of %.3g s, most_substep allows %d: take a softer or "
+                            "denser material, larger elements or a shorter step",
+                            w->step_s, ceil(w->step_s / limit), limit, w->most_substep);
+    w->rest_limit_s = limit;
+    return PAL_ERR_OK;
+}
+
+static pal_err make_part(pal_world *w, int b)
+{
+    const pal_body *body = &w->plan.body[b];
+    part *p = &w->part[b];
+    const double *x = body->skin ? body->surface->x : body->x_rest;
+    if (body->n_shown == 0) return PAL_ERR_OK;
+    p->n_vertex = body->n_shown;
+    p->n_tri = body->skin ? body->surface->n_tri : body->tets->n_face;
+    p->rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
+    p->tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
+    int32_t *shown_of = PAL_NEW(w->arena, int32_t, body->n_node);
+    if (!p->rest_m || !p->tri || !shown_of) return PAL_ERR_MEMORY;
+    for (int i = 0; i < p->n_vertex; i++) {
+        int from = body->skin ? i : body->shown_node[i];
+        if (!body->skin) shown_of[from] = i;
+        for (int c = 0; c < 3; c++) p->rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
+    }
+    for (int i = 0; i < 3 * p->n_tri; i++)
+        p->tri[i] = body->skin ? body->surface->tri[i] : shown_of[body->tets->face[i]];
+    return PAL_ERR_OK;
+}
+
+/* tools with the defaults that depend on bodies */
+static void make_tools(pal_world *w, const pal_scene *scene)
+{
+    w->tools.n_tool = scene->n_tool;
+    for (int t = 0; t < scene->n_tool; t++) {
+        double radius = scene->tool[t].radius_m;
+        w->tools.tool[t].radius_m = radius > 0 ? radius : 0.04 * w->plan.body[0].size_m;
+        w->tools.tool[t].force_cap_N = scene->tool[t].force_cap_N;
+    }
+}
+
+static void run_output(pal_world *w)
+{
+    for (int b = 0; b < w->plan.n_body; b++) {
+        pal_step step = step_of(w, b);
+        for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
+            pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
+            (void)row->effect->run(row->self, &step);
+        }
+        pal_arena_reset(w->scratch);
+    }
+}
+
+static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
+{
+    PAL_TRY(pal_scene_check(scene, note));
+    w->arena = pal_arena_create(1 << 20, true);
+    if (!w->arena) return PAL_ERR_MEMORY;
+    w->step_s = scene->step_s;
+    w->most_substep = scene->most_substep;
+    PAL_TRY(pal_plan_build(scene, w->arena, note, &w->plan));
+    w->scratch = pal_arena_create(w->plan.scratch_byte + 64, false);
+    if (!w->scratch) return PAL_ERR_MEMORY;
+    make_tools(w, scene);
+    for (int b = 0; b < w->plan.n_body; b++) {
+        w->material[b] = scene->body[b].material;
+        PAL_TRY(pal_material_check(&w->material[b], note));
+        PAL_TRY(make_part(w, b));
+    }
+    PAL_TRY(check_budget(w, note));
+    w->n_substep = count_substeps(w, w->step_s, find_limit(w, 0));
+    run_output(w);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_world_create(const pal_scene *scene, pal_note *note, pal_world **out)
+{
+    pal_world *w = calloc(1, sizeof *w);
+    pal_err err = w ? create(w, scene, note) : PAL_ERR_MEMORY;
+    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "out of memory for the scene \"%s\"", scene->name);
+    if (err)
+        pal_world_destroy(w);
+    else
+        *out = w;
+    return err;
+}
+
+void pal_world_destroy(pal_world *world)
+{
+    if (!world) return;
+    pal_arena_destroy(world->scratch);
+    pal_arena_destroy(world->arena);
+    free(world);
+}
+
+/* ---- commands between steps ---- */
+
+pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
+{
+    if (tool < 0 || tool >= world->tools.n_tool) return PAL_ERR_REFUSED;
+    if (pose && !pal_pose_ok(pose, 100 * world->plan.body[0].size_m)) return PAL_ERR_REFUSED;
+    world->has_asked[tool] = pose != NULL;
+    if (pose) {
+        world->asked[tool] = *pose;
+        world->pose_ns[tool] = pal_clock_ns();
+    }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3])
+{
+    if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
+    pal_body *b = &world->plan.body[body];
+    if (node < 0 || node >= b->n_node) return PAL_ERR_REFUSED;
+    if (!b->outer) b->outer = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
+    if (!b->outer) return PAL_ERR_MEMORY;
+    pal_copy3(b->outer + 3 * node, force_N);
+    return PAL_ERR_OK;
+}
+
+void pal_world_reset(pal_world *world)
+{
+    for (int b = 0; b < world->plan.n_body; b++) {
+        pal_body *body = &world->plan.body[b];
+        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+        memcpy(body->x, body->x_rest, n_byte);
+        memset(body->v, 0, n_byte);
+        memset(body->f, 0, n_byte);
+        memset(body->load, 0, n_byte);
+        if (body->outer) memset(body->outer, 0, n_byte);
+        body->frozen = false;
+        body->n_capped = body->n_clamped = body->n_heavy = 0;
+    }
+    for (int i = 0; i < world->plan.n_row; i++) {
+        const pal_row *row = &world->plan.row[i];
+        if (row->effect->reset) row->effect->reset(row->self, &world->plan.body[world->plan.row_body[i]]);
+    }
+    for (int t = 0; t < world->tools.n_tool; t++) {
+        const pal_tool *old = &world->tools.tool[t];
+        world->tools.tool[t] = (pal_tool){.radius_m = old->radius_m, .force_cap_N = old->force_cap_N};
+        world->has_asked[t] = false;
+    }
+    world->tick = 0;
+    world->time_s = 0;
+    find_limit(world, 0);
+    run_output(world);
+}
+
+static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_note *note)
+{
+    pal_body *body = &w->plan.body[b];
+    for (int i = 0; i < w->plan.n_row; i++) {
+        const pal_row *row = &w->plan.row[i];
+        if (w->plan.row_body[i] != b || !row->effect->material) continue;
+        PAL_TRY(row->effect->material(row->self, body, to, note));
+    }
+    double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
+    for (int i = 0; i < body->n_dof; i++) body->mass_kg[i] *= ratio;
+    body->load_cap_N = 10 * to->young_Pa * body->h_m * body->h_m;
+    w->material[b] = *to;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note)
+{
+    if (body < 0 || body >= world->plan.n_body)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist", body);
+    pal_material to = *material, was = world->material[body];
+    PAL_TRY(pal_material_check(&to, note));
+    pal_err err = apply_material(world, body, &to, note);
+    if (!err) err = check_budget(world, note);
+    /* constants are functions of the material, so putting the old one back puts everything back */
+    if (err) (void)apply_material(world, body, &was, NULL);
+    find_limit(world, 0);
+    return err;
+}
+
+/* ---- a step ---- */
+
+/* lasting loads and tool contact of one body, every node's load within the cap */
+static pal_err run_contact(pal_world *w, pal_step *step, int b)
+{
+    pal_body *body = step->body;
+    size_t n3 = 3 * (size_t)body->n_node;
+    if (body->outer)
+        memcpy(body->load, body->outer, n3 * sizeof(double));
+    else
+        memset(body->load, 0, n3 * sizeof(double));
+    for (int i = 0; i < step->n_contact; i++) {
+        pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
+        uint64_t before = pal_clock_ns();
+        PAL_TRY(row->effect->run(row->self, step));
+        row->spent_ns += pal_clock_ns() - before;
+    }
+    if (!body->outer && step->n_contact == 0) return PAL_ERR_OK;
+    double cap2 = body->load_cap_N * body->load_cap_N;
+    for (int i = 0; i < body->n_node; i++) {
+        double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
+        if (load2 <= cap2) continue;
+        pal_scale3(load, body->load_cap_N / sqrt(load2), load);
+        body->n_capped++;
+    }
+    return PAL_ERR_OK;
+}
+
+static uint64_t force_ns(const pal_step *step)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < step->n_force; i++) sum += step->force[i].spent_ns;
+    return sum;
+}
+
+static pal_err run_substep(pal_world *w, pal_step *shared)
+{
+    for (int b = 0; b < w->plan.n_body; b++) {
+        if (w->plan.body[b].frozen) continue;
+        pal_step step = step_of(w, b);
+        step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
+        step.time_s = shared->time_s;
+        step.heavy = shared->heavy && step.body->dt_limit_s < step.dt_s;
+        step.body->n_heavy += step.heavy;
+        PAL_TRY(run_contact(w, &step, b));
+        pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        uint64_t before = pal_clock_ns(), forces = force_ns(&step);
+        PAL_TRY(solve->effect->run(solve->self, &step));
+        solve->spent_ns += pal_clock_ns() - before - (force_ns(&step) - forces);
+        pal_arena_reset(w->scratch);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ADAPT, GUARD and OUTPUT rows, once a step */
+static pal_err run_stage(pal_world *w, pal_stage stage, double dt_s)
+{
+    for (int b = 0; b < w->plan.n_body; b++) {
+        pal_step step = step_of(w, b);
+        step.dt_s = dt_s;
+        step.n_sub = 1;
+        for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
+            pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];
+            if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
+            uint64_t before = pal_clock_ns();
+            PAL_TRY(row->effect->run(row->self, &step));
+            row->spent_ns += pal_clock_ns() - before;
+        }
+        pal_arena_reset(w->scratch);
+    }
+    return PAL_ERR_OK;
+}
+
+/* equal sub-steps; the rest of the step is split again when the limit falls below them */
+static pal_err run_substeps(pal_world *w, double dt_s)
+{
+    double done_s = 0;
+    int n_sub = 0;
+    pal_step step = {.dt_s = 0};
+    for (int sub = 0; sub == 0 || sub < n_sub; sub++) {
+        double limit = find_limit(w, sub), left_s = dt_s - done_s;
+        int budget = w->most_substep - sub;
+        if (sub == 0 || step.dt_s > limit) {
+            int n = count_substeps(w, left_s, limit);
+            step.heavy = n > budget;
+            n_sub = sub + (n > budget ? (budget > 0 ? budget : 1) : n);
+            step.dt_s = left_s / (n_sub - sub);
+        }
+        step.sub = sub, step.n_sub = n_sub;
+        step.time_s = w->time_s + done_s + step.dt_s;
+        pal_tools_advance(&w->tools, sub, n_sub, step.dt_s);
+        PAL_TRY(run_substep(w, &step));
+        done_s += step.dt_s;
+    }
+    w->n_substep = n_sub;
+    return PAL_ERR_OK;
+}
+
+static int count_frozen(const pal_world *w)
+{
+    int n = 0;
+    for (int b = 0; b < w->plan.n_body; b++) n += w->plan.body[b].frozen;
+    return n;
+}
+
+pal_err pal_world_step(pal_world *world, double dt_s)
+{
+    pal_world *w = world;
+    if (!(dt_s > 0) || !isfinite(dt_s)) return PAL_ERR_REFUSED;
+    /* a step that is too long at rest is refused; deformation is dealt with on the way */
+    if (count_substeps(w, dt_s, w->rest_limit_s) > w->most_substep) return PAL_ERR_BUDGET;
+    uint64_t began = pal_clock_thread_ns();
+    int frozen = count_frozen(w);
+    for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
+    for (int t = 0; t < w->tools.n_tool; t++) pal_tool_take(&w->tools.tool[t], w->has_asked[t] ? &w->asked[t] : NULL);
+    PAL_TRY(run_substeps(w, dt_s));
+    pal_tools_finish(&w->tools, w->n_substep);
+    w->tick++;
+    w->time_s += dt_s;
+    PAL_TRY(run_stage(w, PAL_STAGE_ADAPT, dt_s));
+    PAL_TRY(run_stage(w, PAL_STAGE_GUARD, dt_s));
+    PAL_TRY(run_stage(w, PAL_STAGE_OUTPUT, dt_s));
+    w->step_ns = pal_clock_thread_ns() - began;
+    w->end_ns = pal_clock_ns();
+    return count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
+}
+
+/* ---- what others see ---- */
+
+static void copy_part(const pal_body *body, pal_frame_part *to)
+{
+    const double *o = body->offset_m;
+    to->revision = body->revision;
+    to->frozen = body->frozen;
+    if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
+        if (to->n_vertex > 0) memcpy(to->position_m, body->shown, 3 * sizeof(float) * (size_t)to->n_vertex);
+        return;
+    }
+    for (int i = 0; i < to->n_vertex; i++)
+        for (int c = 0; c < 3; c++) to->position_m[3 * i + c] = (float)(body->shown[3 * i + c] + o[c]);
+}
+
+static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
+{
+    const pal_tool *tool = &w->tools.tool[t];
+    to->present = tool->present, to->touching = tool->touching, to->holding = tool->holding;
+    to->pose = tool->last;
+    to->pose_ns = w->pose_ns[t];
+    pal_copy3(to->force_N, tool->mean_force_N);
+    to->radius_m = tool->radius_m;
+    to->n_patch = tool->n_patch;
+    memcpy(to->patch, tool->patch, sizeof to->patch);
+    to->has_grip = tool->has_grip;
+    pal_copy3(to->grip_x0_m, tool->grip_x0_m);
+    pal_copy3(to->grip_f0_N, tool->grip_f0_N);
+    memcpy(to->grip_k_N_m, tool->grip_k_N_m, sizeof to->grip_k_N_m);
+    to->grip_b_Ns_m = tool->grip_b_Ns_m;
+}
+
+void pal_world_frame(const pal_world *world, pal_frame *out)
+{
+    const pal_world *w = world;
+    out->tick = w->tick;
+    out->time_s = w->time_s;
+    out->end_ns = w->end_ns;
+    out->step_ns = w->step_ns;
+    out->n_substep = w->n_substep;
+    for (int b = 0; b < out->n_part; b++) copy_part(&w->plan.body[b], &out->part[b]);
+    out->n_tool = w->tools.n_tool;
+    for (int t = 0; t < w->tools.n_tool; t++) copy_tool(w, t, &out->tool[t]);
+    out->n_row = w->plan.n_row < PAL_FRAME_ROWS ? w->plan.n_row : PAL_FRAME_ROWS;
+    for (int i = 0; i < out->n_row; i++) {
+        uint64_t ns = w->plan.row[i].spent_ns;
+        out->row_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
+    }
+}
+
+static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t n_byte)
+{
+    const unsigned char *p = bytes;
+    for (size_t i = 0; i < n_byte; i++) hash = (hash ^ p[i]) * 0x100000001b3u;
+    return hash;
+}
+
+uint64_t pal_world_hash(const pal_world *world)
+{
+    uint64_t hash = hash_bytes(0xcbf29ce484222325u, &world->tick, sizeof world->tick);
+    for (int b = 0; b < world->plan.n_body; b++) {
+        const pal_body *body = &world->plan.body[b];
+        hash = hash_bytes(hash, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+        hash = hash_bytes(hash, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    return hash;
+}
+
+int pal_world_rows(const pal_world *world)
+{
+    return world->plan.n_row;
+}
+
+const pal_row *pal_world_effect(const pal_world *world, int row)
+{
+    return &world->plan.row[row];
+}
+
+void pal_world_row(const pal_world *world, int row, pal_row_info *out)
+{
+    const pal_row *r = &world->plan.row[row];
+    *out = (pal_row_info){.name = r->effect->name,
+                          .body = world->plan.body[world->plan.row_body[row]].name,
+                          .stage = pal_stage_name(r->effect->stage),
+                          .n_byte = r->n_byte,
+                          .spent_ns = r->spent_ns};
+}
+
+int pal_world_parts(const pal_world *world)
+{
+    return world->plan.n_body;
+}
+
+void pal_world_shown(const pal_world *world, int index, pal_shown *out)
+{
+    const part *p = &world->part[index];
+    const pal_body *body = &world->plan.body[index];
+    *out = (pal_shown){.name = body->name,
+                       .n_vertex = p->n_vertex,
+                       .n_tri = p->n_tri,
+                       .rest_m = p->rest_m,
+                       .tri = p->tri,
+                       .revision = body->revision};
+}
+
+double pal_world_limit_s(const pal_world *world)
+{
+    return world->limit_s;
+}
+
+int pal_world_substeps(const pal_world *world)
+{
+    return world->n_substep;
+}
+
+double pal_world_energy_J(const pal_world *world)
+{
+    double sum = 0;
+    for (int b = 0; b < world->plan.n_body; b++) sum += pal_body_kinetic_J(&world->plan.body[b]);
+    for (int i = 0; i < world->plan.n_row; i++) {
+        const pal_row *row = &world->plan.row[i];
+        if (row->effect->energy) sum += row->effect->energy(row->self, &world->plan.body[world->plan.row_body[i]]);
+    }
+    return sum;
+}
+
+size_t pal_world_bytes(const pal_world *world)
+{
+    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte;
+}
+
+int pal_world_bodies(const pal_world *world)
+{
+    return world->plan.n_body;
+}
+
+pal_body *pal_world_body(pal_world *world, int body)
+{
+    return &world->plan.body[body];
+}
+
+const pal_tools *pal_world_tools(const pal_world *world)
+{
+    return &world->tools;
+}
