@@ -129,7 +129,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0)
             return pal_json_bad(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
-        err = pal_scene_prepare_file(file, &options, out, NULL, NULL, &why);
+        err = pal_scene_prepare_file(file, &options, out, NULL, &why);
     }
     return err ? pal_note_set(json->note, err, "%s: %s: %s", json->file, at, why.text) : PAL_ERR_OK;
 }

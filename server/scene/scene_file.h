@@ -51,8 +51,10 @@ typedef struct pal_surface_scene_report {
     pal_prepare_report prepare;
     double unit_m;
     const char *unit_name; /* "mm", "m", "given", ... */
+    bool unit_guessed;     /* nobody said it: taken from the size */
     double read_s;
     int resolution;
+    int label; /* of a label volume, -1: a surface */
 } pal_surface_scene_report;
 
 /* any surface file or label volume -> default scene: material, lowest 5 % held, three tools. report may be NULL */
@@ -64,6 +66,10 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
 /* writes DIR/scene.json and DIR/NAME.palmesh for every body, scene.json last; makes DIR; IO, and then nothing that this
  * call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
+/* other texts than those from the file's name; NULL keeps one. name becomes the only body's name as well. REFUSED for
+ * characters that a scene may not hold or too many of them, and then nothing changed */
+pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *title, const char *source,
+                         pal_note *note);
 /* makes a folder and those above it; IO */
 pal_err pal_scene_make_folder(const char *folder, pal_note *note);
 #endif

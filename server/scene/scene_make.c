@@ -151,21 +151,24 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
 }
 
 static pal_err read_any(const char *path, const pal_surface_scene *options, pal_surface *out,
-                        pal_surface_scene_report *report, int *label, pal_note *note)
+                        pal_surface_scene_report *report, pal_note *note)
 {
     double start = pal_clock_s();
     say(options, "read", 0);
-    *label = -1;
+    report->label = -1;
     pal_err err;
     if (pal_label_volume_is(path)) {
+        if (options->unit_m > 0 && options->unit_m != 1e-3)
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: a scan is in mm, no other unit can be given", path);
         report->unit_m = 1e-3;
         report->unit_name = "mm";
-        err = read_volume(path, options, out, &report->surface, label, note);
+        err = read_volume(path, options, out, &report->surface, &report->label, note);
     } else if (options->label > 0) {
         err = pal_note_set(note, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
                            options->label);
     } else {
         pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = weld};
+        report->unit_guessed = options->unit_m == 0;
         err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, note);
     }
     report->read_s = pal_clock_s() - start;
@@ -187,16 +190,14 @@ static pal_err make(const char *name, const pal_surface *surface, const pal_surf
 }
 
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
-                               pal_surface_scene_report *report, int *label_used, pal_note *note)
+                               pal_surface_scene_report *report, pal_note *note)
 {
     pal_surface_scene_report own = {0};
     pal_surface surface = {0};
-    int label;
     if (!report) report = &own;
-    PAL_TRY(read_any(path, options, &surface, report, &label, note));
+    PAL_TRY(read_any(path, options, &surface, report, note));
     pal_err err = make(path, &surface, options, out, report, note);
     pal_surface_free(&surface);
-    if (!err && label_used) *label_used = label;
     return err;
 }
 
@@ -220,10 +221,39 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     return pal_scene_check(scene, note);
 }
 
+static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_note *note)
+{
+    char shown[256];
+    if (strlen(text) >= n_byte)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %zu bytes, more than %zu", what, strlen(text), n_byte - 1);
+    shown_text(text, shown, sizeof shown);
+    if (strcmp(text, shown))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: has characters that cannot be shown", what);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char *title, const char *source,
+                         pal_note *note)
+{
+    pal_scene *scene = &loaded->scene;
+    char plain[PAL_NAME];
+    pal_scene_plain_name(name ? name : scene->name, plain);
+    if (name && strcmp(plain, name))
+        return pal_note_set(note, PAL_ERR_REFUSED, "name: wanted at most %d of the characters a-z 0-9 _ -",
+                            PAL_NAME - 1);
+    if (title) PAL_TRY(check_shown("title", title, sizeof scene->title, note));
+    if (source) PAL_TRY(check_shown("source", source, sizeof scene->source, note));
+    snprintf(scene->name, sizeof scene->name, "%s", plain);
+    if (name && scene->n_body == 1) snprintf(scene->body[0].name, sizeof scene->body[0].name, "%s", name);
+    if (title) snprintf(scene->title, sizeof scene->title, "%s", title);
+    if (source) snprintf(scene->source, sizeof scene->source, "%s", source);
+    return PAL_ERR_OK;
+}
+
 /* an empty scene and report; NULL: out of memory */
 static pal_loaded_scene *begin(pal_surface_scene_report *report, const char *name, pal_note *note)
 {
-    *report = (pal_surface_scene_report){.unit_name = ""};
+    *report = (pal_surface_scene_report){.unit_name = "", .label = -1};
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     if (!loaded) pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a scene", name);
     return loaded;
@@ -236,11 +266,10 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     if (!report) report = &own;
     pal_loaded_scene *loaded = begin(report, path, note);
     if (!loaded) return PAL_ERR_MEMORY;
-    int label = -1;
     char stem[256], shown[100];
     const char *slash = strrchr(path, '/');
     pal_scene_stem(path, stem, sizeof stem);
-    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, &label, note);
+    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, note);
     if (!err) err = dress(loaded, stem, options, note);
     if (err) {
         pal_scene_free(loaded);
@@ -248,8 +277,8 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     }
     pal_scene *scene = &loaded->scene;
     shown_text(stem, shown, sizeof shown);
-    if (label >= 0)
-        snprintf(scene->title, sizeof scene->title, "%s, label %d", shown, label);
+    if (report->label >= 0)
+        snprintf(scene->title, sizeof scene->title, "%s, label %d", shown, report->label);
     else
         snprintf(scene->title, sizeof scene->title, "%s", shown);
     shown_text(slash ? slash + 1 : path, scene->source, sizeof scene->source);

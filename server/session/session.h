@@ -8,6 +8,7 @@
  * open until close. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
+#include "server/sim/effect.h"
 #include "server/sim/world.h"
 
 typedef struct pal_session pal_session;

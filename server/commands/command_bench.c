@@ -1,0 +1,34 @@
+/* `palpate bench NAME`: dispatch. */
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+
+#include <stdio.h>
+#include <string.h>
+
+int command_bench(int argc, char **argv)
+{
+    const pal_flag_table table = {.usage = "bench mesh [SURFACE.ply] | springs | protocol | latency [flags]",
+                                  .about = "Measures this machine, medians of several runs:\n"
+                                           "  mesh      preparation of tetrahedra at several resolutions (of a "
+                                           "procedural organ without SURFACE)\n"
+                                           "  springs   forces, integration and skinning against the machine's limits\n"
+                                           "  protocol  encoding and decoding of frames\n"
+                                           "  latency   from a pose put into a session to the frame that shows it\n",
+                                  .least_operand = 1,
+                                  .most_operand = 2};
+    pal_flag_common common;
+    const char *word[2] = {NULL, NULL};
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    if (code >= 0) return code;
+    bool mesh = !strcmp(word[0], "mesh");
+    if (n == 2 && !mesh) {
+        fprintf(stderr, "palpate bench: \"%.60s\" is one word too many (see palpate bench --help)\n", word[1]);
+        return 2;
+    }
+    if (mesh) return bench_mesh(word[1], common.json);
+    if (!strcmp(word[0], "springs")) return bench_springs(common.json);
+    if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
+    if (!strcmp(word[0], "latency")) return bench_latency(common.json);
+    fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);
+    return 2;
+}

@@ -1,0 +1,140 @@
+/* `palpate plan`: the rows of a scene, their memory, and what they cost on this machine: the median over up to 60 steps
+ * at rest, or as many as fit into two seconds. */
+#include "server/base/clock.h"
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/commands/scene_arg.h"
+#include "server/sim/effect.h"
+#include "server/sim/world.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STEPS = 60, MOST_S = 2 };
+
+typedef struct cost {
+    int n_step;
+    uint64_t row_ns[PAL_FRAME_ROWS][STEPS], step_ns[STEPS];
+} cost;
+
+static int by_size(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+static double median_ms(uint64_t *ns, int n)
+{
+    qsort(ns, (size_t)n, sizeof *ns, by_size);
+    return n ? 1e-6 * (double)ns[n / 2] : 0;
+}
+
+static pal_err measure(pal_world *world, double step_s, cost *out)
+{
+    double start = pal_clock_s();
+    int n_row = pal_world_rows(world);
+    for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MOST_S); k++, out->n_step++) {
+        uint64_t before = pal_clock_thread_ns();
+        PAL_TRY(pal_world_step(world, step_s));
+        out->step_ns[k] = pal_clock_thread_ns() - before;
+        for (int r = 0; r < n_row && r < PAL_FRAME_ROWS; r++) {
+            pal_row_info row;
+            pal_world_row(world, r, &row);
+            out->row_ns[r][k] = row.spent_ns;
+        }
+    }
+    return PAL_ERR_OK;
+}
+
+static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
+{
+    cJSON *o = cJSON_CreateObject();
+    double step_ms = median_ms(c->step_ns, c->n_step);
+    cJSON_AddBoolToObject(o, "ok", true);
+    cJSON_AddStringToObject(o, "name", scene->name);
+    cJSON_AddNumberToObject(o, "step_s", scene->step_s);
+    cJSON_AddNumberToObject(o, "substeps", pal_world_substeps(world));
+    cJSON_AddNumberToObject(o, "limit_s", pal_world_limit_s(world));
+    cJSON_AddNumberToObject(o, "steps_measured", c->n_step);
+    cJSON_AddNumberToObject(o, "step_ms", step_ms);
+    cJSON_AddNumberToObject(o, "load", 1e-3 * step_ms / scene->step_s);
+    cJSON_AddNumberToObject(o, "world_bytes", (double)pal_world_bytes(world));
+    cJSON *bodies = cJSON_AddArrayToObject(o, "bodies");
+    for (int b = 0; b < scene->n_body; b++) {
+        cJSON *body = cJSON_CreateObject();
+        cJSON_AddItemToArray(bodies, body);
+        cJSON_AddStringToObject(body, "name", scene->body[b].name);
+        cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
+        cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
+        cJSON_AddNumberToObject(body, "triangles", scene->body[b].mesh->surface.n_tri);
+    }
+    cJSON *rows = cJSON_AddArrayToObject(o, "rows");
+    for (int r = 0; r < pal_world_rows(world); r++) {
+        pal_row_info row;
+        cJSON *entry = cJSON_CreateObject();
+        pal_world_row(world, r, &row);
+        cJSON_AddItemToArray(rows, entry);
+        cJSON_AddStringToObject(entry, "name", row.name);
+        cJSON_AddStringToObject(entry, "body", row.body);
+        cJSON_AddStringToObject(entry, "stage", row.stage);
+        cJSON_AddNumberToObject(entry, "bytes", (double)row.n_byte);
+        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_ROWS ? median_ms(c->row_ns[r], c->n_step) : 0);
+    }
+    return o;
+}
+
+static void print(const pal_scene *scene, const pal_world *world, cost *c)
+{
+    for (int b = 0; b < scene->n_body; b++)
+        printf("%s: %d tetrahedra, %d nodes, %d shown triangles\n", scene->body[b].name,
+               scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
+    printf("\n%-9s %-16s %-16s %10s %10s\n", "stage", "row", "body", "kB", "ms a step");
+    for (int r = 0; r < pal_world_rows(world); r++) {
+        pal_row_info row;
+        pal_world_row(world, r, &row);
+        printf("%-9s %-16s %-16s %10.1f %10.4f\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
+               r < PAL_FRAME_ROWS ? median_ms(c->row_ns[r], c->n_step) : 0);
+    }
+    double step_ms = median_ms(c->step_ns, c->n_step), limit_s = pal_world_limit_s(world);
+    printf("\na step of %.3f ms in %d sub-step%s", 1e3 * scene->step_s, pal_world_substeps(world),
+           pal_world_substeps(world) == 1 ? "" : "s");
+    if (isfinite(limit_s)) printf(" (stable up to %.3f ms each)", 1e3 * limit_s);
+    printf(" takes %.3f ms here, %.0f %% of real time; the world has %.1f MB\n", step_ms,
+           1e-1 * step_ms / scene->step_s, 1e-6 * (double)pal_world_bytes(world));
+}
+
+int command_plan(int argc, char **argv)
+{
+    const pal_flag_table table = {.usage = "plan SCENE [flags]",
+                                  .about = "Shows the rows that a scene calls for, in the order of a step, with their "
+                                           "memory and their measured cost here.\nSCENE is a scene.json, its folder, "
+                                           "or any surface or scan.\n",
+                                  .least_operand = 1,
+                                  .most_operand = 1};
+    pal_flag_common common;
+    const char *word[1];
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    if (code >= 0) return code;
+    pal_loaded_scene *loaded = NULL;
+    pal_world *world = NULL;
+    pal_note note = {""}, why = {""};
+    static cost measured;
+    pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note);
+    if (!err && (err = pal_world_create(&loaded->scene, &why, &world)))
+        pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    pal_report_progress("measure", 0, &common);
+    if (!err) err = measure(world, loaded->scene.step_s, &measured);
+    pal_report_progress(NULL, 0, &common);
+    if (err)
+        code = pal_report_refusal(&common, err, &note);
+    else if (common.json)
+        code = pal_report_json(&common, as_json(&loaded->scene, world, &measured));
+    else
+        code = 0;
+    if (!err && !common.json && !common.quiet) print(&loaded->scene, world, &measured);
+    pal_world_destroy(world);
+    pal_scene_free(loaded);
+    return code;
+}

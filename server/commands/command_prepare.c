@@ -1,0 +1,283 @@
+/* `palpate prepare`: surface file or label volume -> DIR/scene.json, the prepared mesh and TetGen files. All files are
+ * written into a hidden folder inside DIR first and then moved, scene.json last, so that DIR never holds half a scene.
+ */
+#include "server/base/clock.h"
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/mesh/label_volume.h"
+#include "server/mesh/mesh_file.h"
+#include "server/scene/scene_file.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PATH = 1200, TETGEN_MOST = 1000000, LABELS = 256, FILES = 64 };
+
+static const char about[] =
+    "Turns a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr .inr.gz) into a "
+    "scene\n"
+    "that `palpate serve DIR/scene.json` runs: tetrahedra (paper B 2.2), skin, tissue, supports, tools.\n"
+    "Files written: DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at "
+    "most\n"
+    "1,000,000 tetrahedra (--tetgen writes them for any mesh, --no-tetgen for none). Either all of them or none.\n";
+
+typedef struct wishes {
+    pal_surface_scene scene;
+    const char *folder, *units, *name, *title, *source;
+    bool procedural, list_labels, tetgen, no_tetgen;
+} wishes;
+
+typedef struct outcome {
+    pal_surface_scene_report report;
+    double write_s, total_s;
+    char file[FILES][80];
+    int n_file;
+} outcome;
+
+/* ---- --list-labels ---- */
+
+static int list_labels(const pal_flag_common *common, const char *path)
+{
+    pal_label_volume volume;
+    static pal_label_count count[LABELS];
+    pal_note note = {""};
+    pal_err err = pal_label_volume_read(path, &volume, &note);
+    if (err) return pal_report_refusal(common, err, &note);
+    int n = pal_label_volume_list(&volume, count, LABELS);
+    pal_label_volume_free(&volume);
+    if (!common->json) {
+        if (!common->quiet) printf("%10s %12s %12s\n", "label", "voxels", "millilitres");
+        for (int k = 0; k < n && !common->quiet; k++)
+            printf("%10d %12lld %12.1f\n", count[k].label, (long long)count[k].n_voxel, 1e6 * count[k].volume_m3);
+        return 0;
+    }
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddBoolToObject(object, "ok", true);
+    cJSON *list = cJSON_AddArrayToObject(object, "labels");
+    for (int k = 0; k < n; k++) {
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, entry);
+        cJSON_AddNumberToObject(entry, "label", count[k].label);
+        cJSON_AddNumberToObject(entry, "voxels", (double)count[k].n_voxel);
+        cJSON_AddNumberToObject(entry, "volume_m3", count[k].volume_m3);
+    }
+    return pal_report_json(common, object);
+}
+
+/* ---- writing ---- */
+
+/* moves every file of the staging folder up into its parent, scene.json last */
+static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_note *note)
+{
+    char from[PATH + 300], to[PATH + 300];
+    DIR *list = opendir(stage);
+    if (!list) return pal_note_set(note, PAL_ERR_IO, "%s: %s", stage, strerror(errno));
+    out->n_file = 0;
+    for (struct dirent *entry; (entry = readdir(list)) && out->n_file < FILES - 1;)
+        if (entry->d_name[0] != '.' && strcmp(entry->d_name, "scene.json"))
+            snprintf(out->file[out->n_file++], sizeof out->file[0], "%.79s", entry->d_name);
+    closedir(list);
+    snprintf(out->file[out->n_file++], sizeof out->file[0], "scene.json");
+    for (int k = 0; k < out->n_file; k++) {
+        snprintf(from, sizeof from, "%s/%s", stage, out->file[k]);
+        snprintf(to, sizeof to, "%s/%s", folder, out->file[k]);
+        if (rename(from, to)) return pal_note_set(note, PAL_ERR_IO, "%s: cannot be written: %s", to, strerror(errno));
+    }
+    return PAL_ERR_OK;
+}
+
+static void remove_folder(const char *folder)
+{
+    char path[PATH + 300];
+    DIR *list = opendir(folder);
+    for (struct dirent *entry; list && (entry = readdir(list));) {
+        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) unlink(path);
+    }
+    if (list) closedir(list);
+    rmdir(folder);
+}
+
+static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bool tetgen, pal_note *note)
+{
+    char stem[PATH + 100];
+    PAL_TRY(pal_scene_save(loaded, stage, note));
+    if (!tetgen) return PAL_ERR_OK;
+    snprintf(stem, sizeof stem, "%s/%s", stage, loaded->scene.body[0].name);
+    return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, note);
+}
+
+static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome *out, pal_note *note)
+{
+    char stage[PATH];
+    bool was_there = access(wish->folder, F_OK) == 0;
+    bool tetgen = wish->tetgen || (!wish->no_tetgen && loaded->mesh[0].tets.n_tet <= TETGEN_MOST);
+    int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", wish->folder, (long)getpid());
+    if (n < 0 || (size_t)n >= sizeof stage)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
+    pal_err err = pal_scene_make_folder(wish->folder, note);
+    if (!err) err = write_files(loaded, stage, tetgen, note);
+    if (!err) err = move_up(stage, wish->folder, out, note);
+    remove_folder(stage);
+    if (err && !was_there) rmdir(wish->folder);
+    return err;
+}
+
+/* ---- saying ---- */
+
+static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
+{
+    const pal_surface_scene_report *r = &out->report;
+    const pal_prepared *mesh = &loaded->mesh[0];
+    char path[PATH + 16];
+    cJSON *o = cJSON_CreateObject();
+    snprintf(path, sizeof path, "%s/scene.json", wish->folder);
+    cJSON_AddBoolToObject(o, "ok", true);
+    cJSON_AddStringToObject(o, "scene", path);
+    cJSON_AddStringToObject(o, "name", loaded->scene.name);
+    cJSON_AddStringToObject(o, "title", loaded->scene.title);
+    cJSON *files = cJSON_AddArrayToObject(o, "files");
+    for (int k = 0; k < out->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(out->file[k]));
+    cJSON_AddStringToObject(o, "format", r->surface.format);
+    cJSON *units = cJSON_AddObjectToObject(o, "units");
+    cJSON_AddStringToObject(units, "name", wish->units ? wish->units : r->unit_name);
+    cJSON_AddNumberToObject(units, "m", r->unit_m);
+    cJSON_AddBoolToObject(units, "guessed", r->unit_guessed);
+    if (r->label >= 0) cJSON_AddNumberToObject(o, "label", r->label);
+    cJSON_AddNumberToObject(o, "triangles", mesh->surface.n_tri);
+    cJSON_AddNumberToObject(o, "vertices", mesh->surface.n_vertex);
+    cJSON_AddNumberToObject(o, "resolution", r->resolution);
+    cJSON_AddNumberToObject(o, "voxels", (double)r->prepare.n_voxel);
+    cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
+    cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
+    cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
+    cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
+    cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
+    cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
+    cJSON_AddNumberToObject(o, "surface_volume_m3", r->prepare.voxel.surface_volume_m3);
+    cJSON_AddNumberToObject(o, "inside_volume_m3", r->prepare.voxel.inside_volume_m3);
+    cJSON_AddNumberToObject(o, "volume_error", r->prepare.volume_error);
+    cJSON *dropped = cJSON_AddObjectToObject(o, "dropped");
+    cJSON_AddNumberToObject(dropped, "degenerate", (double)r->surface.n_degenerate);
+    cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
+    cJSON_AddNumberToObject(dropped, "nonfinite", (double)r->surface.n_nonfinite);
+    cJSON_AddNumberToObject(o, "welded", (double)r->surface.n_welded);
+    cJSON *seconds = cJSON_AddObjectToObject(o, "seconds");
+    cJSON_AddNumberToObject(seconds, "read", r->read_s);
+    cJSON_AddNumberToObject(seconds, "tree", r->prepare.voxel.tree_s);
+    cJSON_AddNumberToObject(seconds, "fill", r->prepare.voxel.fill_s);
+    cJSON_AddNumberToObject(seconds, "split", r->prepare.split_s);
+    cJSON_AddNumberToObject(seconds, "skin", r->prepare.skin_s);
+    cJSON_AddNumberToObject(seconds, "write", out->write_s);
+    cJSON_AddNumberToObject(seconds, "total", out->total_s);
+    return o;
+}
+
+static void print(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
+{
+    const pal_surface_scene_report *r = &out->report;
+    const pal_prepared *mesh = &loaded->mesh[0];
+    double low[3], high[3];
+    pal_surface_box(&mesh->surface, low, high);
+    printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
+           1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
+    if (r->unit_guessed) printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
+    printf("\n%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
+           mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution,
+           r->prepare.voxel.n_component, r->prepare.voxel.n_component == 1 ? "" : "s", r->prepare.voxel.method);
+    if (r->prepare.voxel.surface_volume_m3 > 0)
+        printf("volume of the surface %.1f ml, of the voxels inside %+.1f %%\n",
+               1e6 * r->prepare.voxel.surface_volume_m3, 100 * r->prepare.volume_error);
+    else
+        printf("the surface is open; volume of the voxels inside %.1f ml\n", 1e6 * r->prepare.voxel.inside_volume_m3);
+    if (r->surface.n_degenerate + r->surface.n_duplicate + r->surface.n_nonfinite > 0)
+        printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite\n",
+               (long long)r->surface.n_degenerate, (long long)r->surface.n_duplicate,
+               (long long)r->surface.n_nonfinite);
+    printf("wrote");
+    for (int k = 0; k < out->n_file; k++) printf(" %s", out->file[k]);
+    printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", wish->folder, out->total_s, wish->folder);
+}
+
+/* ---- the command ---- */
+
+static int usage(const pal_flag_common *common, const char *sentence)
+{
+    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
+    return 2;
+}
+
+static int run(pal_flag_common *common, const char *in, wishes *wish)
+{
+    pal_loaded_scene *loaded = NULL;
+    static outcome out;
+    pal_note note = {""};
+    double start = pal_clock_s();
+    wish->scene.progress = pal_report_progress;
+    wish->scene.user = common;
+    pal_err err = wish->procedural ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
+                                   : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
+    if (err) return pal_report_refusal(common, err, &note);
+    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
+    double before = pal_clock_s();
+    pal_report_progress("write", 0, common);
+    if (!err) err = save(loaded, wish, &out, &note);
+    out.write_s = pal_clock_s() - before;
+    out.total_s = pal_clock_s() - start;
+    pal_report_progress(NULL, 0, common);
+    int code = err            ? pal_report_refusal(common, err, &note)
+               : common->json ? pal_report_json(common, as_json(loaded, wish, &out))
+                              : 0;
+    if (!err && !common->json && !common->quiet) print(loaded, wish, &out);
+    pal_scene_free(loaded);
+    return code;
+}
+
+int command_prepare(int argc, char **argv)
+{
+    wishes wish = {.scene = {.label = -1, .material = {5000, 0.45, 1000, 4}}};
+    pal_material *m = &wish.scene.material;
+    const pal_flag flag[] = {
+        {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
+        {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
+         "voxels on the longest axis (as many as give about 13,000 tetrahedra)"},
+        {"--label", "N", PAL_FLAG_COUNT, &wish.scene.label, 1, INT32_MAX,
+         "label of a segmented scan (the most frequent one)"},
+        {"--list-labels", NULL, PAL_FLAG_SWITCH, &wish.list_labels, 0, 0, "only list the labels of a segmented scan"},
+        {"--units", "WORD", PAL_FLAG_TEXT, &wish.units, 0, 0,
+         "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
+        {"--triangles", "N", PAL_FLAG_COUNT, &wish.scene.target_tri, 100, 10000000,
+         "shown triangles of a scan's surface or of the procedural organ (50,000)"},
+        {"--young-Pa", "E", PAL_FLAG_NUMBER, &m->young_Pa, 1e-6, 1e12, "stiffness of the tissue (5000)"},
+        {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.5, "its Poisson ratio (0.45)"},
+        {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},
+        {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
+        {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
+        {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
+        {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},
+        {"--procedural", NULL, PAL_FLAG_SWITCH, &wish.procedural, 0, 0, "no IN: an organ that is computed"},
+        {"--tetgen", NULL, PAL_FLAG_SWITCH, &wish.tetgen, 0, 0, "write TetGen files for any size"},
+        {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &wish.no_tetgen, 0, 0, "write no TetGen files"},
+    };
+    const pal_flag_table table = {.usage = "prepare IN -o DIR [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .most_operand = 1};
+    pal_flag_common common;
+    const char *in[1] = {NULL};
+    int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
+    if (code >= 0) return code;
+    if (wish.procedural == (n_in > 0)) return usage(&common, "needs either a file or --procedural");
+    if (wish.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
+    if (!wish.folder || !*wish.folder) return usage(&common, "needs -o DIR");
+    if (wish.tetgen && wish.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
+    if (wish.units && !(wish.scene.unit_m = pal_mesh_unit_named(wish.units)))
+        return usage(&common, "--units: is not m, cm, mm, um or in");
+    return run(&common, in[0], &wish);
+}

@@ -1,0 +1,64 @@
+/* `palpate replay`: runs an input log against its scene and compares the hashes. */
+#include "server/base/clock.h"
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/commands/scene_arg.h"
+#include "server/session/replay.h"
+
+#include <stdio.h>
+
+static cJSON *as_json(const pal_replay_report *r, double seconds)
+{
+    char hash[24];
+    cJSON *o = cJSON_CreateObject();
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)r->last_hash);
+    cJSON_AddBoolToObject(o, "ok", r->n_hash == r->n_hash_equal);
+    cJSON_AddNumberToObject(o, "steps", (double)r->n_tick);
+    cJSON_AddNumberToObject(o, "poses", (double)r->n_pose);
+    cJSON_AddNumberToObject(o, "commands", (double)r->n_command);
+    cJSON_AddNumberToObject(o, "hashes", (double)r->n_hash);
+    cJSON_AddNumberToObject(o, "hashes_equal", (double)r->n_hash_equal);
+    if (r->n_hash == r->n_hash_equal)
+        cJSON_AddNullToObject(o, "first_difference");
+    else
+        cJSON_AddNumberToObject(o, "first_difference", (double)r->first_difference);
+    cJSON_AddStringToObject(o, "last_hash", hash);
+    cJSON_AddNumberToObject(o, "seconds", seconds);
+    return o;
+}
+
+int command_replay(int argc, char **argv)
+{
+    const pal_flag_table table = {.usage = "replay LOG SCENE [flags]",
+                                  .about = "Runs an input log (palpate serve --record LOG) again and compares the hash "
+                                           "of the world now and then.\nSCENE is the scene that was served.\n"
+                                           "Exit code 1 when a hash differs.\n",
+                                  .least_operand = 2,
+                                  .most_operand = 2};
+    pal_flag_common common;
+    const char *word[2];
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    if (code >= 0) return code;
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_replay_report report;
+    double start = pal_clock_s();
+    pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &note);
+    pal_report_progress("replay", 0, &common);
+    if (!err) err = pal_replay_run(word[0], &loaded->scene, &report, &note);
+    pal_report_progress(NULL, 0, &common);
+    pal_scene_free(loaded);
+    if (err) return pal_report_refusal(&common, err, &note);
+    bool equal = report.n_hash == report.n_hash_equal;
+    if (!equal)
+        fprintf(stderr, "palpate replay: %s: the world differs from step %llu on: %llu of %llu hashes are equal\n",
+                word[0], (unsigned long long)report.first_difference, (unsigned long long)report.n_hash_equal,
+                (unsigned long long)report.n_hash);
+    if (common.json && (code = pal_report_json(&common, as_json(&report, pal_clock_s() - start))) > 0) return code;
+    if (equal && !common.json && !common.quiet)
+        printf("%llu steps, %llu poses, %llu commands: all %llu hashes equal, the last is %016llx\n",
+               (unsigned long long)report.n_tick, (unsigned long long)report.n_pose,
+               (unsigned long long)report.n_command, (unsigned long long)report.n_hash,
+               (unsigned long long)report.last_hash);
+    return equal ? 0 : 1;
+}

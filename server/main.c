@@ -1,0 +1,45 @@
+/* `palpate COMMAND ...`: finds the command and runs it. Nothing else happens here: signals belong to serve, which is
+ * the one command that waits. */
+#include "server/commands/commands.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const pal_command_entry command[] = {
+#ifdef PAL_WITH_SERVE
+    {"serve", "run scenes and let browsers and devices touch them", command_serve},
+#endif
+    {"prepare", "turn a surface or a segmented scan into a scene that serve can run", command_prepare},
+    {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
+    {"replay", "run a recorded input log again and compare the world's hashes", command_replay},
+    {"bench", "measure mesh preparation, springs and protocol on this machine", command_bench},
+};
+enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };
+
+static void manual(FILE *to)
+{
+    fprintf(to, "usage: palpate COMMAND [...]\n\n");
+    for (int k = 0; k < N_COMMAND; k++) fprintf(to, "  %-9s %s\n", command[k].name, command[k].about);
+    fprintf(to, "\n`palpate COMMAND --help` says more about one of them, `palpate --version` says which this is.\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        manual(stderr);
+        return USAGE;
+    }
+    const char *word = argv[1];
+    if (!strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "help")) {
+        manual(stdout);
+        return 0;
+    }
+    if (!strcmp(word, "--version")) {
+        printf("palpate %s\n", PAL_VERSION);
+        return 0;
+    }
+    for (int k = 0; k < N_COMMAND; k++)
+        if (!strcmp(word, command[k].name)) return command[k].run(argc - 1, argv + 1);
+    fprintf(stderr, "palpate: there is no command \"%.60s\" (see palpate --help)\n", word);
+    return USAGE;
+}
