@@ -259,15 +259,11 @@ static uint32_t choose_k(const uint32_t *v)
     for (int i = 0; i < GROUP; i++) sum += v[i];
     if (sum == 0) return K_ZERO;
     while (k < K_MAX && (uint32_t)GROUP << (k + 1) <= sum) k++;
-    /* the best parameter is at or next to log2 of the mean */
-    uint32_t best = k, least = cost(v, k);
-    for (int step = -1; step <= 1; step += 2) {
-        uint32_t other = (uint32_t)((int)k + step), bits;
-        if (other > K_MAX) continue;
-        bits = cost(v, other);
-        if (bits < least) least = bits, best = other;
-    }
-    return best;
+    /* the best parameter is next to log2 of the mean, or far below it when few large values are better escaped */
+    uint32_t least = cost(v, k), bits = k < K_MAX ? cost(v, k + 1) : UINT32_MAX;
+    if (bits < least) return k + 1;
+    while (k > 0 && (bits = cost(v, k - 1)) < least) least = bits, k--;
+    return k;
 }
 
 typedef struct bit_writer {

@@ -73,6 +73,7 @@ typedef enum shape_motion {
     MOTION_LOCAL,    /* about 5 % of the vertices move              */
     MOTION_TELEPORT, /* jumps of up to 2 m                          */
     MOTION_STORM,    /* white noise of 20 mm: worst case for the prediction */
+    MOTION_SPIKE,    /* every 37th vertex jumps by 30 mm: escape codes */
     MOTION_COUNT
 } shape_motion;
 
@@ -87,7 +88,7 @@ static inline void shape_move(const shape *s, shape_motion motion, int k, float 
         for (int c = 0; c < 3; c++) d2 += (x[c] - centre[c]) * (x[c] - centre[c]);
         double width = motion == MOTION_LOCAL ? 0.012 : 0.03, dent = 0.008 * exp(-d2 / (width * width));
         if (motion == MOTION_LOCAL && dent < 1e-5) dent = 0;
-        if (motion == MOTION_REST || motion == MOTION_TELEPORT || motion == MOTION_STORM) dent = 0;
+        if (motion == MOTION_REST || motion >= MOTION_TELEPORT) dent = 0;
         for (int c = 0; c < 3; c++) x[c] -= dent * centre[c] / 0.075;
         if (motion == MOTION_BUMP || motion == MOTION_BEND || motion == MOTION_NOISE)
             x[2] += 3e-4 * sin(40 * x[0] + 9 * t) * cos(35 * x[1]);
@@ -100,6 +101,7 @@ static inline void shape_move(const shape *s, shape_motion motion, int k, float 
         double noise = motion == MOTION_NOISE ? 2e-5 : motion == MOTION_STORM ? 0.02 : 0;
         for (int c = 0; c < 3 && noise > 0; c++) x[c] += noise * shape_random(&random);
         if (motion == MOTION_TELEPORT) x[k % 3] += 2.0 * sin(17.0 * k);
+        if (motion == MOTION_SPIKE && (i + (size_t)k) % 37 == 0) x[i % 3] += 0.03;
         for (size_t c = 0; c < 3; c++) position_m[3 * i + c] = (float)x[c];
     }
 }

@@ -86,7 +86,7 @@ static void error_stays_within_its_bound_in_every_frame(void)
 
 static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
 {
-    static const double most[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0};
+    static const double most[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0, 0};
     rig r;
     REQUIRE(rig_create(&r, 70));
     pal_frame_given given = given_of(&r, 5e-5);

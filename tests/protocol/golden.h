@@ -1,0 +1,194 @@
+/* The contents of the golden packets, shared by the program that writes them and the test that reads them. Values are
+ * chosen so that a swapped, shifted or narrowed field shows: all different, negative, beyond 32 bits, not exact in
+ * binary. */
+#ifndef TESTS_PROTOCOL_GOLDEN_H
+#define TESTS_PROTOCOL_GOLDEN_H
+#include "protocol/control.h"
+#include "protocol/wire.h"
+#include "tests/protocol/shapes.h"
+
+#include <stdio.h>
+
+static const struct {
+    const char *name;
+    shape_motion motion;
+    bool affine;
+    double error_m;
+} golden_motion[] = {
+    {"rest", MOTION_REST, false, 5e-5},         {"bend", MOTION_BEND, false, 5e-5},
+    {"storm", MOTION_STORM, false, 1e-6},       {"spike", MOTION_SPIKE, false, 5e-5}, /* escape codes */
+    {"teleport", MOTION_TELEPORT, false, 5e-5},                                       /* q raised by the encoder */
+    {"affine", MOTION_BEND, true, 5e-5},
+};
+enum { GOLDEN_FRAMES = sizeof golden_motion / sizeof *golden_motion };
+
+static inline pal_wire_pose golden_pose(void)
+{
+    return (pal_wire_pose){.tool = 3,
+                           .seq = 4000000001u,
+                           .flags = PAL_WIRE_POSE_CONTACT | PAL_WIRE_POSE_POSE_ONLY | PAL_WIRE_POSE_AWAY,
+                           .stamp_us = 1234567890123456,
+                           .position_m = {0.1, -0.2, 0.3},
+                           .quaternion = {0.5, -0.5, 0.5, 0.5},
+                           .velocity_m_s = {0.01f, -0.02f, 0.03f},
+                           .omega_rad_s = {1.5f, -2.25f, 3.125f},
+                           .force_N = {-1, 2, -3.3f},
+                           .torque_N_m = {0.001f, 0.002f, -0.004f},
+                           .grip = 0.77f,
+                           .buttons = PAL_WIRE_GRAB,
+                           .model_seq = 99,
+                           .model_age_us = 16667,
+                           .model_stamp_us = 9007199254740991};
+}
+
+static inline pal_wire_ack golden_ack(void)
+{
+    return (pal_wire_ack){3000000007u, 1250};
+}
+
+static inline pal_wire_tools golden_tools(void)
+{
+    pal_wire_tools t = {.cycle = 4100000000u, .n_tool = 3, .sim_time_us = 86400000001};
+    for (uint32_t i = 0; i < t.n_tool; i++) {
+        float k = (float)(i + 1);
+        t.tool[i] = (pal_wire_tool){.holder = (uint16_t)(i * 7),
+                                    .flags = (uint16_t)(i * 9 % 32),
+                                    .colour = 0x10FF80u + i,
+                                    .radius_m = 0.005f * k,
+                                    .position_m = {0.1f * k, -0.2f * k, 0.3f},
+                                    .quaternion = {1, 0.1f, 0.2f * k, -0.3f},
+                                    .force_N = {-1.5f * k, 2.25f, 1e-7f},
+                                    .echo_seq = 17 + i,
+                                    .hold_us = 1900 + i,
+                                    .echo_stamp_us = 5000000000 + i};
+    }
+    return t;
+}
+
+static inline pal_wire_haptic golden_haptic(void)
+{
+    pal_wire_haptic h = {.tool = 2,
+                         .seq = 77,
+                         .flags = PAL_WIRE_HAPTIC_FREEZE | PAL_WIRE_HAPTIC_TOPOLOGY_CHANGED,
+                         .stamp_us = 6000000000,
+                         .echo_stamp_us = 7000000000,
+                         .echo_seq = 123,
+                         .hold_us = 456,
+                         .frame_us = 16667,
+                         .n_patch = 2,
+                         .origin_m = {0.123456789012345, -1e-9, 2},
+                         .f_ref_N = {0.5f, -0.25f, 3},
+                         .has_grip = 1,
+                         .grip_x0_m = {0.01f, 0.02f, 0.03f},
+                         .grip_f0_N = {1, 2, 3},
+                         .grip_k_N_m = {100, 1, 2, 110, 3, 120},
+                         .grip_b_N_s_m = 1.5f};
+    for (uint32_t i = 0; i < h.n_patch; i++) {
+        float k = (float)(i + 1);
+        h.patch[i] = (pal_wire_patch){.id = (uint16_t)(1000 + i),
+                                      .group = (uint16_t)(65535 - i),
+                                      .p_m = {0.001f * k, 0.002f, -0.003f},
+                                      .n = {0, 0.6f, 0.8f},
+                                      .v_m_s = {-0.01f, 0.02f * k, 0.03f},
+                                      .k1_N_m = 300 * k,
+                                      .k2_N_m2 = 5000,
+                                      .b_N_s_m = 2.5f,
+                                      .kt_N_m = 150,
+                                      .mu_s = 0.4f,
+                                      .mu_d = 0.3f,
+                                      .radius_m = 0.02f};
+    }
+    return h;
+}
+
+static inline void golden_parts(pal_wire_part_info *part, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        snprintf(part[i].name, sizeof part[i].name, "liver \"%u\"", i);
+        snprintf(part[i].asset, sizeof part[i].asset, "/asset/%032x", i + 11);
+        part[i].epoch = 4000000000u + i;
+        part[i].n_vertex = 25000 + i;
+        part[i].n_triangle = 49996 + i;
+        part[i].error_m = 5e-5;
+    }
+}
+
+static inline void golden_hello(pal_wire_hello *h)
+{
+    *h = (pal_wire_hello){.version = PAL_PROTOCOL_VERSION,
+                          .session = "main",
+                          .title = "Liver",
+                          .organ = "liver, abdominal CT \xC3\xA9\xE2\x82\xAC\xF0\x9F\xAB\x80 back\\slash",
+                          .step_rate_hz = 500,
+                          .frame_rate_hz = 60,
+                          .credit = 3,
+                          .box_min_m = {-0.1, -0.2, -0.3},
+                          .box_max_m = {0.1, 0.2, 1.0 / 3},
+                          .n_part = 2,
+                          .n_tool = 1,
+                          .n_row = 3,
+                          .tool = {{"probe", 0.01}},
+                          .row = {"gravity", "edge_distance", "verlet"},
+                          .you_id = 7,
+                          .you_role = PAL_WIRE_ROLE_TRAINEE,
+                          .you_name = "Ada",
+                          .you_tool = PAL_WIRE_TOOL_NONE};
+    golden_parts(h->part, 2);
+}
+
+static inline void golden_control(pal_control_type type, pal_control *c)
+{
+    memset(c, 0, sizeof *c);
+    c->type = type;
+    switch (type) {
+    case PAL_CONTROL_HELLO:
+        golden_hello(&c->hello);
+        break;
+    case PAL_CONTROL_TOPOLOGY:
+        c->topology.n_part = 1;
+        golden_parts(c->topology.part, 1);
+        break;
+    case PAL_CONTROL_STATUS:
+        c->status = (pal_wire_status){.tick = 9007199254740991,
+                                      .sim_time_s = 12.345,
+                                      .paused = true,
+                                      .step_rate_hz = 499.9,
+                                      .slowdown = 1.25,
+                                      .substeps = 3,
+                                      .step_ms = 0.41,
+                                      .n_row = 3,
+                                      .row_ms = {0.001, 1.0 / 3, 0.03},
+                                      .n_member = 2,
+                                      .bytes_s = 312000,
+                                      .rtt_ms = 0.4,
+                                      .n_skipped = 5,
+                                      .n_late = 6,
+                                      .n_refused = 7,
+                                      .note = "slower than real time"};
+        break;
+    case PAL_CONTROL_MEMBERS:
+        c->members.n_member = 2;
+        c->members.member[0] = (pal_wire_member){1, PAL_WIRE_ROLE_INSTRUCTOR, 0, 0xFF8000, "Ada"};
+        c->members.member[1] = (pal_wire_member){65535, PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, 0x0080FF, "Bo"};
+        break;
+    case PAL_CONTROL_ERROR:
+        c->problem = (pal_wire_problem){"tool_taken", "tool 0 is held by Ada"};
+        break;
+    case PAL_CONTROL_JOIN:
+        c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY};
+        break;
+    case PAL_CONTROL_COMMAND:
+        c->order = (pal_wire_order){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
+        break;
+    case PAL_CONTROL_TAKE:
+        c->tool = 2;
+        break;
+    case PAL_CONTROL_PING:
+    case PAL_CONTROL_PONG:
+        c->stamp_ms = 1234.5678901;
+        break;
+    default:
+        break;
+    }
+}
+#endif
