@@ -1,0 +1,272 @@
+/* A tool holds tissue: a damped spring between the tool and the patch of tissue it closed on.
+ *
+ * When the grab button goes down, the shown vertices within `reach` of the tool are taken with weights (1 - d^2/R^2)^2,
+ * or the nearest one alone when it lies within 1.5 reach; through the skin that gives node weights W_i, sum 1, and the
+ * patch's place y = sum W_i x_i. With o = y - tool at that moment (turned with the tool's quaternion afterwards),
+ *     F = k (tool + o - y) - c v_rel,   node i gets W_i F, the tool gets -F,
+ * so nothing jumps when the grab begins, and force and torque balance about y. k and c are kept below the explicit
+ * limits alpha m_i / dt^2 and beta m_i / dt of every free node, m_i being shared by the tools that hold it. F is
+ * shortened to what the tool's cap and the nodes' load_cap_N leave. The patch is let go when the button goes up or the
+ * tool's ramp has fallen to 0.
+ *
+ * For a haptic bridge the tool's bilateral part is published as f0 - K (x - x0) - b v, K = k_s 1: k_s starts as this
+ * spring in series with the tissue under the patch, 2 E R / (1 - nu^2), and follows least squares on the tool's moves
+ * (haptics.md 2.3 steps 3 and 6).
+ *
+ * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
+#include "server/base/vec3.h"
+#include "server/sim/effect.h"
+#include "server/sim/patch.h"
+#include "server/sim/touch.h"
+
+#include <math.h>
+#include <string.h>
+
+#define ALPHA        0.25
+#define BETA         0.25
+#define FORGET       0.9
+#define LEAST_MOVE_M 0.05e-3
+#define LEAST_K_N_M  10.0
+
+typedef struct grip {
+    bool held, button; /* has tissue; button in the last step                              */
+    int n_node;
+    int32_t *node;                  /* [n_node]                                                         */
+    double *weight;                 /* sum 1 [n_node]                                                   */
+    double offset[3];               /* patch minus tool in the tool's axes at quaternion 1              */
+    double k_most_N_m, c_most_Ns_m; /* explicit limits in this sub-step                    */
+    double force[3];                /* on the tool, this sub-step                                       */
+    /* felt stiffness */
+    double last_m[3], last_N[3], xx, xf, k_start_N_m, k_felt_N_m;
+} grip;
+
+typedef struct tool_grab {
+    int n_tool;
+    grip grip[PAL_TOOL_MAX];
+    double *sum_weight; /* of all tools that hold a node [n_node] */
+    double *gather;     /* weights of a new grab [n_node], 0 between grabs */
+    double asked_N_m, damping_s, asked_reach_m;
+    double young_Pa, poisson;
+} tool_grab;
+
+static double reach_m(const tool_grab *grab, const pal_tool *tool)
+{
+    return grab->asked_reach_m > 0 ? grab->asked_reach_m : 2 * tool->radius_m;
+}
+
+static double stiffness_N_m(const tool_grab *grab, double reach)
+{
+    return grab->asked_N_m > 0 ? grab->asked_N_m : 16 * grab->young_Pa * reach;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
+{
+    tool_grab *grab = self;
+    (void)body, (void)note;
+    grab->young_Pa = mat->young_Pa;
+    grab->poisson = fmin(mat->poisson, 0.4999);
+    return PAL_ERR_OK;
+}
+
+static void let_go(tool_grab *grab, grip *g)
+{
+    for (int i = 0; i < g->n_node; i++) grab->sum_weight[g->node[i]] -= g->weight[i];
+    g->n_node = 0;
+    g->held = false;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    tool_grab *grab = self;
+    for (int t = 0; t < grab->n_tool; t++) {
+        grab->grip[t].held = grab->grip[t].button = false;
+        grab->grip[t].n_node = 0;
+    }
+    memset(grab->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    tool_grab *grab = PAL_NEW(build->arena, tool_grab, 1);
+    if (!grab) return PAL_ERR_MEMORY;
+    grab->damping_s = 0.01;
+    PAL_TRY(pal_item_number(item, "stiffness_N_m", 0, 1e9, &grab->asked_N_m, build->note));
+    PAL_TRY(pal_item_number(item, "damping_s", 0, 10, &grab->damping_s, build->note));
+    PAL_TRY(pal_item_number(item, "reach_m", 0, 10, &grab->asked_reach_m, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    if (build->body->n_shown == 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: tool_grab needs a body that shows something",
+                            item->path);
+    size_t n_node = (size_t)build->body->n_node;
+    grab->n_tool = build->scene->n_tool;
+    grab->sum_weight = PAL_NEW(build->arena, double, n_node);
+    grab->gather = PAL_NEW(build->arena, double, n_node);
+    if (!grab->sum_weight || !grab->gather) return PAL_ERR_MEMORY;
+    for (int t = 0; t < grab->n_tool; t++) {
+        grab->grip[t].node = PAL_NEW(build->arena, int32_t, n_node);
+        grab->grip[t].weight = PAL_NEW(build->arena, double, n_node);
+        if (!grab->grip[t].node || !grab->grip[t].weight) return PAL_ERR_MEMORY;
+    }
+    material(grab, build->body, &build->def->material, NULL);
+    *self = grab;
+    return PAL_ERR_OK;
+}
+
+static void add_vertex(tool_grab *grab, const pal_body *body, int vertex, double share)
+{
+    int32_t node[PAL_SKIN_NEAR];
+    double weight[PAL_SKIN_NEAR];
+    int n = pal_touch_nodes(body, vertex, node, weight);
+    for (int k = 0; k < n; k++) grab->gather[node[k]] += share * weight[k];
+}
+
+/* node weights of what lies within reach of p (body frame), left in gather; false: nothing there */
+static bool close_on(tool_grab *grab, const pal_body *body, const double p[3], double reach)
+{
+    double nearest2 = 2.25 * reach * reach, sum = 0;
+    int nearest = -1;
+    for (int i = 0; i < body->n_shown; i++) {
+        const float *s = body->shown + 3 * (size_t)i;
+        double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
+        double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
+        if (d2 <= nearest2) nearest2 = d2, nearest = i;
+        if (!(fall > 0)) continue;
+        add_vertex(grab, body, i, fall * fall);
+        sum += fall * fall;
+    }
+    if (nearest < 0) return false;
+    if (sum == 0) add_vertex(grab, body, nearest, 1);
+    return true;
+}
+
+/* y and its velocity */
+static void patch_place(const grip *g, const pal_body *body, double y[3], double v[3])
+{
+    pal_set3(y, 0, 0, 0);
+    pal_set3(v, 0, 0, 0);
+    for (int i = 0; i < g->n_node; i++) {
+        pal_axpy3(y, g->weight[i], body->d + 3 * (size_t)g->node[i]);
+        pal_axpy3(v, g->weight[i], body->dv + 3 * (size_t)g->node[i]);
+    }
+}
+
+static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body)
+{
+    double last[3], y[3], v[3], reach = reach_m(grab, tool), sum = 0;
+    pal_sub3(last, tool->last.position_m, body->offset_m);
+    if (!close_on(grab, body, last, reach)) return;
+    g->n_node = 0;
+    for (int i = 0; i < body->n_node; i++) {
+        if (grab->gather[i] == 0) continue;
+        g->node[g->n_node] = i;
+        sum += g->weight[g->n_node++] = grab->gather[i];
+        grab->gather[i] = 0;
+    }
+    for (int i = 0; i < g->n_node; i++) {
+        g->weight[i] /= sum;
+        grab->sum_weight[g->node[i]] += g->weight[i];
+    }
+    patch_place(g, body, y, v);
+    double back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
+    pal_sub3(g->offset, y, last);
+    pal_quat_rotate(g->offset, back, g->offset);
+    g->held = true;
+    double k = stiffness_N_m(grab, reach), tissue = 2 * grab->young_Pa * reach / (1 - grab->poisson * grab->poisson);
+    g->k_start_N_m = g->k_felt_N_m = fmax(LEAST_K_N_M, k * tissue / (k + tissue));
+    g->xx = g->xf = 0;
+    pal_copy3(g->last_m, tool->last.position_m);
+    pal_set3(g->last_N, 0, 0, 0);
+}
+
+/* once a step: the button's edges */
+static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body)
+{
+    bool pressed = tool->grab && !g->button;
+    g->button = tool->grab;
+    /* a tool that is gone holds on while its ramp falls, so that its force fades */
+    if (g->held && ((tool->present && !tool->grab) || tool->ramp <= 0)) let_go(grab, g);
+    if (pressed && !g->held) take_hold(grab, g, tool, body);
+}
+
+static void find_limits(const tool_grab *grab, grip *g, const pal_body *body, double dt_s)
+{
+    double least = INFINITY;
+    for (int i = 0; i < g->n_node; i++)
+        if (!body->held[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grab->sum_weight[g->node[i]]);
+    g->k_most_N_m = ALPHA * least / (dt_s * dt_s);
+    g->c_most_Ns_m = BETA * least / dt_s;
+}
+
+static double spring_N_m(const tool_grab *grab, const grip *g, const pal_tool *tool)
+{
+    return fmin(stiffness_N_m(grab, reach_m(grab, tool)), g->k_most_N_m);
+}
+
+static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
+{
+    pal_body *body = step->body;
+    double y[3], v[3], goal[3], force[3];
+    find_limits(grab, g, body, step->dt_s);
+    patch_place(g, body, y, v);
+    pal_quat_rotate(goal, tool->next.quat, g->offset);
+    pal_add3(goal, goal, tool->here_m);
+    pal_sub3(goal, goal, body->offset_m);
+    double k = spring_N_m(grab, g, tool), c = fmin(k * grab->damping_s, g->c_most_Ns_m);
+    for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
+    pal_set3(g->force, 0, 0, 0);
+    if (!pal_finite3(force)) return;
+    double most = 0;
+    for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
+    double size = most * pal_norm3(force), room = 1;
+    if (body->load_cap_N > 0 && size > body->load_cap_N) room = body->load_cap_N / size;
+    pal_scale3(g->force, -1, force);
+    room = fmin(room, pal_tool_room(tool, g->force));
+    pal_scale3(g->force, room, g->force);
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(body->load + 3 * (size_t)g->node[i], -g->weight[i], g->force);
+    pal_add3(tool->force_N, tool->force_N, g->force);
+    tool->holding = true;
+}
+
+/* the bilateral part for a haptic bridge, in the last sub-step */
+static void publish(const tool_grab *grab, grip *g, pal_tool *tool)
+{
+    double move[3], change[3], k = spring_N_m(grab, g, tool);
+    pal_sub3(move, tool->here_m, g->last_m);
+    pal_sub3(change, g->force, g->last_N);
+    double way2 = pal_dot3(move, move);
+    if (way2 > LEAST_MOVE_M * LEAST_MOVE_M) {
+        double prior2 = 1e-4 * tool->radius_m * tool->radius_m;
+        g->xx = FORGET * g->xx + way2;
+        g->xf = FORGET * g->xf - pal_dot3(move, change);
+        g->k_felt_N_m = (g->xf + prior2 * g->k_start_N_m) / (g->xx + prior2);
+        pal_copy3(g->last_m, tool->here_m);
+        pal_copy3(g->last_N, g->force);
+    }
+    g->k_felt_N_m = fmin(fmax(g->k_felt_N_m, LEAST_K_N_M), fmax(k, LEAST_K_N_M));
+    tool->has_grip = true;
+    for (int c = 0; c < 3; c++) {
+        tool->grip_x0_m[c] = tool->here_m[c];
+        tool->grip_f0_N[c] = g->force[c];
+        tool->grip_k_N_m[c] = tool->grip_k_N_m[c + 3] = 0;
+    }
+    tool->grip_k_N_m[0] = tool->grip_k_N_m[3] = tool->grip_k_N_m[5] = g->k_felt_N_m;
+    tool->grip_b_Ns_m = fmin(k * grab->damping_s, g->c_most_Ns_m) * g->k_felt_N_m / fmax(k, LEAST_K_N_M);
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    tool_grab *grab = self;
+    pal_tools *tools = step->tools;
+    int n_tool = tools->n_tool < grab->n_tool ? tools->n_tool : grab->n_tool;
+    for (int t = 0; t < n_tool; t++) {
+        grip *g = &grab->grip[t];
+        if (step->sub == 0) begin_tool(grab, g, &tools->tool[t], step->body);
+        if (!g->held || step->body->frozen) continue;
+        pull(grab, g, &tools->tool[t], step);
+        if (step->sub == step->n_sub - 1) publish(grab, g, &tools->tool[t]);
+    }
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_tool_grab = {
+    .name = "tool_grab", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .material = material, .reset = reset};

@@ -1,0 +1,391 @@
+/* A sphere presses tissue: penalty contact between each tool and the shown surface, in every sub-step.
+ *
+ * The surface that is touched is the one that is seen (skinned), not the staircase of voxels below it (sim/touch.h).
+ * A proxy of the tool stays on the side it came from (sim/proxy.h). A contact point within the proxy's sphere, at depth
+ * d, is pushed straight away from the proxy's centre with
+ *     f = k (d - dt v_away),   k = stiffness_Pa_m * area,
+ * v_away being the tissue's own speed away from the proxy: stiffness and damping k dt, as a linearly implicit spring
+ * would have them. Row sums at every free node stay below alpha m / dt^2 (alpha 0.5): together with the solver's own
+ * limit, dt^2 K <= m, symplectic steps stay stable (a + 2 b < 4 with a <= 1.5, b <= 0.5). The sum of all forces is
+ * shortened to the tool's cap, and in its first and last 10 steps by its ramp. The opposite force acts on the tool.
+ *
+ * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
+ * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
+ *
+ * Keys: stiffness_Pa_m (0: 20 E / radius), friction (Coulomb, 0), clamp_S (0.02: penetration correction a step, in box
+ * diagonals), near_m (0: the larger of a radius and 10 mm; within it a patch is published), slip_S (0.25), slip_s
+ * (0.5). */
+#include "server/base/vec3.h"
+#include "server/sim/effect.h"
+#include "server/sim/patch.h"
+#include "server/sim/proxy.h"
+#include "server/sim/touch.h"
+
+#include <math.h>
+#include <string.h>
+
+#define ALPHA         0.5
+#define DEEPEST_RADII 0.5
+#define BLOB_COSINE   0.5
+enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10 };
+
+typedef struct contact {
+    int32_t point;
+    double x[3], away[3]; /* its place; unit, from proxy to point */
+    double depth_m, k_N_m;
+    double force[3]; /* on the point */
+} contact;
+
+/* one tool as this body feels it */
+typedef struct holder {
+    bool active; /* the proxy is somewhere */
+    pal_proxy proxy;
+    double ease;     /* 0..1: rises after the proxy was seated */
+    double behind_s; /* for how long it has been far behind    */
+    int32_t *list;   /* contact points near in this step [n_point] */
+    int n_list;
+    double nearest_m; /* from the tool's way to the nearest point at the start of the step */
+    pal_proxy_limits limits;
+    contact *contact; /* [CONTACT_MAX] */
+    int n_contact;
+    double total[3]; /* on the tool, this sub-step, this body */
+    pal_patches patches;
+} holder;
+
+typedef struct tool_push {
+    pal_touch touch;
+    int n_tool, body_index;
+    holder holder[PAL_TOOL_MAX];
+    double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s;
+    double young_Pa, poisson, damping_1_s, density_kg_m3;
+} tool_push;
+
+static void take_material(tool_push *push, const pal_material *material)
+{
+    push->young_Pa = material->young_Pa;
+    push->poisson = fmin(material->poisson, 0.4999);
+    push->damping_1_s = material->damping_1_s;
+    push->density_kg_m3 = material->density_kg_m3;
+}
+
+static double stiffness_Pa_m(const tool_push *push, double radius_m)
+{
+    return push->asked_Pa_m > 0 ? push->asked_Pa_m : 20 * push->young_Pa / radius_m;
+}
+
+static double near_m(const tool_push *push, double radius_m)
+{
+    return push->asked_near_m > 0 ? push->asked_near_m : fmax(radius_m, 0.010);
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
+{
+    (void)body, (void)note;
+    take_material(self, mat);
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    tool_push *push = self;
+    (void)body;
+    for (int t = 0; t < push->n_tool; t++) {
+        push->holder[t].active = false;
+        pal_patches_reset(&push->holder[t].patches, push->body_index * 1024);
+    }
+}
+
+static pal_err read_keys(tool_push *push, pal_item *item, pal_note *note)
+{
+    push->clamp_S = 0.02, push->slip_S = 0.25, push->slip_s = 0.5;
+    PAL_TRY(pal_item_number(item, "stiffness_Pa_m", 0, 1e15, &push->asked_Pa_m, note));
+    PAL_TRY(pal_item_number(item, "friction", 0, 2, &push->friction, note));
+    PAL_TRY(pal_item_number(item, "clamp_S", 1e-4, 0.1, &push->clamp_S, note));
+    PAL_TRY(pal_item_number(item, "near_m", 0, 1, &push->asked_near_m, note));
+    PAL_TRY(pal_item_number(item, "slip_S", 0.05, 100, &push->slip_S, note));
+    PAL_TRY(pal_item_number(item, "slip_s", 0, 1e9, &push->slip_s, note));
+    return pal_item_done(item, note);
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    const pal_scene *scene = build->scene;
+    tool_push *push = PAL_NEW(build->arena, tool_push, 1);
+    if (!push) return PAL_ERR_MEMORY;
+    PAL_TRY(read_keys(push, item, build->note));
+    if (build->body->n_shown == 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: tool_push needs a body that shows something",
+                            item->path);
+    take_material(push, &build->def->material);
+    push->n_tool = scene->n_tool;
+    push->body_index = (int)(build->def - scene->body);
+    double low[3], high[3], least_m = INFINITY;
+    pal_surface_box(&scene->body[0].mesh->surface, low, high);
+    for (int t = 0; t < scene->n_tool; t++) {
+        double radius = scene->tool[t].radius_m;
+        least_m = fmin(least_m, radius > 0 ? radius : 0.04 * pal_dist3(low, high));
+    }
+    if (!(least_m > 0 && isfinite(least_m))) least_m = 0.04 * build->body->size_m;
+    /* the proxy keeps half a radius away from every point: points half a radius apart leave no hole for it */
+    PAL_TRY(pal_touch_make(build->body, DEEPEST_RADII * least_m, SAMPLE_MAX, build->arena, &push->touch));
+    size_t n_point = (size_t)push->touch.n_point;
+    for (int t = 0; t < push->n_tool; t++) {
+        push->holder[t].list = PAL_NEW(build->arena, int32_t, n_point);
+        push->holder[t].contact = PAL_NEW(build->arena, contact, CONTACT_MAX);
+        if (!push->holder[t].list || !push->holder[t].contact) return PAL_ERR_MEMORY;
+    }
+    /* positions and allowed distances of one tool's points */
+    size_t scratch = n_point * 4 * sizeof(double) + 256;
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    reset(push, build->body);
+    *self = push;
+    return PAL_ERR_OK;
+}
+
+/* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
+static void seat(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
+{
+    int vertex;
+    double normal[3];
+    memset(&h->proxy, 0, sizeof h->proxy);
+    pal_copy3(h->proxy.x, at);
+    h->active = true;
+    h->behind_s = 0;
+    if (!pal_touch_nearest(&push->touch, body, at, &vertex, normal)) return;
+    double p[3], out[3];
+    for (int c = 0; c < 3; c++) p[c] = (double)body->shown[3 * (size_t)vertex + (size_t)c];
+    pal_sub3(out, at, p);
+    if (pal_dot3(out, normal) > 0) {
+        if (pal_norm3(out) >= DEEPEST_RADII * radius_m) return;
+        pal_unit3(normal, out, 0);
+    }
+    pal_copy3(h->proxy.normal, normal);
+    for (int c = 0; c < 3; c++) h->proxy.x[c] = p[c] + radius_m * normal[c];
+}
+
+/* once a step: is the proxy there, and which points can it meet */
+static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
+{
+    pal_body *body = step->body;
+    double next[3], step_s = step->dt_s * step->n_sub;
+    h->n_list = 0;
+    h->nearest_m = INFINITY;
+    if (!tool->present && tool->ramp <= 0) {
+        h->active = false;
+        pal_patches_reset(&h->patches, push->body_index * 1024);
+        return;
+    }
+    pal_sub3(next, tool->next.position_m, body->offset_m);
+    double behind = h->active ? pal_dist3(h->proxy.x, next) : 0;
+    h->behind_s = behind > push->slip_S * body->size_m ? h->behind_s + step_s : 0;
+    if (!h->active) {
+        double last[3];
+        pal_sub3(last, tool->last.position_m, body->offset_m);
+        seat(push, h, body, last, tool->radius_m);
+        h->ease = 1;
+    } else if (h->behind_s > push->slip_s) {
+        seat(push, h, body, next, tool->radius_m);
+        h->ease = 0;
+    }
+    h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
+    double reach = tool->radius_m + near_m(push, tool->radius_m);
+    pal_copy3(h->limits.a, h->proxy.x);
+    pal_copy3(h->limits.b, next);
+    h->limits.radius_m = tool->radius_m;
+    h->limits.deepest_m = DEEPEST_RADII * tool->radius_m;
+    h->limits.slack_m = 0.5 * (reach - tool->radius_m);
+    h->n_list = pal_touch_collect(&push->touch, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
+}
+
+/* contacts of the proxy where it now is; x [n_list][3] are the points */
+static void find_contacts(const tool_push *push, holder *h, const double *x)
+{
+    double radius = h->limits.radius_m, k_area = stiffness_Pa_m(push, radius);
+    h->n_contact = 0;
+    for (int i = 0; i < h->n_list && h->n_contact < CONTACT_MAX; i++) {
+        double w[3];
+        pal_sub3(w, x + 3 * i, h->proxy.x);
+        double d2 = pal_dot3(w, w);
+        if (!(d2 < radius * radius) || push->touch.area_m2[h->list[i]] <= 0) continue;
+        contact *c = &h->contact[h->n_contact++];
+        double distance = sqrt(d2);
+        c->point = h->list[i];
+        pal_copy3(c->x, x + 3 * i);
+        if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
+        c->depth_m = fmin(radius - distance, h->limits.deepest_m);
+        c->k_N_m = k_area * push->touch.area_m2[c->point];
+    }
+}
+
+/* proxy and contacts of one tool in this sub-step */
+static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
+{
+    h->n_contact = 0;
+    pal_set3(h->total, 0, 0, 0);
+    if (!h->active) return;
+    double here[3];
+    pal_sub3(here, tool->here_m, step->body->offset_m);
+    h->limits.rise_m = push->clamp_S * step->body->size_m / step->n_sub;
+    size_t used = pal_arena_used(step->scratch);
+    double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
+           *core = PAL_NEW(step->scratch, double, h->n_list);
+    if (x && core) {
+        for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
+        pal_proxy_move(&h->proxy, here, x, h->n_list, &h->limits, step->dt_s, core);
+        find_contacts(push, h, x);
+    }
+    pal_arena_return(step->scratch, used);
+}
+
+/* force on one contact point: penalty with damping, and Coulomb friction with a viscous core */
+static void contact_force(const tool_push *push, const holder *h, contact *c, double k, double dt_s)
+{
+    double v[3];
+    pal_touch_velocity(&push->touch, c->point, v);
+    double away = pal_dot3(v, c->away), f = k * (c->depth_m - dt_s * away);
+    pal_set3(c->force, 0, 0, 0);
+    if (!(f > 0)) return;
+    pal_scale3(c->force, f, c->away);
+    if (push->friction <= 0) return;
+    double slide[3];
+    pal_sub3(slide, v, h->proxy.v);
+    pal_axpy3(slide, -pal_dot3(slide, c->away), c->away);
+    double speed = pal_norm3(slide);
+    if (speed > 0) pal_axpy3(c->force, -fmin(k * dt_s, push->friction * f / speed), slide);
+}
+
+/* forces of one tool to the nodes and back */
+static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
+{
+    pal_body *body = step->body;
+    double alpha = ALPHA / (step->dt_s * step->dt_s), soft = tool->ramp * h->ease, sum[3] = {0}, torque[3] = {0};
+    if (h->n_contact == 0 || soft <= 0) return;
+    pal_touch_force_begin(&push->touch);
+    for (int i = 0; i < h->n_contact; i++) {
+        contact *c = &h->contact[i];
+        double k = soft * c->k_N_m * pal_touch_row_scale(&push->touch, body, c->point, alpha), moment[3];
+        contact_force(push, h, c, k, step->dt_s);
+        pal_touch_push(&push->touch, body, c->point, c->force);
+        pal_add3(sum, sum, c->force);
+        pal_cross3(moment, c->x, c->force);
+        pal_add3(torque, torque, moment);
+    }
+    if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
+    pal_scale3(h->total, -1, sum);
+    double room = fmin(pal_tool_room(tool, h->total), pal_touch_balance(&push->touch, body, torque));
+    pal_touch_apply(&push->touch, body, room);
+    pal_scale3(h->total, room, h->total);
+    for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
+    pal_add3(tool->force_N, tool->force_N, h->total);
+    tool->touching = true;
+    /* the side the tool is on, slowly */
+    double side[3];
+    if (pal_unit3(side, h->total, 0)) {
+        pal_axpy3(side, 4, h->proxy.normal);
+        pal_unit3(h->proxy.normal, side, 1e-9);
+    }
+}
+
+/* the strongest contacts not yet grouped, within 60 degrees of their mean */
+static bool contact_blob(const holder *h, uint8_t *grouped, pal_blob *blob)
+{
+    double axis[3], sum[3];
+    int seed = -1;
+    double most = 0;
+    for (int i = 0; i < h->n_contact; i++) {
+        double f2 = pal_dot3(h->contact[i].force, h->contact[i].force);
+        if (!grouped[i] && f2 > most) most = f2, seed = i;
+    }
+    if (seed < 0) return false;
+    pal_copy3(axis, h->contact[seed].away);
+    for (int pass = 0; pass < 2; pass++) {
+        pal_set3(sum, 0, 0, 0);
+        for (int i = 0; i < h->n_contact; i++)
+            if (!grouped[i] && pal_dot3(h->contact[i].away, axis) >= BLOB_COSINE)
+                pal_add3(sum, sum, h->contact[i].force);
+        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
+    }
+    for (int i = 0; i < h->n_contact; i++)
+        if (pal_dot3(h->contact[i].away, axis) >= BLOB_COSINE) grouped[i] = 1;
+    grouped[seed] = 1;
+    blob->force_N = pal_norm3(sum);
+    blob->gap_m = 0;
+    pal_scale3(sum, -1, sum);
+    return pal_unit3(blob->normal, sum, 0);
+}
+
+/* the nearest tissue not in the direction of an earlier blob; directions of what is about as near are averaged */
+static bool near_blob(const holder *h, const double *x, const pal_blob *earlier, int n_earlier, pal_blob *blob)
+{
+    double radius = h->limits.radius_m, least = INFINITY, sum[3] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < h->n_list; i++) {
+            double out[3];
+            pal_sub3(out, h->proxy.x, x + 3 * i);
+            double distance = pal_norm3(out);
+            if (pass == 1 && distance > least + 0.2 * radius) continue;
+            if (!pal_unit3(out, out, 1e-9 * radius)) continue;
+            bool seen = false;
+            for (int b = 0; b < n_earlier && !seen; b++) seen = pal_dot3(out, earlier[b].normal) >= BLOB_COSINE;
+            if (seen) continue;
+            if (pass == 0)
+                least = fmin(least, distance);
+            else
+                pal_axpy3(sum, least + 0.2 * radius - distance, out);
+        }
+    if (!(least < INFINITY)) return false;
+    *blob = (pal_blob){.gap_m = fmax(0, least - radius)};
+    return pal_unit3(blob->normal, sum, 0);
+}
+
+/* what a haptic bridge needs to know, in the last sub-step */
+static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
+{
+    if (!h->active) return;
+    pal_blob blob[PAL_PATCH_MAX];
+    int n = 0;
+    size_t used = pal_arena_used(step->scratch);
+    double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list);
+    uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, h->n_contact);
+    if (x && grouped) {
+        while (n < PAL_PATCH_MAX && contact_blob(h, grouped, &blob[n])) n++;
+        for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
+        while (n < PAL_PATCH_MAX && near_blob(h, x, blob, n, &blob[n])) n++;
+    }
+    pal_arena_return(step->scratch, used);
+    double radius = tool->radius_m;
+    pal_patch_rules rules = {.radius_m = radius, .k_least_N_m = 10, .k_most_N_m = 5000, .friction = push->friction};
+    rules.k_start_N_m = 2 * push->young_Pa * radius / (1 - push->poisson * push->poisson);
+    rules.k_start_N_m = fmin(fmax(rules.k_start_N_m, rules.k_least_N_m), rules.k_most_N_m);
+    /* drag of the tissue that moves along, about 4 radii cubed */
+    rules.b_s = push->damping_1_s * 4 * push->density_kg_m3 * radius * radius * radius / rules.k_start_N_m;
+    pal_patches_update(&h->patches, &rules, blob, n, tool);
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    tool_push *push = self;
+    pal_tools *tools = step->tools;
+    int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
+    if (step->body->frozen) return PAL_ERR_OK;
+    if (step->sub == 0) {
+        pal_touch_begin(&push->touch);
+        for (int t = 0; t < n_tool; t++) begin_tool(push, &push->holder[t], &tools->tool[t], step);
+    }
+    if (push->touch.n_live > 0) pal_touch_update(&push->touch, step->body);
+    for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
+
+    /* every tool's stiffness counts before any force is given */
+    pal_touch_row_begin(&push->touch);
+    for (int t = 0; t < n_tool; t++)
+        for (int i = 0; i < push->holder[t].n_contact; i++)
+            pal_touch_row_add(&push->touch, step->body, push->holder[t].contact[i].point,
+                              push->holder[t].contact[i].k_N_m);
+    for (int t = 0; t < n_tool; t++) press(push, &push->holder[t], &tools->tool[t], step);
+    if (step->sub == step->n_sub - 1)
+        for (int t = 0; t < n_tool; t++) publish(push, &push->holder[t], &tools->tool[t], step);
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_tool_push = {
+    .name = "tool_push", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .material = material, .reset = reset};

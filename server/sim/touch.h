@@ -1,0 +1,74 @@
+/* What a tool can touch: contact points of a body's shown surface, followed in every sub-step.
+ *
+ * The points are all shown vertices and, where a triangle is longer than `spacing`, samples inside it, so that a sphere
+ * never slips through a coarse mesh. A step first collects the vertices near the tools from body->shown (the last
+ * OUTPUT); each sub-step then re-evaluates only those from the nodes. A force on a point goes to the nodes by its skin
+ * weights, normalised to sum 1 in double precision, so that the nodes bear exactly the force that the tool gives.
+ *
+ * A skinned point does not lie on the weighted mean of its nodes, so node forces alone would have another torque than
+ * the contact; pal_touch_apply adds the self-balanced rotation field w x (x_i - centre) that restores it.
+ * Memory: the world's arena. Thread: [sim], pal_touch_make [load]. */
+#ifndef PAL_SIM_TOUCH_H
+#define PAL_SIM_TOUCH_H
+#include "server/sim/body.h"
+#include "server/sim/tools.h"
+
+typedef struct pal_touch {
+    int n_vertex, n_point; /* points [0, n_vertex) are the shown vertices, the rest samples                 */
+    int32_t *corner;       /* shown vertices of each sample          [n_point - n_vertex][3]               */
+    float *share;          /* their shares, sum 1                    [n_point - n_vertex][3]               */
+    double *area_m2;       /* rest area that each point stands for   [n_point]                             */
+
+    /* this step's live part: vertices and frames near some tool */
+    int n_live, n_frame;
+    int32_t *live, *frame;                  /* [n_live] [n_frame]                                      */
+    uint32_t *live_mark, *frame_mark, mark; /* a vertex or frame is live when its mark is `mark`       */
+    double *x, *v;                          /* of live vertices, by vertex: m, m/s [n_vertex][3] each  */
+
+    /* forces on nodes, gathered for one tool at a time; row sums for all tools of a sub-step */
+    int n_node, n_row;
+    int32_t *node, *row_node; /* [n_node] [n_row]                */
+    uint32_t *node_mark, *row_mark, turn, row_turn;
+    double *force; /* N, by node                          [body n_node][3]        */
+    double *row;   /* sum of stiffness times weight, N/m  [body n_node]           */
+} pal_touch;
+
+/* points, at most most_sample samples (spacing grows to keep to it); body must show something; MEMORY, REFUSED */
+pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, pal_arena *arena, pal_touch *out);
+
+/* a new step: nothing is live */
+void pal_touch_begin(pal_touch *touch);
+/* adds the points of body->shown within reach_m of the segment a..b (body frame) to the live part and writes them to
+ * list [n_point], ascending; returns how many; *nearest_m is the least distance found (reach_m when none) */
+int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3], const double b[3], double reach_m,
+                      int32_t *list, double *nearest_m);
+/* positions and velocities of the live vertices at the body's current state; frames of a skin are brought up to date
+ * where live */
+void pal_touch_update(pal_touch *touch, const pal_body *body);
+void pal_touch_point(const pal_touch *touch, int point, double x[3]);
+void pal_touch_velocity(const pal_touch *touch, int point, double v[3]);
+
+/* the shown vertex nearest to p (all are looked at) and the unit normal of the shown surface there; false: none */
+bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], int *vertex, double normal[3]);
+
+/* explicit stability in a sub-step (numerics.md part 3): rows are summed over every point pressed, and a point's
+ * stiffness is scaled by the least over its free nodes of most / row, most = alpha m / dt^2 */
+void pal_touch_row_begin(pal_touch *touch);
+void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double stiffness_N_m);
+double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int point, double alpha_per_dt2);
+
+/* forces of one tool: begin, push every point, then apply scale times all of it to body->load. `force_N` and
+ * `torque_Nm` (about the body frame's origin) are what the points got in sum. */
+void pal_touch_force_begin(pal_touch *touch);
+void pal_touch_push(pal_touch *touch, const pal_body *body, int point, const double force_N[3]);
+/* corrects the torque, then returns the largest share of the gathered forces that keeps every node within
+ * body->load_cap_N (1 when there is no cap) */
+double pal_touch_balance(pal_touch *touch, const pal_body *body, const double torque_Nm[3]);
+void pal_touch_apply(const pal_touch *touch, pal_body *body, double scale);
+
+/* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */
+int pal_touch_nodes(const pal_body *body, int vertex, int32_t *node, double *weight);
+
+/* largest s in [0, 1] with |force so far on the tool + s force| <= the tool's cap at its present ramp */
+double pal_tool_room(const pal_tool *tool, const double force_N[3]);
+#endif
