@@ -1,0 +1,59 @@
+/* The back-end interface of the bridge, and at the same time the C ABI of a plug-in (haptics.md 1.5): a plug-in is a
+ * shared object that exports `const pal_haptic_v1 *pal_haptic_entry(void)`. Every back end implements this table.
+ *
+ * Units m, m/s, N, N m, s; axes of the device: x to the user, y right, z up; origin in the middle of its workspace.
+ * Results of functions: 0 ok, > 0 warning, < 0 error (text by strerror).
+ * Thread: probe, open, close, force_enable [load]; read and write [servo]; stop [any], async-safe. */
+#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_H
+#define PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_H
+#include <stddef.h>
+#include <stdint.h>
+
+#define PAL_HAPTIC_ABI 1
+
+enum { PAL_DEVICE_POLLED = 0, PAL_DEVICE_CALLBACK = 1, PAL_DEVICE_REQUEST_REPLY = 2 }; /* thread_model */
+enum { PAL_DEVICE_BUTTON_GRAB = 1, PAL_DEVICE_BUTTON_CLUTCH = 2, PAL_DEVICE_BUTTON_DEADMAN = 1 << 30 };
+
+typedef struct pal_dev_info {
+    uint32_t size; /* sizeof of the caller's struct */
+    char name[64];
+    double peak_N, continuous_N; /* force the device can give, and for ever          */
+    double stiffness_max_N_m;    /* largest contact stiffness it renders stably      */
+    double damping_max_Ns_m;
+    double low_m[3], high_m[3]; /* workspace                                         */
+    int32_t dof_in, dof_out;
+    int32_t pose_only; /* 1: no force                                       */
+    int32_t thread_model;
+} pal_dev_info;
+
+typedef struct pal_dev_state {
+    uint32_t size;
+    uint32_t buttons; /* PAL_DEVICE_BUTTON_*                                          */
+    double position_m[3];
+    double quat[4];           /* w x y z, handle to device                                    */
+    double grip;              /* opening, rad or m                                            */
+    uint64_t stamp_us;        /* device's time                                                */
+    double motor_temperature; /* fraction of the limit, 0 unknown                        */
+} pal_dev_state;
+
+typedef struct pal_haptic_v1 {
+    uint32_t abi, size;                /* PAL_HAPTIC_ABI, sizeof of this table */
+    const char *name;                  /* "virtual"                              */
+    int (*probe)(char *why, size_t n); /* how many devices are there, or < 0 and the reason in why */
+    int (*open)(void **handle, const char *id, pal_dev_info *out); /* id: what follows "name:" */
+    int (*read)(void *handle, pal_dev_state *state);
+    int (*write)(void *handle, const double force_N[3], const double torque_N_m[3], double grip);
+    int (*run)(void *handle, int (*tick)(void *), void *user); /* callback and request-reply devices, else NULL */
+    int (*force_enable)(void *handle, int on);
+    int (*stop)(void *handle); /* zero force and brake */
+    void (*close)(void *handle);
+    const char *(*strerror)(void *handle, int error);
+} pal_haptic_v1;
+
+typedef const pal_haptic_v1 *(*pal_haptic_entry_fn)(void);
+
+/* the back ends of this build, NULL beyond the last */
+const pal_haptic_v1 *pal_device_backend(int index);
+/* by name, n_name bytes of it; NULL: none */
+const pal_haptic_v1 *pal_device_find(const char *name, size_t n_name);
+#endif

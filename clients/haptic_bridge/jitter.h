@@ -1,0 +1,18 @@
+/* Log2 histogram of times with 8 steps per octave (9 % resolution), for period and lateness of a servo loop.
+ * Adding is a few instructions without branches on memory; one thread writes. Reading a copy: any thread. */
+#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_JITTER_H
+#define PAL_CLIENTS_HAPTIC_BRIDGE_JITTER_H
+#include <stdint.h>
+
+enum { PAL_JITTER_STEPS = 8, PAL_JITTER_BINS = 40 * PAL_JITTER_STEPS };
+
+typedef struct pal_jitter {
+    uint32_t bin[PAL_JITTER_BINS];
+    uint64_t n, max_ns;
+} pal_jitter;
+
+void pal_jitter_add(pal_jitter *j, uint64_t ns);
+void pal_jitter_merge(pal_jitter *into, const pal_jitter *from);
+/* upper edge of the bin that holds the fraction, us; at most the maximum; 0 when empty */
+double pal_jitter_at_us(const pal_jitter *j, double fraction);
+#endif

@@ -1,0 +1,116 @@
+/* One tick of the bridge (haptics.md 2.4 to 2.7): device pose in, local patch force out, states, limits.
+ *
+ * The servo owns no thread: servo_thread.h calls pal_servo_tick from a real-time loop, tests call it in virtual time.
+ * A tick takes no lock, calls no heap and does no input or output but the device's. Models come in and views go out by
+ * trio, events by ring; e-stop and re-arm are atomic flags.
+ *
+ * States: ARMING until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s, then force fades in
+ * over 1 s; FREE and CONTACT render; STALE when the newest model is older than max(100 ms, 4 frame times, twice the
+ * usual longest gap): force fades out over 500 ms under 3 N s/m damping, then FREE without a model (0.5 N s/m); a new
+ * model fades in over 250 ms. ESTOP and FAULT give no force until re-armed; e-stop is latched, a fault of speed, a
+ * number or a stalled loop re-arms by ARMING's conditions, a device that does not answer does not.
+ * Limits: |F| <= cap, may rise by cap / 10 ms and fall at once; rms of 1 s above the device's continuous rating scales
+ * force down; contact stiffness <= device's / (scale force_scale), 300 N/m without real time; walls of 200 N/m at 95 %
+ * of the workspace. World: x_w = origin + scale R (x_d - centre), F_d = force_scale R' F_w. While the clutch button is
+ * down the world pose stands still and force is faded out. */
+#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_SERVO_H
+#define PAL_CLIENTS_HAPTIC_BRIDGE_SERVO_H
+#include "clients/haptic_bridge/device.h"
+#include "protocol/wire.h"
+#include "server/base/err.h"
+
+#include <stdbool.h>
+
+typedef struct pal_servo pal_servo;
+
+typedef enum pal_servo_state {
+    PAL_SERVO_OFF,
+    PAL_SERVO_ARMING,
+    PAL_SERVO_FREE,
+    PAL_SERVO_CONTACT,
+    PAL_SERVO_STALE,
+    PAL_SERVO_FAULT,
+    PAL_SERVO_ESTOP
+} pal_servo_state;
+const char *pal_servo_state_name(pal_servo_state state);
+
+/* kinds of haptic_event_t */
+typedef enum pal_servo_event_kind {
+    PAL_EVENT_BUTTON_DOWN = 1,
+    PAL_EVENT_BUTTON_UP,
+    PAL_EVENT_CLUTCH,
+    PAL_EVENT_ESTOP,
+    PAL_EVENT_ESTOP_CLEAR,
+    PAL_EVENT_DEVICE_READY,
+    PAL_EVENT_DEVICE_LOST,
+    PAL_EVENT_FAULT,
+    PAL_EVENT_STALE,
+    PAL_EVENT_RECOVERED,
+    PAL_EVENT_LIMIT,
+    PAL_EVENT_RT_DEGRADED,
+    PAL_EVENT_WORKSPACE_EDGE
+} pal_servo_event_kind;
+typedef struct pal_servo_event {
+    int16_t kind, code;
+    float value;
+    const char *text; /* constant */
+} pal_servo_event;
+
+typedef struct pal_servo_options {
+    const pal_haptic_v1 *backend; /* borrowed                                                       */
+    void *device;                 /* opened, borrowed                                               */
+    pal_dev_info info;
+    double rate_hz;            /* nominal, 1000                                                 */
+    double force_cap_N;        /* 0: least of 3 N and the device's peak                         */
+    double origin_m[3];        /* world place of the workspace's centre                          */
+    double rotation[9];        /* device to world, row-major                                     */
+    double scale, force_scale; /* 0: 1                                                           */
+    bool pose_only;
+    bool hand_off; /* the hand looks off: damping floor 5 ms instead of 2.5 ms       */
+} pal_servo_options;
+
+/* copies. [load] */
+pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out);
+void pal_servo_destroy(pal_servo *servo); /* NULL is fine */
+
+/* [servo] one tick at this time; times must not go back */
+void pal_servo_tick(pal_servo *servo, uint64_t now_ns);
+/* [servo] real-time class, by the loop's own measurement: 0 good, 1 stiffness limited, 2 forces off */
+void pal_servo_set_degraded(pal_servo *servo, int level);
+/* [servo] zero force to the device, at the end */
+void pal_servo_end(pal_servo *servo);
+
+/* [net] newest model wins; generation changes with every new session (reconnect): older models are dropped.
+ * arrival_ns: pal_clock_ns when it came */
+void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
+/* [net] the server is gone or came back as another session: drop the model at once, fade */
+void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
+/* [net] moves the world place of the workspace's centre; taken while there is no force */
+void pal_servo_put_origin(pal_servo *servo, const double origin_m[3]);
+void pal_servo_estop(pal_servo *servo);   /* [any] async-signal-safe; takes effect within one tick */
+void pal_servo_rearm(pal_servo *servo);   /* [any] clears e-stop: ARMING follows                   */
+void pal_servo_stalled(pal_servo *servo); /* [any] the watchdog has stopped the device: ARMING follows */
+
+/* what others may know of a tick */
+typedef struct pal_servo_view {
+    uint64_t stamp_ns, n_tick;
+    pal_servo_state state;
+    double position_m[3], quat[4], velocity_m_s[3]; /* world */
+    double force_N[3];                              /* world, really commanded, on the hand */
+    double device_m[3];
+    double fade, grip;
+    uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRAB       */
+    uint32_t model_seq, model_age_us;
+    uint64_t model_stamp_us;
+    uint64_t n_model, n_model_old, n_bad_read, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
+    double force_rms_N, force_max_N, jump_max_N; /* jump: largest step at a model change */
+    double depth_m, motor_temperature;
+    double felt_N_m; /* tangent force over depth, 0 out of contact */
+} pal_servo_view;
+/* [net] newest unseen view or NULL; valid until the next call */
+const pal_servo_view *pal_servo_take_view(pal_servo *servo);
+/* [net] next event; false: none */
+bool pal_servo_take_event(pal_servo *servo, pal_servo_event *out);
+/* [any] grows with every tick, for the watchdog */
+uint64_t pal_servo_ticks(const pal_servo *servo);
+#endif

@@ -1,0 +1,191 @@
+#include "clients/haptic_bridge/servo_thread.h"
+#include "server/base/clock.h"
+#include "server/base/trio.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#define WATCHDOG_NS       20000000u
+#define WATCHDOG_STEP_NS  5000000u
+#define JUDGE_LEAST_TICKS 2000
+#define LIMIT_LATE_US     2000.0
+#define OFF_LATE_US       10000.0
+#define OFF_MISSED        0.01
+
+enum { FIFO_SERVO = 80, FIFO_WATCHDOG = 81, STACK_TOUCH_BYTES = 256 * 1024, JUDGE_SECONDS = 10 };
+
+struct pal_servo_thread {
+    pal_servo *servo;
+    pal_servo_options options;
+    pthread_t loop, watchdog;
+    atomic_bool stop;
+    atomic_uint n_watchdog;
+    atomic_int rt_flags;
+    uint64_t period_ns;
+    pal_trio timings;
+    pal_servo_timing slot[3], total;
+    /* lateness of each of the last seconds, for the judgement */
+    pal_jitter second[JUDGE_SECONDS];
+    uint64_t second_missed[JUDGE_SECONDS];
+    int now_second;
+};
+
+static void thread_touch_stack(void)
+{
+    volatile char block[STACK_TOUCH_BYTES];
+    for (size_t i = 0; i < sizeof block; i += 4096) block[i] = 0;
+}
+
+/* once a second: publishes the timing and decides what forces the loop may give */
+static void thread_judge(pal_servo_thread *t)
+{
+    static _Thread_local pal_jitter window;
+    memset(&window, 0, sizeof window);
+    uint64_t missed = 0;
+    for (int i = 0; i < JUDGE_SECONDS; i++) {
+        pal_jitter_merge(&window, &t->second[i]);
+        missed += t->second_missed[i];
+    }
+    int level = 0;
+    if (window.n + missed >= JUDGE_LEAST_TICKS) {
+        const double late = pal_jitter_at_us(&window, 0.999);
+        if (late > LIMIT_LATE_US) level = 1;
+        if (late > OFF_LATE_US || (double)missed > OFF_MISSED * (double)(window.n + missed)) level = 2;
+    }
+    pal_servo_set_degraded(t->servo, level);
+    t->total.rt_flags = atomic_load(&t->rt_flags) | (level == 1 ? PAL_RT_LIMITED : 0) | (level == 2 ? PAL_RT_OFF : 0);
+    t->total.n_watchdog = atomic_load(&t->n_watchdog);
+    pal_servo_timing *slot = pal_trio_slot(&t->timings);
+    *slot = t->total;
+    pal_trio_publish(&t->timings);
+    t->now_second = (t->now_second + 1) % JUDGE_SECONDS;
+    memset(&t->second[t->now_second], 0, sizeof t->second[0]);
+    t->second_missed[t->now_second] = 0;
+}
+
+static void *thread_loop(void *user)
+{
+    pal_servo_thread *t = user;
+    thread_touch_stack();
+    uint64_t due = pal_clock_ns() + t->period_ns, last = 0, judge = due + 1000000000;
+    while (!atomic_load_explicit(&t->stop, memory_order_relaxed)) {
+        pal_clock_sleep_until_ns(due);
+        const uint64_t now = pal_clock_ns(), late = now > due ? now - due : 0;
+        pal_servo_tick(t->servo, now);
+        pal_jitter_add(&t->total.lateness, late);
+        pal_jitter_add(&t->second[t->now_second], late);
+        if (last) pal_jitter_add(&t->total.period, now - last);
+        last = now;
+        t->total.n_tick++;
+        due += t->period_ns;
+        /* missed ticks are left out, the grid of due times stays */
+        const uint64_t after = pal_clock_ns();
+        if (after > due) {
+            const uint64_t missed = (after - due) / t->period_ns + (after - due > t->period_ns / 2);
+            t->total.n_missed += missed;
+            t->second_missed[t->now_second] += missed;
+            due += missed * t->period_ns;
+        }
+        if (after >= judge) {
+            thread_judge(t);
+            judge += 1000000000;
+        }
+    }
+    pal_servo_end(t->servo);
+    return NULL;
+}
+
+static void *thread_watch(void *user)
+{
+    pal_servo_thread *t = user;
+    uint64_t seen = pal_servo_ticks(t->servo), since = pal_clock_ns();
+    bool stopped = false;
+    while (!atomic_load_explicit(&t->stop, memory_order_relaxed)) {
+        const uint64_t now = pal_clock_ns(), ticks = pal_servo_ticks(t->servo);
+        if (ticks != seen) {
+            seen = ticks, since = now;
+            stopped = false;
+        } else if (!stopped && now - since > WATCHDOG_NS) {
+            t->options.backend->stop(t->options.device);
+            pal_servo_stalled(t->servo);
+            atomic_fetch_add(&t->n_watchdog, 1);
+            stopped = true;
+        }
+        pal_clock_sleep_until_ns(now + WATCHDOG_STEP_NS);
+    }
+    return NULL;
+}
+
+/* a thread with a real-time class when allowed, else a plain one */
+static pal_err thread_make(pthread_t *thread, void *(*run)(void *), void *user, int priority, bool *real_time)
+{
+    pthread_attr_t attributes;
+    if (pthread_attr_init(&attributes)) return PAL_ERR_MEMORY;
+    const struct sched_param parameter = {.sched_priority = priority};
+    pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+    pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+    pthread_attr_setschedparam(&attributes, &parameter);
+    int failed = pthread_create(thread, &attributes, run, user);
+    pthread_attr_destroy(&attributes);
+    *real_time = failed == 0;
+    if (failed) failed = pthread_create(thread, NULL, run, user);
+    return failed ? PAL_ERR_MEMORY : PAL_ERR_OK;
+}
+
+pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *options, pal_note *note,
+                               pal_servo_thread **out)
+{
+    pal_servo_thread *t = calloc(1, sizeof *t);
+    if (!t) return PAL_ERR_MEMORY;
+    t->servo = servo;
+    t->options = *options;
+    t->period_ns = (uint64_t)(1e9 / options->rate_hz);
+    pal_trio_init(&t->timings, &t->slot[0], &t->slot[1], &t->slot[2]);
+    bool fifo = false, fifo_watch = false;
+    const bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    options->backend->force_enable(options->device, !options->pose_only);
+    atomic_store(&t->rt_flags, locked ? PAL_RT_LOCKED : 0);
+    pal_err err = thread_make(&t->loop, thread_loop, t, FIFO_SERVO, &fifo);
+    if (!err && thread_make(&t->watchdog, thread_watch, t, FIFO_WATCHDOG, &fifo_watch)) {
+        atomic_store(&t->stop, true);
+        pthread_join(t->loop, NULL);
+        err = PAL_ERR_MEMORY;
+    }
+    if (err) {
+        free(t);
+        return err;
+    }
+    cpu_set_t last;
+    CPU_ZERO(&last);
+    CPU_SET((size_t)(sysconf(_SC_NPROCESSORS_ONLN) - 1), &last);
+    const bool pinned = fifo && pthread_setaffinity_np(t->loop, sizeof last, &last) == 0;
+    pal_note_set(note, PAL_ERR_OK, "%s%s%s", fifo ? "" : "no SCHED_FIFO (needs CAP_SYS_NICE or an rtprio limit) ",
+                 locked ? "" : "memory not locked (needs a memlock limit) ",
+                 fifo && !pinned ? "not pinned to a processor" : "");
+    if (fifo) atomic_fetch_or(&t->rt_flags, PAL_RT_FIFO);
+    *out = t;
+    return PAL_ERR_OK;
+}
+
+void pal_servo_thread_stop(pal_servo_thread *thread, pal_servo_timing *timing)
+{
+    if (!thread) return;
+    atomic_store(&thread->stop, true);
+    pthread_join(thread->loop, NULL);
+    pthread_join(thread->watchdog, NULL);
+    thread->total.n_watchdog = atomic_load(&thread->n_watchdog);
+    thread->total.rt_flags |= atomic_load(&thread->rt_flags);
+    if (timing) *timing = thread->total;
+    free(thread);
+}
+
+const pal_servo_timing *pal_servo_thread_timing(pal_servo_thread *thread)
+{
+    return pal_trio_take(&thread->timings);
+}

@@ -1,0 +1,325 @@
+/* The bridge's servo in virtual time against a simulated server: states, limits, felt stiffness. */
+#include "clients/haptic_bridge/device_virtual.h"
+#include "clients/haptic_bridge/jitter.h"
+#include "clients/haptic_bridge/servo.h"
+#include "tests/check.h"
+
+#define TICK_NS 1000000u
+
+typedef struct rig {
+    void *device;
+    pal_servo *servo;
+    uint64_t now_ns;
+    uint32_t seq, generation;
+    pal_wire_haptic model;
+    bool serving; /* models come at 60 Hz */
+    uint64_t next_model_ns;
+    pal_servo_view view;
+} rig;
+
+/* tissue below z = 0 of the world; device and world have the same axes */
+static bool rig_open(rig *r, const char *id, double k1)
+{
+    *r = (rig){.now_ns = 1000000000, .generation = 1, .serving = true};
+    pal_servo_options o = {.backend = pal_device_virtual(), .rate_hz = 1000, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (pal_device_virtual()->open(&r->device, id, &o.info)) return false;
+    o.device = r->device;
+    pal_device_virtual()->force_enable(r->device, 1);
+    r->model = (pal_wire_haptic){.n_patch = 1, .frame_us = 16667};
+    r->model.patch[0] = (pal_wire_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
+    return pal_servo_create(&o, &r->servo) == PAL_ERR_OK;
+}
+static void rig_close(rig *r)
+{
+    pal_servo_destroy(r->servo);
+    pal_device_virtual()->close(r->device);
+}
+
+static void rig_tick(rig *r)
+{
+    if (r->serving && r->now_ns >= r->next_model_ns) {
+        r->model.seq = ++r->seq;
+        pal_servo_put_model(r->servo, &r->model, r->generation, r->now_ns);
+        r->next_model_ns = r->now_ns + 16666667;
+    }
+    pal_servo_tick(r->servo, r->now_ns);
+    const pal_servo_view *view = pal_servo_take_view(r->servo);
+    if (view) r->view = *view;
+    pal_virtual_advance(r->device, 1e-3);
+    r->now_ns += TICK_NS;
+}
+static void rig_run(rig *r, double seconds)
+{
+    for (int i = 0; i < (int)(seconds * 1000); i++) rig_tick(r);
+}
+static double rig_force(const rig *r)
+{
+    const double *f = r->view.force_N;
+    return sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+}
+static bool rig_event(rig *r, int kind)
+{
+    pal_servo_event event;
+    bool found = false;
+    while (pal_servo_take_event(r->servo, &event)) found = found || event.kind == kind;
+    return found;
+}
+
+/* pressed and held on 300 N/m: comes to rest, and force over depth is the plane's stiffness */
+static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
+{
+    static const char *const devices[] = {"touch", "premium", "omega3", "inverse3", "falcon"};
+    static const char *const hands[] = {"average", "light", "firm"};
+    for (int d = 0; d < 5; d++) {
+        for (int h = 0; h < 3; h++) {
+            /* light enough for the continuous rating of every device */
+            char id[96];
+            snprintf(id, sizeof id, "%s,hand=%s,script=press-hold,depth=%g,height=%g,clock=virtual", devices[d],
+                     hands[h], d == 4 ? 30.0 : 60.0);
+            rig r;
+            REQUIRE(rig_open(&r, id, 300));
+            rig_run(&r, 5);
+            double x[3], v[3], fastest = 0, f_sum = 0, d_sum = 0;
+            for (int i = 0; i < 500; i++) {
+                rig_tick(&r);
+                pal_virtual_truth(r.device, x, v, NULL);
+                fastest = fmax(fastest, fabs(v[2]));
+                f_sum += r.view.force_N[2];
+                d_sum += -x[2];
+            }
+            CHECK_LE(fastest, 2e-3);
+            CHECK(f_sum / 500 > 0.1);
+            /* the encoder's floor makes the device look deeper by half a step on average */
+            CHECK_NEAR(f_sum / d_sum, 300, 0.01 * 300 + 300 * 0.064e-3 * 500 / d_sum);
+            CHECK_INT(r.view.state, PAL_SERVO_CONTACT);
+            CHECK_NEAR(r.view.felt_N_m, 300, 3);
+            rig_close(&r);
+        }
+    }
+}
+
+static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    const double before = rig_force(&r);
+    CHECK(before > 0.1);
+    r.serving = false;
+    const uint64_t last = r.next_model_ns - 16666667;
+    double worst_step = 0, at = before;
+    while (r.now_ns < last + 99000000) rig_tick(&r);
+    CHECK_NEAR(rig_force(&r), before, 0.02);
+    CHECK_INT(r.view.flags & PAL_WIRE_POSE_STALE, 0);
+    while (r.now_ns < last + 602000000) {
+        rig_tick(&r);
+        worst_step = fmax(worst_step, fabs(rig_force(&r) - at));
+        at = rig_force(&r);
+    }
+    CHECK_LE(worst_step, 0.1);
+    CHECK(r.view.flags & PAL_WIRE_POSE_STALE);
+    CHECK_NEAR(r.view.fade, 0, 0);
+    CHECK(rig_event(&r, PAL_EVENT_STALE));
+    /* what is left is damping of 0.5 N s/m */
+    rig_run(&r, 2);
+    CHECK_LE(rig_force(&r), 0.005);
+    CHECK_INT(r.view.state, PAL_SERVO_FREE);
+    r.serving = true;
+    at = rig_force(&r);
+    worst_step = 0;
+    for (int i = 0; i < 1000; i++) {
+        rig_tick(&r);
+        worst_step = fmax(worst_step, rig_force(&r) - at);
+        at = rig_force(&r);
+    }
+    CHECK_LE(worst_step, 0.05);
+    CHECK(at > 0.1);
+    CHECK(rig_event(&r, PAL_EVENT_RECOVERED));
+    rig_close(&r);
+}
+
+static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    CHECK(rig_force(&r) > 0.1);
+    pal_servo_estop(r.servo);
+    rig_tick(&r);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    rig_tick(&r);
+    rig_tick(&r);
+    double given[3];
+    pal_virtual_truth(r.device, NULL, NULL, given);
+    CHECK_LE(fabs(given[2]), 0.2);
+    rig_run(&r, 3);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    CHECK_INT(r.view.state, PAL_SERVO_ESTOP);
+    CHECK(r.view.flags & PAL_WIRE_POSE_ESTOP);
+    CHECK(rig_event(&r, PAL_EVENT_ESTOP));
+    /* the server's flag does the same */
+    pal_servo_rearm(r.servo);
+    rig_run(&r, 3);
+    CHECK(rig_force(&r) > 0.1);
+    r.model.flags = PAL_WIRE_HAPTIC_FORCE_OFF;
+    rig_run(&r, 0.02);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    rig_close(&r);
+}
+
+static void force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "omega3,hand=firm,script=press-hold,depth=40,clock=virtual", 2000));
+    double at = 0, worst = 0, most = 0;
+    for (int i = 0; i < 6000; i++) {
+        rig_tick(&r);
+        worst = fmax(worst, rig_force(&r) - at);
+        at = rig_force(&r);
+        most = fmax(most, at);
+    }
+    CHECK_LE(most, 3 + 1e-9);
+    CHECK_NEAR(most, 3, 1e-6);
+    CHECK_LE(worst, 0.3 + 1e-9);
+    CHECK(r.view.n_saturated > 0);
+    rig_close(&r);
+}
+
+static void continuous_rating_scales_a_long_push_down(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "touch,hand=firm,script=press-hold,depth=20,clock=virtual", 390));
+    rig_run(&r, 12);
+    CHECK(r.view.force_max_N > 1.2);
+    CHECK_LE(r.view.force_rms_N, 1.1 * 0.88);
+    rig_close(&r);
+}
+
+static void stiffness_above_the_device_is_rendered_at_its_clamp(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 3000));
+    rig_run(&r, 4);
+    CHECK_NEAR(r.view.felt_N_m, 800, 8);
+    CHECK(r.view.flags & PAL_WIRE_POSE_STIFF_CLAMPED);
+    pal_servo_set_degraded(r.servo, 1);
+    rig_run(&r, 2);
+    CHECK_NEAR(r.view.felt_N_m, 300, 3);
+    pal_servo_set_degraded(r.servo, 2);
+    rig_run(&r, 1);
+    CHECK_NEAR(r.view.fade, 0, 0);
+    CHECK_LE(rig_force(&r), 1e-9);
+    CHECK(rig_event(&r, PAL_EVENT_RT_DEGRADED));
+    rig_close(&r);
+}
+
+static void old_models_are_dropped_and_a_new_session_starts_afresh(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    const uint32_t seq = r.view.model_seq;
+    pal_wire_haptic old = r.model;
+    old.seq = seq - 3;
+    r.serving = false;
+    pal_servo_put_model(r.servo, &old, r.generation, r.now_ns);
+    rig_tick(&r);
+    CHECK_INT(r.view.model_seq, seq);
+    CHECK_INT(r.view.n_model_old, 1);
+    pal_servo_put_generation(r.servo, ++r.generation);
+    rig_tick(&r);
+    CHECK_INT(r.view.model_seq, 0);
+    CHECK_LE(rig_force(&r), 0.05);
+    /* a server that starts again counts from 1, and is believed */
+    r.seq = 0;
+    r.serving = true;
+    r.next_model_ns = r.now_ns;
+    rig_run(&r, 0.002);
+    CHECK_INT(r.view.model_seq, 1);
+    CHECK_LE(r.view.fade, 0.02);
+    rig_run(&r, 1);
+    CHECK(rig_force(&r) > 0.1);
+    rig_close(&r);
+}
+
+static void numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    r.model.patch[0].k1_N_m = NAN;
+    for (int i = 0; i < 100; i++) {
+        rig_tick(&r);
+        CHECK(isfinite(rig_force(&r)));
+    }
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    CHECK(r.view.n_not_finite > 0);
+    CHECK(rig_event(&r, PAL_EVENT_FAULT));
+    rig_close(&r);
+}
+
+static void device_that_stops_answering_is_a_fault_that_stays(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual,fail=4000", 300));
+    rig_run(&r, 3.999);
+    CHECK(rig_force(&r) > 0.1);
+    rig_run(&r, 0.003);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    rig_run(&r, 1);
+    CHECK_INT(r.view.state, PAL_SERVO_FAULT);
+    CHECK(rig_event(&r, PAL_EVENT_DEVICE_LOST));
+    rig_close(&r);
+}
+
+static void handle_driven_faster_than_two_metres_a_second_loses_force(void)
+{
+    rig r;
+    REQUIRE(rig_open(&r, "omega3,hand=off,clock=virtual", 300));
+    const double none[3] = {0, 0, 0}, throw_N[3] = {0, 0, -20};
+    pal_virtual_push(r.device, none);
+    rig_run(&r, 2);
+    pal_virtual_push(r.device, throw_N);
+    double most_after = 0;
+    bool fault = false;
+    for (int i = 0; i < 100; i++) {
+        rig_tick(&r);
+        if (r.view.n_fault > 0) fault = true;
+        if (fault) most_after = fmax(most_after, rig_force(&r));
+    }
+    CHECK(fault);
+    CHECK_NEAR(most_after, 0, 0);
+    rig_close(&r);
+}
+
+static void jitter_histogram_finds_percentiles_within_a_step(void)
+{
+    static pal_jitter j;
+    for (int i = 1; i <= 100000; i++) pal_jitter_add(&j, (uint64_t)i * 100);
+    CHECK_NEAR(pal_jitter_at_us(&j, 0.5), 5000, 0.13 * 5000);
+    CHECK_NEAR(pal_jitter_at_us(&j, 0.99), 9900, 0.13 * 9900);
+    CHECK_NEAR(pal_jitter_at_us(&j, 1), 10000, 1e-9);
+    for (int i = 0; i < 1000; i++) {
+        static pal_jitter one;
+        memset(&one, 0, sizeof one);
+        const uint64_t ns = (uint64_t)1 << (i % 40) | (uint64_t)i * 7;
+        pal_jitter_add(&one, ns);
+        CHECK_NEAR(pal_jitter_at_us(&one, 0.5), (double)ns * 1e-3, 1e-9);
+    }
+}
+
+int main(void)
+{
+    RUN(press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness);
+    RUN(stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly);
+    RUN(emergency_stop_takes_force_away_within_two_ticks_and_stays);
+    RUN(force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms);
+    RUN(continuous_rating_scales_a_long_push_down);
+    RUN(stiffness_above_the_device_is_rendered_at_its_clamp);
+    RUN(old_models_are_dropped_and_a_new_session_starts_afresh);
+    RUN(numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force);
+    RUN(device_that_stops_answering_is_a_fault_that_stays);
+    RUN(handle_driven_faster_than_two_metres_a_second_loses_force);
+    RUN(jitter_histogram_finds_percentiles_within_a_step);
+    return check_report();
+}
