@@ -28,6 +28,7 @@
 bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
 {
     int32_t first = 0;
+    int64_t n_pair = 0, n_flat = 0;
     for (int row = 0; row < crossings->n_row; row++) {
         const pal_crossing *item = crossings->item + crossings->start[row];
         int64_t n = crossings->start[row + 1] - crossings->start[row];
@@ -38,9 +39,12 @@ bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
         for (int64_t i = 0; i < n; i += 2) {
             if (item[i].sign != first || item[i + 1].sign == first) return false;
             pal_bits_set_run(word, item[i].place, item[i + 1].place);
+            n_flat += item[i].depth == item[i + 1].depth;
+            n_pair++;
         }
     }
-    return true;
+    /* a copy turned inside out pairs up with its twin instead of with the far wall */
+    return 2 * n_flat <= n_pair;
 }
 
 /* all that the methods share */
@@ -140,20 +144,22 @@ static pal_err vote_axis(decision *d, int axis, uint8_t *vote)
     return err;
 }
 
-/* the surface as the parts are faced now, and its tree */
+/* the surface as the parts are faced now, and its tree; parts that cannot be faced (Moebius) have no winding number */
 static pal_err plant_tree(decision *d)
 {
     if (d->tree) return PAL_ERR_OK;
     double began = pal_clock_s();
     const pal_scan_surface *scan = d->scan;
     d->facing = *d->surface;
-    d->facing.n_tri = scan->n_tri;
+    d->facing.n_tri = 0;
     d->facing.tri = malloc((scan->n_tri ? (size_t)scan->n_tri : 1) * 3 * sizeof *d->facing.tri);
     if (!d->facing.tri) return PAL_ERR_MEMORY;
     for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
         const int32_t *from = scan->tri + 3 * t;
-        bool turn = d->parts.part[scan->part[t]].cavity;
-        int32_t *to = d->facing.tri + 3 * t;
+        const pal_part *part = &d->parts.part[scan->part[t]];
+        if (!part->coherent) continue;
+        bool turn = part->cavity;
+        int32_t *to = d->facing.tri + 3 * (size_t)d->facing.n_tri++;
         to[0] = from[0], to[1] = from[turn ? 2 : 1], to[2] = from[turn ? 1 : 2];
     }
     pal_err err = pal_box_tree_create(&d->facing, &d->tree);
@@ -329,7 +335,7 @@ static pal_err check_meant(decision *d, bool open, int resolution)
 /* the method asked for, or the first that serves */
 static pal_err run_method(decision *d, const char *method, bool *open)
 {
-    bool any = !method, even = d->scan->even;
+    bool any = !method;
     pal_crossings rows;
     d->report->surface_volume_m3 = d->scan->closed ? fabs(pal_surface_volume(d->surface)) : 0;
     if (!any && !strcmp(method, "flood")) return by_flood(d);
@@ -341,8 +347,10 @@ static pal_err run_method(decision *d, const char *method, bool *open)
         if (plain) return PAL_ERR_OK;
         clear_inside(d);
     }
+    PAL_TRY(pal_scan_drop_copies(d->scan, d->surface->n_vertex));
     PAL_TRY(pal_parts_find(d->scan, &d->parts));
     pal_err err;
+    bool even = d->scan->even;
     if (any ? even : !strcmp(method, "scanline"))
         err = by_scanline(d);
     else if (!any && !strcmp(method, "winding"))

@@ -377,11 +377,10 @@ pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
             int64_t n = rows->start[row + 1] - rows->start[row];
             begin_row(parts, w, item, n);
             for (int64_t i = 0; i < n; i++) {
-                if (w->count[item[i].part] == 0) {
-                    int32_t around = outermost(parts, w, &item[i]);
-                    bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
-                    votes[item[i].part] += opposed ? 1 : -1;
-                }
+                if (w->count[item[i].part] == UNCLEAN) continue;
+                int32_t around = outermost(parts, w, &item[i]);
+                bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
+                votes[item[i].part] += opposed ? 1 : -1;
                 cross(parts, w, &item[i]);
             }
             end_row(w, item, n);

@@ -29,8 +29,8 @@ typedef struct pal_parts {
 pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out);
 void pal_parts_free(pal_parts *parts);
 
-/* sets cavity from the rows along one axis: a part that begins inside another one in most of its rows and faced the
- * other way in the file. A coincident copy lies inside nothing. MEMORY */
+/* sets cavity from the rows along one axis: a part most of whose crossings lie inside another one that faced the other
+ * way in the file. A nearly coincident copy lies inside nothing. MEMORY */
 pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows);
 
 /* Inside along one row by the parts: where the smallest part around a centre is no cavity. Calls run(from, to) for each

@@ -48,7 +48,8 @@ uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign)
     return hash_pair(hash_point(a), hash_point(b), sign);
 }
 
-/* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or */
+/* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or; hash of
+ * each vertex */
 static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
 {
     uint64_t sum = 0, odd = 0;
@@ -63,6 +64,57 @@ static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
     }
     scan->closed = sum == 0;
     scan->even = odd == 0;
+}
+
+typedef struct numbered {
+    uint64_t key;
+    int32_t tri;
+} numbered;
+
+static int compare_numbered(const void *a, const void *b)
+{
+    const numbered *s = a, *t = b;
+    if (s->key != t->key) return s->key < t->key ? -1 : 1;
+    return s->tri < t->tri ? -1 : s->tri > t->tri;
+}
+
+pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
+{
+    size_t n = (size_t)scan->n_tri;
+    pal_scan_surface fewer = *scan;
+    fewer.tri = malloc((n ? n : 1) * 3 * sizeof *fewer.tri);
+    uint64_t *hash = malloc((n_vertex ? (size_t)n_vertex : 1) * sizeof *hash);
+    numbered *list = malloc((n ? n : 1) * sizeof *list);
+    if (!fewer.tri || !hash || !list) {
+        free(fewer.tri);
+        free(hash);
+        free(list);
+        return PAL_ERR_MEMORY;
+    }
+    for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    for (size_t t = 0; t < n; t++) {
+        const int32_t *c = scan->tri + 3 * t;
+        /* the same for the three corners in any order */
+        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]];
+        list[t] = (numbered){(a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u, (int32_t)t};
+    }
+    qsort(list, n, sizeof *list, compare_numbered);
+    /* sorting back by number leaves the first of each set in the order of the file */
+    size_t n_kept = 0;
+    for (size_t i = 0; i < n; i++)
+        if (n_kept == 0 || list[i].key != list[n_kept - 1].key) list[n_kept++] = list[i];
+    for (size_t i = 0; i < n_kept; i++) list[i].key = 0;
+    qsort(list, n_kept, sizeof *list, compare_numbered);
+    for (size_t i = 0; i < n_kept; i++)
+        memcpy(fewer.tri + 3 * i, scan->tri + 3 * (size_t)list[i].tri, 3 * sizeof *fewer.tri);
+    fewer.n_tri = (int)n_kept;
+    find_closed(&fewer, hash);
+    bool better = fewer.even || !scan->even;
+    free(hash);
+    free(list);
+    free(better ? scan->tri : fewer.tri);
+    if (better) *scan = fewer;
+    return PAL_ERR_OK;
 }
 
 pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out)

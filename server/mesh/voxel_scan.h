@@ -42,6 +42,9 @@ typedef struct pal_scan_surface {
 
 pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out); /* MEMORY */
 void pal_scan_surface_free(pal_scan_surface *scan);
+/* keeps one of each set of triangles with the same three places, whichever way they face, unless the surface is even
+ * with them and not without (two copies that close a fin); sets closed and even anew; MEMORY */
+pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex);
 
 /* hash of the edge between two points; *sign is +1 or -1 by its direction; collapsed edges give 0 */
 uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign);
