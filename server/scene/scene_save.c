@@ -13,10 +13,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH = 1200 };
+enum { PATH = 1200, MESH_NAME = PAL_NAME + 24 };
 
 /* "liver.palmesh"; a number keeps two bodies of like names apart */
-static void mesh_name(const pal_scene *scene, int body, char out[PAL_NAME + 16])
+static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
 {
     char plain[PAL_NAME], other[PAL_NAME];
     bool twice = false;
@@ -26,9 +26,9 @@ static void mesh_name(const pal_scene *scene, int body, char out[PAL_NAME + 16])
         twice = twice || (k != body && !strcmp(plain, other));
     }
     if (twice)
-        snprintf(out, PAL_NAME + 16, "%s_%d.palmesh", plain, body);
+        snprintf(out, MESH_NAME, "%s_%d.palmesh", plain, body);
     else
-        snprintf(out, PAL_NAME + 16, "%s.palmesh", plain);
+        snprintf(out, MESH_NAME, "%s.palmesh", plain);
 }
 
 static void add_item(cJSON *parent, const char *key, const pal_item *item)
@@ -75,7 +75,7 @@ static void add_supports(cJSON *object, const pal_body_def *body)
 static void add_body(cJSON *list, const pal_scene *scene, int index)
 {
     const pal_body_def *body = &scene->body[index];
-    char name[PAL_NAME + 16];
+    char name[MESH_NAME];
     cJSON *object = cJSON_CreateObject();
     cJSON_AddItemToArray(list, object);
     mesh_name(scene, index, name);
@@ -144,7 +144,7 @@ pal_err pal_scene_make_folder(const char *folder, pal_note *note)
 pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
 {
     const pal_scene *scene = &loaded->scene;
-    char name[PAL_NAME + 16], path[PATH];
+    char name[MESH_NAME], path[PATH];
     int done = 0;
     pal_err err = pal_scene_make_folder(folder, note);
     if (err) return err;
