@@ -1,15 +1,25 @@
 #!/bin/sh
 # The viewer's checks: `types` runs tsc over the JSDoc types, `test` runs node --test. Packages come from the lock file
-# into the build folder. usage: check_viewer.sh types|test
+# into the build folder (deploy/common.sh). usage: check_viewer.sh types|test
 set -u
 tree=$(cd "$(dirname "$0")/../.." && pwd)
 build=${PALPATE_BUILD:-$tree/build}
+packages=$build/viewer_packages
 case ${1-} in
 types)
-    "$build/viewer_packages/node_modules/.bin/tsc" --noEmit -p "$tree/clients/viewer/jsconfig.json" \
-        --typeRoots "$build/viewer_packages/node_modules/@types" --baseUrl "$tree"
+    # the served vendor folder does not exist in the tree: its types stand in for it, beside the sources by rootDirs
+    mkdir -p "$packages/types/vendor"
+    echo 'export * from "three";' >"$packages/types/vendor/three.module.min.d.ts"
+    cat >"$packages/tsconfig.json" <<JSON
+{
+  "extends": "$tree/clients/viewer/jsconfig.json",
+  "compilerOptions": { "rootDirs": ["$tree/clients/viewer", "$packages/types"], "typeRoots": ["$packages/node_modules/@types"], "types": [] },
+  "include": ["$tree/clients/viewer/src/*.js", "$packages/types/vendor/*.d.ts"]
+}
+JSON
+    exec "$packages/node_modules/.bin/tsc" --noEmit -p "$packages/tsconfig.json"
     ;;
-test) cd "$tree/clients/viewer" && node --test test/ ;;
+test) cd "$tree/clients/viewer" && exec node --test test/ ;;
 *)
     echo "usage: check_viewer.sh types|test" >&2
     exit 2

@@ -24,32 +24,40 @@ const FINAL = new Map([
  */
 
 export class Link {
+  /** @type {WebSocket | null} */
+  socket = null;
+  want = { url: "", name: "Guest", role: "trainee" };
+  tries = 0;
+  generation = 0; // of the connection: what belongs to an older one is ignored
+  poseSeq = 0;
+  /** @type {number[]} */
+  lastPosition = [0, 0, 0];
+  figuresAt = 0;
+  /** @type {Map<number, Part>} */
+  parts = new Map();
+  /** @type {Map<number, Uint8Array>} newest frame of a part whose asset is not here yet */
+  kept = new Map();
+  decodeUs = 0;
+  nDecoded = 0;
+  decodeSum = 0;
+  bytes = 0;
+  myTool = -1;
+  latency = 0;
+  rtt = 0;
+  echo = 0;
+
   /** @param {Surroundings} around */
   constructor(around) {
     this.around = around;
-    /** @type {WebSocket | null} */
-    this.socket = null;
-    this.want = { url: "", name: "Guest", role: "trainee" };
-    this.tries = 0;
-    this.generation = 0;
-    this.poseSeq = 0;
-    this.fresh();
     this.figuresAt = around.now();
   }
 
   fresh() {
-    /** @type {Map<number, Part>} */
-    this.parts = new Map();
-    /** @type {Map<number, Uint8Array>} newest frame of a part whose asset is not here yet */
-    this.kept = new Map();
-    this.decodeUs = 0;
-    this.nDecoded = 0;
-    this.decodeSum = 0;
-    this.bytes = 0;
+    this.parts.clear();
+    this.kept.clear();
+    this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
+    this.latency = this.rtt = this.echo = 0;
     this.myTool = -1;
-    this.latency = 0;
-    this.rtt = 0;
-    this.echo = 0;
   }
 
   /** @param {{url: string, name: string, role: string}} want */
@@ -111,7 +119,7 @@ export class Link {
   /** @param {{tool: number, position: number[] | null, grab: boolean, away: boolean}} pose */
   pose(pose) {
     if (this.socket?.readyState !== 1) return;
-    this.lastPosition = pose.position ?? this.lastPosition ?? [0, 0, 0];
+    this.lastPosition = pose.position ?? this.lastPosition;
     this.socket.send(writePose({
       tool: pose.tool, seq: ++this.poseSeq, flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
       stampUs: Math.round(this.around.now() * 1000), position: this.lastPosition, buttons: pose.grab ? 1 : 0,

@@ -136,7 +136,7 @@ const control = {
   },
 };
 
-worker.onmessage = ({ data }) => {
+worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
   switch (data.type) {
     case "state":
       showState(data.state, data.text);

@@ -1,0 +1,182 @@
+// The connection: join, keeping frames until the asset is there, credit, latency, reconnecting; with a socket, a clock
+// and a fetch of the test's own, and the golden packets as traffic.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { Link } from "../src/link.js";
+import { vertexNormals } from "../src/normals.js";
+import { KIND, POSE_FLAG, readHead, readTools } from "../src/wire.js";
+
+/** @param {string} name */
+const load = (name) => new Uint8Array(readFileSync(new URL(`../../../tests/data/golden/${name}`, import.meta.url)));
+const turn = () => new Promise((resolve) => setImmediate(resolve));
+
+class FakeSocket {
+  /** @param {string} url @param {string} protocol */
+  constructor(url, protocol) {
+    this.url = url;
+    this.protocol = protocol;
+    this.readyState = 0;
+    /** @type {any[]} */
+    this.sent = [];
+    this.closed = 0;
+  }
+  /** @param {any} data */
+  send(data) {
+    this.sent.push(data);
+  }
+  /** @param {number} code */
+  close(code) {
+    this.closed = code;
+    this.readyState = 3;
+  }
+  accept() {
+    this.readyState = 1;
+    this.onopen?.();
+  }
+  /** @param {any} data */
+  say(data) {
+    this.onmessage?.({ data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data) });
+  }
+  /** messages of one kind that were sent @param {number} kind */
+  binary(kind) {
+    return this.sent.filter((m) => typeof m !== "string" && readHead(m).kind === kind);
+  }
+  texts() {
+    return this.sent.filter((m) => typeof m === "string").map((m) => JSON.parse(m));
+  }
+}
+
+function stand() {
+  const stand = {
+    time: 1000, /** @type {FakeSocket[]} */ sockets: [], /** @type {any[]} */ posted: [], /** @type {{call: () => void, ms: number}[]} */ waiting: [],
+    /** @type {(value: any) => void} */ giveAsset: () => {}, /** @type {string[]} */ asked: [],
+    of: (/** @type {string} */ type) => stand.posted.filter((m) => m.type === type),
+    /** @type {any} */ link: null,
+  };
+  stand.link = new Link({
+    open: (url, protocol) => {
+      const socket = new FakeSocket(url, protocol);
+      stand.sockets.push(socket);
+      return /** @type {any} */ (socket);
+    },
+    get: (url) => {
+      stand.asked.push(url);
+      return new Promise((resolve) => (stand.giveAsset = resolve));
+    },
+    post: (message) => stand.posted.push(message),
+    now: () => stand.time,
+    later: (call, ms) => stand.waiting.push({ call, ms }),
+  });
+  return stand;
+}
+
+const HELLO = { type: "hello", session: "liver", parts: [{ epoch: 0, asset: "/asset/ab" }], you: { id: 1, tool: 0 } };
+
+/** a connection that has joined; the part's epoch is that of the golden frames */
+async function joined() {
+  const s = stand();
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+  s.sockets[0].accept();
+  const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
+  const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
+  const parts = Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/ab" }));
+  s.sockets[0].say({ ...HELLO, parts });
+  return { s, part };
+}
+
+test("joins with the protocol's name and asks for any tool", () => {
+  const s = stand();
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+  assert.equal(s.sockets[0].protocol, "palpate.v1");
+  assert.equal(s.sockets[0].sent.length, 0);
+  s.sockets[0].accept();
+  assert.deepEqual(s.sockets[0].texts(), [{ type: "join", name: "Ada", role: "trainee", tool: -1 }]);
+});
+
+test("keeps the newest frame until its asset has come, then shows it", async () => {
+  const { s, part } = await joined();
+  assert.equal(s.asked.at(-1), "http://host:1/asset/ab");
+  s.sockets[0].say(load("frame_spike.bin"));
+  s.sockets[0].say(load("frame_bend.bin"));
+  assert.equal(s.of("frame").length, 0);
+  s.giveAsset(load("asset.bin").buffer);
+  await turn();
+  await turn();
+  const shown = s.of("frame").filter((m) => m.part === part);
+  assert.equal(shown.length, 1);
+  assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
+  assert.ok(shown[0].positions.every(Number.isFinite));
+  // normals of a shown surface are of unit length or zero
+  for (let i = 0; i < shown[0].normals.length; i += 3) {
+    const length = Math.hypot(...shown[0].normals.subarray(i, i + 3));
+    assert.ok(length === 0 || Math.abs(length - 1) < 1e-5);
+  }
+});
+
+test("acknowledges every cycle, frames decoded or not", async () => {
+  const { s } = await joined();
+  s.sockets[0].say(load("tools.bin"));
+  s.sockets[0].say(load("tools.bin"));
+  const acks = s.sockets[0].binary(KIND.ACK), cycle = readTools(load("tools.bin")).cycle;
+  assert.equal(acks.length, 2);
+  assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
+});
+
+test("a pose carries tool, grab and clock, and lifting the tool keeps its last place", async () => {
+  const { s } = await joined();
+  s.time = 1234.5;
+  s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grab: true, away: false });
+  s.link.pose({ tool: 2, position: null, grab: false, away: true });
+  const [first, second] = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+  assert.equal(first.getUint16(6, true), 2);
+  assert.equal(Number(first.getBigUint64(16, true)), 1234500);
+  assert.equal(first.getFloat64(32, true), 0.2);
+  assert.equal(first.getUint32(132, true), 1);
+  assert.equal(second.getFloat64(40, true), 0.3);
+  assert.equal(second.getUint32(8, true), first.getUint32(8, true) + 1);
+  assert.ok(second.getUint32(12, true) & POSE_FLAG.AWAY);
+});
+
+test("reconnects with growing pauses after a lost connection", () => {
+  const s = stand();
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+  const pauses = [];
+  for (let i = 0; i < 6; i++) {
+    /** @type {any} */ (s.sockets[i]).onclose({ code: 1006, reason: "" });
+    const next = s.waiting.pop();
+    pauses.push(next?.ms);
+    next?.call();
+  }
+  assert.deepEqual(pauses, [500, 1000, 2000, 4000, 5000, 5000]);
+  assert.equal(s.sockets.length, 7);
+  assert.equal(s.of("state").at(-1).state, "connecting");
+});
+
+test("says why and stays away after a refusal", () => {
+  const s = stand();
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+  /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "" });
+  assert.equal(s.waiting.length, 0);
+  assert.match(s.of("state").at(-1).text, /full/);
+});
+
+test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
+  const { s } = await joined();
+  s.sockets[0].say(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
+  assert.equal(s.sockets[0].closed, 4900);
+  s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
+  const n = s.posted.length;
+  s.sockets[0].say(HELLO);
+  assert.equal(s.posted.length, n);
+});
+
+test("normals of a tetrahedron point away from its middle", () => {
+  const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]), n = new Float32Array(12);
+  vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
+  for (let i = 0; i < 4; i++) {
+    let outward = 0;
+    for (let k = 0; k < 3; k++) outward += n[3 * i + k] * (x[3 * i + k] - 0.25);
+    assert.ok(outward > 0.3);
+  }
+});
