@@ -51,7 +51,7 @@ typedef struct virtual_state {
     const virtual_device *device;
     const virtual_hand *hand;
     virtual_script script;
-    double depth_m, height_m, lag_s;
+    double depth_m, height_m, wait_s, lag_s;
     double viscous, coulomb;
     bool virtual_clock, touched;
     long n_read, fail_at;
@@ -68,7 +68,7 @@ static void virtual_intend(virtual_state *s)
 {
     if (s->script == STILL) return;
     if (!s->touched) {
-        s->xd[2] = s->height_m - APPROACH_M_S * s->time_s;
+        s->xd[2] = s->height_m - APPROACH_M_S * fmax(s->time_s - s->wait_s, 0);
         const double lowest = -0.9 * s->device->radius_m;
         if (s->xd[2] < lowest) s->xd[2] = lowest;
         if (pal_norm3(s->applied) > TOUCH_FELT_N) {
@@ -155,6 +155,7 @@ static bool virtual_option(virtual_state *s, const char *key, const char *value)
     if (end == value || *end || !(number >= 0 && number <= 1e6)) return false;
     if (!strcmp(key, "depth")) return s->depth_m = number * 1e-3, true;
     if (!strcmp(key, "height")) return s->height_m = number * 1e-3, true;
+    if (!strcmp(key, "wait")) return s->wait_s = number, true;
     if (!strcmp(key, "fail")) return s->fail_at = (long)number, true;
     if (!strcmp(key, "lag")) return s->lag_s = number * 1e-3, number > 0;
     return false;
@@ -186,6 +187,7 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->script = PRESS_HOLD;
     s->depth_m = 0.008;
     s->height_m = 0.02;
+    s->wait_s = 1.6;
     s->lag_s = 1e-3;
     if (!virtual_parse(s, id)) {
         free(s);

@@ -10,6 +10,7 @@
  *           stroke: press-hold, then 20 mm to and fro along y; tap: down at 0.3 m/s and up, once a second
  *   depth   mm of the script (8)
  *   height  mm above the workspace centre where it begins (20)
+ *   wait    s at rest before it begins, so that the bridge can arm (1.6)
  *   lag     actuator time constant ms (1)
  *   clock   wall virtual (wall: read goes on to the present; virtual: only pal_virtual_advance moves it)
  *   fail    number of the first read that fails, as a broken cable would; from then on all fail (none) */

@@ -74,8 +74,8 @@ static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
         for (int h = 0; h < 3; h++) {
             /* light enough for the continuous rating of every device */
             char id[96];
-            snprintf(id, sizeof id, "%s,hand=%s,script=press-hold,depth=%g,height=%g,clock=virtual", devices[d],
-                     hands[h], d == 4 ? 30.0 : 60.0);
+            snprintf(id, sizeof id, "%s,hand=%s,script=press-hold,depth=%g,clock=virtual", devices[d], hands[h],
+                     h == 2 ? 0.5 : 3.0);
             rig r;
             REQUIRE(rig_open(&r, id, 300));
             rig_run(&r, 5);
