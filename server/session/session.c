@@ -213,7 +213,8 @@ static bool take_commands(pal_session *s)
 {
     pal_command command;
     bool any = false, was_paused = s->paused;
-    for (; pal_ring_get(s->command, &command); any = true) obey(s, &command);
+    /* a flood that refills the ring as fast as it is emptied must not keep the step waiting */
+    for (int k = 0; k < N_COMMAND && pal_ring_get(s->command, &command); k++, any = true) obey(s, &command);
     if (was_paused != s->paused) forget_pace(s);
     return any;
 }
