@@ -6,9 +6,10 @@
 #include <math.h>
 #include <string.h>
 
-/* largest correction for torque, as a share of the largest node force: where the nodes are nearly in line the rotation
- * field would have to be large, and a little torque is given up instead */
-#define MOST_TURN_SHARE 1.0
+/* |sum of normals| over the root of the sum of squares of a fan: below this its turning has no say */
+#define LEAST_NORMAL 0.2
+/* tangential part of a frame's edge over its length */
+#define LEAST_TANGENT 0.05
 
 static double longest_edge(const pal_surface *surface, int tri)
 {
@@ -76,14 +77,19 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
     t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
     t->x = PAL_NEW(arena, double, 3 * n_vertex);
     t->v = PAL_NEW(arena, double, 3 * n_vertex);
+    size_t n_slot = body->skin ? n_frame : n_node;
+    t->slot = PAL_NEW(arena, int32_t, n_slot);
     t->node = PAL_NEW(arena, int32_t, n_node);
-    t->row_node = PAL_NEW(arena, int32_t, n_node);
+    t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
     t->node_mark = PAL_NEW(arena, uint32_t, n_node);
-    t->row_mark = PAL_NEW(arena, uint32_t, n_node);
+    t->row_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
+    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
     t->force = PAL_NEW(arena, double, 3 * n_node);
-    t->row = PAL_NEW(arena, double, n_node);
+    t->row = PAL_NEW(arena, double, n_slot);
     bool all = t->corner && t->share && t->area_m2 && t->live && t->frame && t->live_mark && t->frame_mark && t->x &&
-               t->v && t->node && t->row_node && t->node_mark && t->row_mark && t->force && t->row;
+               t->v && t->slot && t->node && t->slot_mark && t->node_mark && t->row_mark && t->slot_force &&
+               t->slot_torque && t->force && t->row;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -285,25 +291,42 @@ bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const doubl
     return pal_unit3(normal, sum, 0);
 }
 
+/* slots that bear a shown vertex and their weights, sum 1; returns how many */
+static int slots(const pal_body *body, int vertex, int32_t *slot, double *weight)
+{
+    if (!body->skin) return pal_touch_nodes(body, vertex, slot, weight);
+    const float *coef = body->skin->coef + 4 * PAL_SKIN_NEAR * (size_t)vertex;
+    double sum = 0;
+    for (int k = 0; k < PAL_SKIN_NEAR; k++) sum += weight[k] = (double)coef[4 * k + 3];
+    for (int k = 0; k < PAL_SKIN_NEAR; k++) {
+        slot[k] = body->skin->near[PAL_SKIN_NEAR * (size_t)vertex + (size_t)k];
+        weight[k] /= sum;
+    }
+    return PAL_SKIN_NEAR;
+}
+
+static int slot_node(const pal_body *body, int slot)
+{
+    return body->skin ? body->skin->frame[slot] : slot;
+}
+
 void pal_touch_row_begin(pal_touch *touch)
 {
     touch->row_turn++;
-    touch->n_row = 0;
 }
 
 void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double stiffness_N_m)
 {
-    int32_t vertex[3], node[PAL_SKIN_NEAR];
+    int32_t vertex[3], slot[PAL_SKIN_NEAR];
     double share[3], weight[PAL_SKIN_NEAR];
     int n = corners(touch, point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int m = pal_touch_nodes(body, vertex[c], node, weight);
+        int m = slots(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
-            int32_t i = node[k];
+            int32_t i = slot[k];
             if (touch->row_mark[i] != touch->row_turn) {
                 touch->row_mark[i] = touch->row_turn;
                 touch->row[i] = 0;
-                touch->row_node[touch->n_row++] = i;
             }
             touch->row[i] += stiffness_N_m * share[c] * weight[k];
         }
@@ -312,16 +335,16 @@ void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double
 
 double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int point, double alpha_per_dt2)
 {
-    int32_t vertex[3], node[PAL_SKIN_NEAR];
+    int32_t vertex[3], slot[PAL_SKIN_NEAR];
     double share[3], weight[PAL_SKIN_NEAR], scale = 1;
     int n = corners(touch, point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int m = pal_touch_nodes(body, vertex[c], node, weight);
+        int m = slots(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
-            int32_t i = node[k];
-            if (body->held[i] || share[c] * weight[k] == 0) continue;
-            double most = alpha_per_dt2 * body->mass_kg[i];
-            if (touch->row[i] * scale > most) scale = most / touch->row[i];
+            int node = slot_node(body, slot[k]);
+            if (body->held[node] || share[c] * weight[k] == 0) continue;
+            double most = alpha_per_dt2 * body->mass_kg[node], row = touch->row[slot[k]];
+            if (row * scale > most) scale = most / row;
         }
     }
     return scale;
@@ -330,77 +353,133 @@ double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int poi
 void pal_touch_force_begin(pal_touch *touch)
 {
     touch->turn++;
-    touch->n_node = 0;
+    touch->n_slot = touch->n_node = 0;
+}
+
+/* R_i w_i o_i, the lever of a skinned vertex in frame k of its five */
+static void lever(const pal_body *body, int vertex, int k, double arm[3])
+{
+    size_t i = PAL_SKIN_NEAR * (size_t)vertex + (size_t)k;
+    const float *axes = (const float *)(const void *)body->skin_axes + 16 * (size_t)body->skin->near[i];
+    const float *coef = body->skin->coef + 4 * i;
+    for (int c = 0; c < 3; c++)
+        arm[c] = (double)coef[0] * (double)axes[c] + (double)coef[1] * (double)axes[4 + c] +
+                 (double)coef[2] * (double)axes[8 + c];
 }
 
 void pal_touch_push(pal_touch *touch, const pal_body *body, int point, const double force_N[3])
 {
-    int32_t vertex[3], node[PAL_SKIN_NEAR];
+    int32_t vertex[3], slot[PAL_SKIN_NEAR];
     double share[3], weight[PAL_SKIN_NEAR];
     int n = corners(touch, point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int m = pal_touch_nodes(body, vertex[c], node, weight);
+        int m = slots(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
-            double *f = touch->force + 3 * (size_t)node[k];
-            if (touch->node_mark[node[k]] != touch->turn) {
-                touch->node_mark[node[k]] = touch->turn;
+            double *f = touch->slot_force + 3 * (size_t)slot[k], *t = touch->slot_torque + 3 * (size_t)slot[k];
+            if (touch->slot_mark[slot[k]] != touch->turn) {
+                touch->slot_mark[slot[k]] = touch->turn;
                 pal_set3(f, 0, 0, 0);
-                touch->node[touch->n_node++] = node[k];
+                pal_set3(t, 0, 0, 0);
+                touch->slot[touch->n_slot++] = slot[k];
             }
             pal_axpy3(f, share[c] * weight[k], force_N);
+            if (!body->skin) continue;
+            double arm[3], moment[3];
+            lever(body, vertex[c], k, arm);
+            pal_cross3(moment, arm, force_N);
+            pal_axpy3(t, share[c], moment);
         }
     }
 }
 
-/* solves the symmetric 3x3 system by cofactors; false when it is nearly singular */
-static bool solve33(const double m[9], const double b[3], double x[3])
+static void add_force(pal_touch *touch, int node, double scale, const double force_N[3])
 {
-    double c0[3], c1[3], c2[3];
-    pal_cross3(c0, m + 3, m + 6);
-    pal_cross3(c1, m + 6, m);
-    pal_cross3(c2, m, m + 3);
-    double det = pal_dot3(m, c0), trace = m[0] + m[4] + m[8];
-    if (!(det > 1e-6 * trace * trace * trace)) return false;
-    for (int k = 0; k < 3; k++) x[k] = (c0[k] * b[0] + c1[k] * b[1] + c2[k] * b[2]) / det;
-    return true;
+    double *f = touch->force + 3 * (size_t)node;
+    if (touch->node_mark[node] != touch->turn) {
+        touch->node_mark[node] = touch->turn;
+        pal_set3(f, 0, 0, 0);
+        touch->node[touch->n_node++] = node;
+    }
+    pal_axpy3(f, scale, force_N);
 }
 
-double pal_touch_balance(pal_touch *touch, const pal_body *body, const double torque_Nm[3])
+/* the tangential part e - X (X.e) of a frame's first edge, or of its second where the first is too steep; its other
+ * end, or -1 */
+static int tangent_edge(const pal_body *body, int slot, const double X[3], double edge[3], double tangent[3])
 {
-    double centre[3] = {0}, lack[3], inertia[9] = {0}, turn[3], largest = 0, added = 0;
-    if (touch->n_node == 0) return 1;
-    pal_copy3(lack, torque_Nm);
-    for (int i = 0; i < touch->n_node; i++)
-        pal_axpy3(centre, 1.0 / touch->n_node, body->d + 3 * (size_t)touch->node[i]);
+    const double *o = body->d + 3 * (size_t)body->skin->frame[slot];
+    for (int k = 0; k < 2; k++) {
+        int end = body->skin->frame_edge[2 * (size_t)slot + (size_t)k];
+        if (end < 0) break;
+        pal_sub3(edge, body->d + 3 * (size_t)end, o);
+        pal_copy3(tangent, edge);
+        pal_axpy3(tangent, -pal_dot3(edge, X), X);
+        if (pal_dot3(tangent, tangent) > LEAST_TANGENT * LEAST_TANGENT * pal_dot3(edge, edge)) return end;
+    }
+    return -1;
+}
+
+/* The torque on a frame as forces on the nodes around it: the transpose of how X (unit of N = sum of fan normals) and Y
+ * (unit of an edge's part normal to X) turn. With spin w = X x X' + (Y'.Z) X the torque's work is
+ * (t x X).X' + (t.X) Y'.Z, where Y'.Z = (Z.e' - (e.X) Z.X') / |e_t| and X' = (1 - X X^T) N' / |N|. */
+static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const double torque[3])
+{
+    const pal_skin *skin = body->skin;
+    int node = skin->frame[slot];
+    const double *o = body->d + 3 * (size_t)node;
+    double N[3] = {0}, squares = 0, X[3], Y[3], Z[3], edge[3], tangent[3], h[3], f[3];
+    size_t first = (size_t)skin->fan_start[slot], past = (size_t)skin->fan_start[slot + 1];
+    for (size_t i = first; i < past; i++) {
+        double a[3], b[3];
+        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
+        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
+        pal_cross3(a, a, b);
+        pal_add3(N, N, a);
+        squares += pal_dot3(a, a);
+    }
+    double length = pal_norm3(N);
+    if (!(length * length > LEAST_NORMAL * LEAST_NORMAL * squares) || !pal_unit3(X, N, 0)) return;
+    int end = tangent_edge(body, slot, X, edge, tangent);
+    if (end < 0) return;
+    double reach = pal_norm3(tangent), twist = pal_dot3(torque, X) / reach;
+    pal_scale3(Y, 1 / reach, tangent);
+    pal_cross3(Z, X, Y);
+
+    /* the edge's own part of the twist about X */
+    add_force(touch, end, twist, Z);
+    add_force(touch, node, -twist, Z);
+    /* the rest tilts the normal */
+    pal_cross3(h, torque, X);
+    pal_axpy3(h, -twist * pal_dot3(edge, X), Z);
+    pal_axpy3(h, -pal_dot3(h, X), X);
+    pal_scale3(h, 1 / length, h);
+    for (size_t i = first; i < past; i++) {
+        double a[3], b[3];
+        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
+        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
+        pal_cross3(f, b, h);
+        add_force(touch, skin->fan[2 * i], 1, f);
+        add_force(touch, node, -1, f);
+        pal_cross3(f, h, a);
+        add_force(touch, skin->fan[2 * i + 1], 1, f);
+        add_force(touch, node, -1, f);
+    }
+}
+
+double pal_touch_gather(pal_touch *touch, const pal_body *body)
+{
+    double largest2 = 0;
+    for (int i = 0; i < touch->n_slot; i++) {
+        int slot = touch->slot[i];
+        add_force(touch, slot_node(body, slot), 1, touch->slot_force + 3 * (size_t)slot);
+        if (body->skin) turn_frame(touch, body, slot, touch->slot_torque + 3 * (size_t)slot);
+    }
     for (int i = 0; i < touch->n_node; i++) {
-        const double *x = body->d + 3 * (size_t)touch->node[i], *f = touch->force + 3 * (size_t)touch->node[i];
-        double m[3], r[3];
-        pal_cross3(m, x, f);
-        pal_sub3(lack, lack, m);
-        pal_sub3(r, x, centre);
-        double r2 = pal_dot3(r, r);
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++) inertia[3 * a + b] += (a == b ? r2 : 0) - r[a] * r[b];
-        largest = fmax(largest, pal_norm3(f));
+        const double *f = touch->force + 3 * (size_t)touch->node[i];
+        largest2 = fmax(largest2, pal_dot3(f, f));
     }
-    /* the rotation field about the centre has no net force because the centre is the plain mean */
-    if (solve33(inertia, lack, turn)) {
-        for (int pass = 0; pass < 2; pass++)
-            for (int i = 0; i < touch->n_node; i++) {
-                double r[3], extra[3];
-                pal_sub3(r, body->d + 3 * (size_t)touch->node[i], centre);
-                pal_cross3(extra, turn, r);
-                if (pass == 0)
-                    added = fmax(added, pal_norm3(extra));
-                else
-                    pal_axpy3(touch->force + 3 * (size_t)touch->node[i],
-                              fmin(1, MOST_TURN_SHARE * largest / fmax(added, 1e-300)), extra);
-            }
-    }
-    largest = 0;
-    for (int i = 0; i < touch->n_node; i++)
-        largest = fmax(largest, pal_norm3(touch->force + 3 * (size_t)touch->node[i]));
-    return body->load_cap_N > 0 && largest > body->load_cap_N ? body->load_cap_N / largest : 1;
+    double cap = body->load_cap_N;
+    return cap > 0 && largest2 > cap * cap ? cap / sqrt(largest2) : 1;
 }
 
 void pal_touch_apply(const pal_touch *touch, pal_body *body, double scale)

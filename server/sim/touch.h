@@ -5,8 +5,10 @@
  * OUTPUT); each sub-step then re-evaluates only those from the nodes. A force on a point goes to the nodes by its skin
  * weights, normalised to sum 1 in double precision, so that the nodes bear exactly the force that the tool gives.
  *
- * A skinned point does not lie on the weighted mean of its nodes, so node forces alone would have another torque than
- * the contact; pal_touch_apply adds the self-balanced rotation field w x (x_i - centre) that restores it.
+ * A skinned point p = sum w_i (x_i + R_i o_i) also moves when the frames R_i turn, and they turn with the faces around
+ * their nodes. Forces go back by the exact transpose of that: w_i f on the node, and the torque w_i (R_i o_i) x f on
+ * the frame as forces on the nodes of its fan. So contact does the same work on nodes as on the surface (without this
+ * it feeds energy into tissue and a resting tool trembles), and total force and torque are those of the contact.
  * Memory: the world's arena. Thread: [sim], pal_touch_make [load]. */
 #ifndef PAL_SIM_TOUCH_H
 #define PAL_SIM_TOUCH_H
@@ -25,12 +27,14 @@ typedef struct pal_touch {
     uint32_t *live_mark, *frame_mark, mark; /* a vertex or frame is live when its mark is `mark`       */
     double *x, *v;                          /* of live vertices, by vertex: m, m/s [n_vertex][3] each  */
 
-    /* forces on nodes, gathered for one tool at a time; row sums for all tools of a sub-step */
-    int n_node, n_row;
-    int32_t *node, *row_node; /* [n_node] [n_row]                */
-    uint32_t *node_mark, *row_mark, turn, row_turn;
-    double *force; /* N, by node                          [body n_node][3]        */
-    double *row;   /* sum of stiffness times weight, N/m  [body n_node]           */
+    /* forces of one tool at a time, on slots (frames of the skin, or nodes without one), then on nodes; row sums of all
+     * tools of a sub-step on slots */
+    int n_slot, n_node, n_row;
+    int32_t *slot, *node; /* in use [n_slot] [n_node] */
+    uint32_t *slot_mark, *node_mark, *row_mark, turn, row_turn;
+    double *slot_force, *slot_torque; /* N, Nm, by slot           [slots][3] each  */
+    double *force;                    /* N, by node               [body n_node][3] */
+    double *row;                      /* sum of stiffness times weight, N/m [slots] */
 } pal_touch;
 
 /* points, at most most_sample samples (spacing grows to keep to it); body must show something; MEMORY, REFUSED */
@@ -57,13 +61,11 @@ void pal_touch_row_begin(pal_touch *touch);
 void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double stiffness_N_m);
 double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int point, double alpha_per_dt2);
 
-/* forces of one tool: begin, push every point, then apply scale times all of it to body->load. `force_N` and
- * `torque_Nm` (about the body frame's origin) are what the points got in sum. */
+/* forces of one tool: begin, push every point, gather them on nodes, then apply scale times all of it to body->load */
 void pal_touch_force_begin(pal_touch *touch);
 void pal_touch_push(pal_touch *touch, const pal_body *body, int point, const double force_N[3]);
-/* corrects the torque, then returns the largest share of the gathered forces that keeps every node within
- * body->load_cap_N (1 when there is no cap) */
-double pal_touch_balance(pal_touch *touch, const pal_body *body, const double torque_Nm[3]);
+/* returns the largest share of the forces that keeps every node within body->load_cap_N (1 when there is no cap) */
+double pal_touch_gather(pal_touch *touch, const pal_body *body);
 void pal_touch_apply(const pal_touch *touch, pal_body *body, double scale);
 
 /* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */

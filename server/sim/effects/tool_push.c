@@ -12,7 +12,7 @@
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
- * Keys: stiffness_Pa_m (0: 20 E / radius), friction (Coulomb, 0), clamp_S (0.02: penetration correction a step, in box
+ * Keys: stiffness_Pa_m (0: 200 E / radius), friction (Coulomb, 0), clamp_S (0.02: penetration correction a step, in box
  * diagonals), near_m (0: the larger of a radius and 10 mm; within it a patch is published), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
@@ -70,7 +70,7 @@ static void take_material(tool_push *push, const pal_material *material)
 
 static double stiffness_Pa_m(const tool_push *push, double radius_m)
 {
-    return push->asked_Pa_m > 0 ? push->asked_Pa_m : 20 * push->young_Pa / radius_m;
+    return push->asked_Pa_m > 0 ? push->asked_Pa_m : 200 * push->young_Pa / radius_m;
 }
 
 static double near_m(const tool_push *push, double radius_m)
@@ -258,21 +258,19 @@ static void contact_force(const tool_push *push, const holder *h, contact *c, do
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    double alpha = ALPHA / (step->dt_s * step->dt_s), soft = tool->ramp * h->ease, sum[3] = {0}, torque[3] = {0};
+    double alpha = ALPHA / (step->dt_s * step->dt_s), soft = tool->ramp * h->ease, sum[3] = {0};
     if (h->n_contact == 0 || soft <= 0) return;
     pal_touch_force_begin(&push->touch);
     for (int i = 0; i < h->n_contact; i++) {
         contact *c = &h->contact[i];
-        double k = soft * c->k_N_m * pal_touch_row_scale(&push->touch, body, c->point, alpha), moment[3];
+        double k = soft * c->k_N_m * pal_touch_row_scale(&push->touch, body, c->point, alpha);
         contact_force(push, h, c, k, step->dt_s);
         pal_touch_push(&push->touch, body, c->point, c->force);
         pal_add3(sum, sum, c->force);
-        pal_cross3(moment, c->x, c->force);
-        pal_add3(torque, torque, moment);
     }
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     pal_scale3(h->total, -1, sum);
-    double room = fmin(pal_tool_room(tool, h->total), pal_touch_balance(&push->touch, body, torque));
+    double room = fmin(pal_tool_room(tool, h->total), pal_touch_gather(&push->touch, body));
     pal_touch_apply(&push->touch, body, room);
     pal_scale3(h->total, room, h->total);
     for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
