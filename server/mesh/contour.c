@@ -2,7 +2,7 @@
  *
  * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face make a tetrahedron
  * with each of the face's four edges; all tetrahedra are alike, so the triangles have no preferred direction. A
- * crossing stays 3 % of its edge away from both ends, which keeps triangles from vanishing and moves no topology. */
+ * crossing stays 1e-4 of its edge away from both ends, which keeps corners apart and moves no topology. */
 #include "server/mesh/contour.h"
 
 #include "server/base/vec3.h"
@@ -11,7 +11,7 @@
 #include <string.h>
 
 static const double most_point = 2e8;
-static const double end_gap = 0.03;
+static const double end_gap = 1e-4;
 
 typedef struct lattice {
     double low[3], h;

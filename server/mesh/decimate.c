@@ -15,6 +15,8 @@
 enum { MOST_RING = 24 };
 /* pull to the edge's middle, as part of the quadric's area: spreads vertices evenly where the surface is flat */
 static const double pull = 1e-3;
+/* triangles below this shape (0 flat, 0.577 equilateral) are thin */
+static const double thin = 0.12;
 
 /* x'Ax + 2b'x + c with A symmetric (xx xy xz yy yz zz), and the area it stands for */
 typedef struct quadric {
@@ -165,20 +167,26 @@ static double thinness(const double a[3], const double b[3], const double c[3], 
     return sum > 0 ? 2 * pal_norm3(n) / sum : 0;
 }
 
-/* do the triangles of one end stay upright and not too thin when it moves to x? other: the end that vanishes with it */
+/* do the triangles of one end stay upright and not too thin when it moves to x? other: the end that vanishes with it.
+ * The normal of a thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
 static bool shape_allows(const pass *p, int32_t u, int32_t other, int32_t ring[MOST_RING][2], int n, const double x[3])
 {
-    double least_before = 1, least_after = 1;
+    double least_before = 1, least_after = 1, largest = 0, shape[MOST_RING], normal[MOST_RING][3], mean[3] = {0, 0, 0};
+    const double *xs = p->s->x, *xu = xs + 3 * (size_t)u;
     for (int k = 0; k < n; k++) {
-        const double *b = p->s->x + 3 * (size_t)ring[k][0], *c = p->s->x + 3 * (size_t)ring[k][1];
-        double n0[3], n1[3], before = thinness(p->s->x + 3 * (size_t)u, b, c, n0), after;
-        least_before = fmin(least_before, before);
-        if (ring[k][0] == other || ring[k][1] == other) continue;
-        after = thinness(x, b, c, n1);
-        least_after = fmin(least_after, after);
-        if (!(pal_dot3(n0, n1) > 0.25 * pal_norm3(n0) * pal_norm3(n1))) return false;
+        shape[k] = thinness(xu, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], normal[k]);
+        least_before = fmin(least_before, shape[k]);
+        largest = fmax(largest, pal_norm3(normal[k]));
+        pal_add3(mean, mean, normal[k]);
     }
-    return least_after > 0.12 || least_after > least_before;
+    for (int k = 0; k < n; k++) {
+        if (ring[k][0] == other || ring[k][1] == other) continue;
+        bool vague = shape[k] < thin || pal_norm3(normal[k]) < largest / 20;
+        double after[3], *before = vague ? mean : normal[k];
+        least_after = fmin(least_after, thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
+        if (!(pal_dot3(before, after) > 0.25 * pal_norm3(before) * pal_norm3(after))) return false;
+    }
+    return least_after > thin || least_after > least_before;
 }
 
 /* collapses u into v if that is allowed */
