@@ -19,8 +19,9 @@
 
 /* the majority settles up to this share of the voxels that are settled already */
 #define FEW_DISPUTED 0.05
-/* an open surface must enclose at least this share of its inside voxels beyond doubt: by two axes or this number */
-#define SURE_SHARE   0.5
+/* an open surface must enclose beyond doubt (by two axes or this winding number) at least this share of its inside
+ * voxels, and of those that two axes claim */
+#define SURE_SHARE 0.5
 #define SURE_WINDING 0.75
 /* length of the sum of area normals over the area: 0 closed, 1 flat */
 #define MOST_ONE_SIDED 0.8
@@ -59,7 +60,7 @@ typedef struct decision {
     pal_surface facing; /* the surface with its parts outward and cavities inward; shares x */
     pal_box_tree *tree; /* of facing */
     double most_winding;
-    int64_t n_sure;
+    int64_t n_sure, n_claimed; /* see SURE_SHARE */
 } decision;
 
 static void clear_inside(decision *d)
@@ -216,6 +217,7 @@ static pal_err count_votes(decision *d, const uint8_t *vote)
         verdict v = judge(vote[i]);
         n_inside += v == INSIDE;
         n_disputed += v == DISPUTED;
+        d->n_claimed += (vote[i] & 15) >= 2;
     }
     bool by_winding = (double)n_disputed > FEW_DISPUTED * (double)n_inside;
     strcpy(d->report->method, by_winding ? "winding" : "vote");
@@ -310,14 +312,16 @@ static pal_err check_meant(decision *d, bool open, int resolution)
     int64_t n_inside = pal_bits_count(d->inside);
     double area, sided = one_sided(d, &area);
     if (open) {
-        if (n_inside > 0 && sided <= MOST_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside)
+        if (n_inside > 0 && sided <= MOST_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside &&
+            (double)d->n_sure >= SURE_SHARE * (double)d->n_claimed)
             return PAL_ERR_OK;
         return pal_note_set(
             d->note, PAL_ERR_REFUSED,
             "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
             "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
-            "are inside beyond doubt",
-            d->scan->n_tri, sided, MOST_ONE_SIDED, d->most_winding, (long long)d->n_sure, (long long)n_inside);
+            "are inside beyond doubt, two axes claim %lld",
+            d->scan->n_tri, sided, MOST_ONE_SIDED, d->most_winding, (long long)d->n_sure, (long long)n_inside,
+            (long long)d->n_claimed);
     }
     if (n_inside > 0) return PAL_ERR_OK;
     double volume = d->report->surface_volume_m3, thick = area > 0 ? 2 * volume / area : 0;

@@ -1,0 +1,1 @@
+pal_fuzz(prepared LINK pal_mesh)
