@@ -1,0 +1,342 @@
+#include "clients/lcm_bridge/lcm_bridge.h"
+#include "clients/link/lcm_convert.h"
+#include "palpate_body_frame_t.h"
+#include "palpate_session_status_t.h"
+#include "protocol/frame_codec.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define POSE_RATE_HZ 245.0 /* the server allows 250 */
+#define POSE_BURST   10.0
+#define SILENCE_NS   5000000000u
+#define REPEAT_NS    1000000000u
+#define RESTARTED_NS 1000000000u /* after this pause a sender may count from the start again */
+
+typedef struct bridge_tool {
+    pal_lcm_bridge *bridge;
+    pal_link *link; /* NULL: no member */
+    int index, held;
+    double tokens;
+    uint32_t seq;
+    uint64_t last_ns;
+} bridge_tool;
+
+typedef struct bridge_part {
+    uint8_t *bytes; /* newest frame [n_byte] */
+    size_t n_byte, cap;
+    pal_frame_head head;
+    uint64_t sent_ns;
+} bridge_part;
+
+struct pal_lcm_bridge {
+    pal_link_loop *loop;
+    pal_lcm_link *lcm;
+    pal_link *watcher;
+    char server[256], session[PAL_WIRE_NAME_BYTES], organ[PAL_WIRE_TEXT_BYTES];
+    bool named, too_long_told;
+    pal_wire_topology topology;
+    bridge_part part[PAL_WIRE_PART_MAX];
+    bridge_tool tool[PAL_WIRE_TOOL_MAX];
+    uint32_t status_seq, n_tool;
+    uint64_t status_ns;
+    pal_lcm_bridge_counts count;
+};
+
+static void bridge_body(pal_lcm_bridge *b, uint32_t index)
+{
+    bridge_part *part = &b->part[index];
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
+    part->sent_ns = pal_clock_ns();
+    if (part->n_byte > PAL_LCM_DATAGRAM_MAX) {
+        b->count.n_frame_dropped++;
+        if (!b->too_long_told)
+            pal_log(PAL_LOG_WARN, "lcm_frame", "frames of part %u have %zu bytes, more than a datagram of %d: dropped",
+                    index, part->n_byte, PAL_LCM_DATAGRAM_MAX);
+        b->too_long_told = true;
+        return;
+    }
+    const palpate_body_frame_t frame = {.utime = (int64_t)part->head.sim_time_us,
+                                        .epoch = (int32_t)part->head.epoch,
+                                        .seq = (int32_t)part->head.seq,
+                                        .version = PAL_LCM_VERSION,
+                                        .part = (int16_t)index,
+                                        .cycle = (int32_t)part->head.cycle,
+                                        .size = (int32_t)part->n_byte,
+                                        .payload = part->bytes};
+    pal_lcm_channel(channel, b->session, "BODY", (int)index);
+    if (!pal_lcm_link_publish(b->lcm, channel, palpate_body_frame_t_get_type_info(), &frame)) b->count.n_frame++;
+}
+
+/* server's status, or NULL when there is no server */
+static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
+{
+    static const pal_wire_status none;
+    const bool running = s != NULL;
+    if (!s) s = &none;
+    const uint32_t n_part = b->topology.n_part;
+    int32_t epoch[PAL_WIRE_PART_MAX];
+    char *asset[PAL_WIRE_PART_MAX];
+    for (uint32_t i = 0; i < n_part; i++) {
+        epoch[i] = (int32_t)b->topology.part[i].epoch;
+        asset[i] = b->topology.part[i].asset;
+    }
+    char note[PAL_WIRE_TEXT_BYTES], channel[PAL_LCM_CHANNEL_MAX + 1];
+    memcpy(note, s->note, sizeof note);
+    const palpate_session_status_t status = {.utime = (int64_t)(pal_clock_ns() / 1000),
+                                             .seq = (int32_t)++b->status_seq,
+                                             .version = PAL_LCM_VERSION,
+                                             .state = running ? (s->frozen ? 3 : (s->paused ? 2 : 1)) : 0,
+                                             .session = b->session,
+                                             .organ = b->organ,
+                                             .server = b->server,
+                                             .tick = (int64_t)s->tick,
+                                             .sim_time_s = s->sim_time_s,
+                                             .step_rate_hz = (float)s->step_rate_hz,
+                                             .slowdown = (float)s->slowdown,
+                                             .step_ms = (float)s->step_ms,
+                                             .substeps = (int32_t)s->substeps,
+                                             .members = (int32_t)s->n_member,
+                                             .late = (int32_t)s->n_late,
+                                             .refused = (int32_t)s->n_refused,
+                                             .n_frame = (int32_t)b->count.n_frame,
+                                             .n_frame_dropped = (int32_t)b->count.n_frame_dropped,
+                                             .n_state = (int32_t)b->count.n_state,
+                                             .n_state_refused = (int32_t)b->count.n_state_refused,
+                                             .n_tool = (int32_t)b->n_tool,
+                                             .n_part = (int8_t)n_part,
+                                             .epoch = epoch,
+                                             .asset = asset,
+                                             .note = note};
+    pal_lcm_channel(channel, b->session, "STATUS", -1);
+    b->status_ns = pal_clock_ns();
+    if (!pal_lcm_link_publish(b->lcm, channel, palpate_session_status_t_get_type_info(), &status)) b->count.n_status++;
+}
+
+static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
+{
+    pal_frame_head head;
+    if (pal_frame_get_head(bytes, n_byte, &head) || head.part >= b->topology.n_part) return;
+    bridge_part *part = &b->part[head.part];
+    if (n_byte > part->cap) {
+        uint8_t *grown = realloc(part->bytes, n_byte);
+        if (!grown) return;
+        part->bytes = grown;
+        part->cap = n_byte;
+    }
+    memcpy(part->bytes, bytes, n_byte);
+    part->n_byte = n_byte;
+    part->head = head;
+    bridge_body(b, head.part);
+}
+
+static void bridge_acknowledge(pal_link *link, const uint8_t *bytes, size_t n_byte)
+{
+    pal_wire_tools tools;
+    if (pal_wire_get_tools(bytes, n_byte, &tools)) return;
+    pal_link_send_ack(link, &(pal_wire_ack){.cycle = tools.cycle});
+}
+
+static void watcher_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+{
+    if (head->kind == PAL_WIRE_FRAME) bridge_frame(user, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) bridge_acknowledge(link, bytes, n_byte);
+}
+
+static void watcher_control(void *user, pal_link *link, const pal_control *c)
+{
+    (void)link;
+    pal_lcm_bridge *b = user;
+    if (c->type == PAL_CONTROL_HELLO) {
+        if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);
+        memcpy(b->organ, c->hello.organ, sizeof b->organ);
+        b->n_tool = c->hello.n_tool;
+        b->topology.n_part = c->hello.n_part;
+        memcpy(b->topology.part, c->hello.part, sizeof b->topology.part);
+        for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
+        pal_log(PAL_LOG_INFO, "lcm_joined", "session %s: %s", b->session, b->organ);
+    }
+    if (c->type == PAL_CONTROL_TOPOLOGY) b->topology = c->topology;
+    if (c->type == PAL_CONTROL_STATUS) bridge_status(b, &c->status);
+}
+
+static void watcher_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+{
+    (void)link;
+    pal_lcm_bridge *b = user;
+    if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) {
+        pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, why);
+        for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
+    }
+    if (state == PAL_LINK_ENDED) pal_link_stop(b->loop);
+}
+
+/* the member of one tool */
+static void tool_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+{
+    bridge_tool *tool = user;
+    pal_lcm_bridge *b = tool->bridge;
+    pal_wire_haptic haptic;
+    if (head->kind == PAL_WIRE_TOOLS) bridge_acknowledge(link, bytes, n_byte);
+    if (head->kind != PAL_WIRE_HAPTIC || pal_wire_get_haptic(bytes, n_byte, &haptic) || haptic.tool != tool->index)
+        return;
+    palpate_haptic_model_t model;
+    palpate_contact_patch_t patch[PAL_WIRE_PATCH_MAX];
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
+    pal_lcm_from_haptic(&haptic, &model, patch);
+    pal_lcm_channel(channel, b->session, "HMODEL", tool->index);
+    if (!pal_lcm_link_publish(b->lcm, channel, palpate_haptic_model_t_get_type_info(), &model)) b->count.n_model++;
+}
+
+static void tool_control(void *user, pal_link *link, const pal_control *c)
+{
+    bridge_tool *tool = user;
+    const pal_wire_hello *hello = pal_link_hello(link);
+    if (c->type == PAL_CONTROL_HELLO) tool->held = c->hello.you_tool;
+    if (c->type == PAL_CONTROL_MEMBERS && hello)
+        for (uint32_t i = 0; i < c->members.n_member; i++)
+            if (c->members.member[i].id == hello->you_id) tool->held = c->members.member[i].tool;
+    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->problem.text);
+}
+
+static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+{
+    (void)link;
+    bridge_tool *tool = user;
+    if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) tool->held = PAL_WIRE_TOOL_NONE;
+    if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, why);
+}
+
+static const pal_link_events tool_events = {tool_state, tool_control, tool_message, NULL};
+
+static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
+{
+    char name[PAL_WIRE_MEMBER_NAME];
+    snprintf(name, sizeof name, "lcm tool %d", tool->index);
+    const pal_link_options options = {.url = b->server,
+                                      .name = name,
+                                      .role = PAL_WIRE_ROLE_TRAINEE,
+                                      .tool = tool->index,
+                                      .events = &tool_events,
+                                      .user = tool};
+    tool->held = PAL_WIRE_TOOL_NONE;
+    tool->seq = 0;
+    if (pal_link_open(b->loop, &options, NULL, &tool->link)) tool->link = NULL;
+    b->count.n_tool += tool->link != NULL;
+}
+
+/* a walked tool_state_t */
+static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t n_byte)
+{
+    bridge_tool *tool = &b->tool[index];
+    pal_wire_pose pose;
+    const uint64_t now = pal_clock_ns();
+    if (pal_lcm_to_pose(bytes, n_byte, &pose) || pose.tool != index) {
+        b->count.n_state_refused++;
+        return;
+    }
+    const uint64_t silence = now - tool->last_ns;
+    /* reordered or repeated datagrams; a sender that was silent may have started again */
+    if (tool->link && silence < RESTARTED_NS && (int32_t)(pose.seq - tool->seq) <= 0) {
+        b->count.n_state_refused++;
+        return;
+    }
+    b->count.n_state++;
+    tool->last_ns = now;
+    tool->seq = pose.seq;
+    tool->tokens = tool->tokens + POSE_RATE_HZ * 1e-9 * (double)silence;
+    if (tool->tokens > POSE_BURST) tool->tokens = POSE_BURST;
+    if (!tool->link) tool_open(b, tool);
+    if (!tool->link || tool->held != index || tool->tokens < 1) return;
+    tool->tokens -= 1;
+    pal_link_send_pose(tool->link, &pose);
+}
+
+static void bridge_lcm_message(void *user, const char *channel, const void *bytes, size_t n_byte)
+{
+    pal_lcm_bridge *b = user;
+    const int index = pal_lcm_channel_index(channel, b->session, "TOOL");
+    if (index < 0) return;
+    if (index < PAL_WIRE_TOOL_MAX && (uint32_t)index < b->n_tool)
+        bridge_state(b, index, bytes, n_byte);
+    else
+        b->count.n_state_refused++;
+}
+
+static void bridge_lcm_refused(void *user, const char *channel, pal_walk why)
+{
+    pal_lcm_bridge *b = user;
+    b->count.n_state_refused++;
+    pal_log(PAL_LOG_DEBUG, "lcm_refused", "%.63s: %s", channel, pal_walk_text(why));
+}
+
+/* four times a second: tools nobody moves are given back or asked for again, parts at rest repeated, status kept alive
+ */
+static void bridge_tidy(void *user)
+{
+    pal_lcm_bridge *b = user;
+    const uint64_t now = pal_clock_ns();
+    for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) {
+        bridge_tool *tool = &b->tool[i];
+        if (!tool->link) continue;
+        if (now - tool->last_ns > SILENCE_NS || pal_link_now(tool->link) == PAL_LINK_ENDED) {
+            pal_link_close(tool->link);
+            tool->link = NULL;
+            b->count.n_tool--;
+        } else if (pal_link_now(tool->link) == PAL_LINK_JOINED && tool->held != i) {
+            pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE, .tool = i});
+        }
+    }
+    for (uint32_t i = 0; i < b->topology.n_part; i++)
+        if (b->part[i].n_byte > 0 && now - b->part[i].sent_ns > REPEAT_NS) bridge_body(b, i);
+    if (pal_link_now(b->watcher) != PAL_LINK_JOINED && now - b->status_ns > REPEAT_NS && b->session[0])
+        bridge_status(b, NULL);
+}
+
+pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_note *note,
+                            pal_lcm_bridge **out)
+{
+    static const pal_link_events watcher_events = {watcher_state, watcher_control, watcher_message, NULL};
+    static const pal_lcm_events lcm_events = {bridge_lcm_message, bridge_lcm_refused};
+    pal_lcm_bridge *b = calloc(1, sizeof *b);
+    if (!b) return PAL_ERR_MEMORY;
+    b->loop = loop;
+    snprintf(b->server, sizeof b->server, "%s", options->server);
+    b->named = options->session != NULL;
+    if (b->named) snprintf(b->session, sizeof b->session, "%s", options->session);
+    for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) b->tool[i] = (bridge_tool){.bridge = b, .index = i};
+    const pal_link_options link = {.url = b->server,
+                                   .name = "palpate-lcm",
+                                   .role = PAL_WIRE_ROLE_VIEWER,
+                                   .tool = PAL_WIRE_TOOL_NONE,
+                                   .events = &watcher_events,
+                                   .user = b};
+    pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, note, &b->lcm);
+    if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/TOOL/.*", palpate_tool_state_t_get_type_info());
+    if (!err) err = pal_link_open(loop, &link, note, &b->watcher);
+    if (!err && !pal_link_every(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
+    if (err) {
+        pal_link_close(b->watcher);
+        pal_lcm_link_close(b->lcm);
+        free(b);
+        return err;
+    }
+    *out = b;
+    return PAL_ERR_OK;
+}
+
+void pal_lcm_bridge_close(pal_lcm_bridge *bridge)
+{
+    if (!bridge) return;
+    pal_lcm_link_close(bridge->lcm);
+    for (int i = 0; i < PAL_WIRE_PART_MAX; i++) free(bridge->part[i].bytes);
+    free(bridge);
+}
+
+pal_lcm_bridge_counts pal_lcm_bridge_count(const pal_lcm_bridge *bridge)
+{
+    return bridge->count;
+}

@@ -1,0 +1,32 @@
+/* palpate.v1 on one side, LCM on the other: what palpate-lcm does.
+ *
+ * One watching member takes frames and status to LCM; each tool whose states come in on
+ * PALPATE1/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE
+ * (at most 245 a second) and brings HAPTIC back as HMODEL/<n>; after 5 s of silence it gives the tool back.
+ *   out  BODY/<part>   body_frame_t: the FRAME message byte for byte, one datagram; repeated after 1 s without change,
+ * so that a late listener sees a part at rest; longer than 65,000 bytes: dropped, counted, one warning STATUS
+ * session_status_t with every status message of the server, 1 Hz without a server HMODEL/<n>    haptic_model_t in
+ * TOOL/<n>      tool_state_t: length walk, then version, range and finite numbers, seq growing Thread: [net]. */
+#ifndef PAL_CLIENTS_LCM_BRIDGE_LCM_BRIDGE_H
+#define PAL_CLIENTS_LCM_BRIDGE_LCM_BRIDGE_H
+#include "clients/link/lcm_link.h"
+
+typedef struct pal_lcm_bridge pal_lcm_bridge;
+
+typedef struct pal_lcm_bridge_options {
+    const char *server;  /* ws://host:port/ws; borrowed                      */
+    const char *lcm;     /* URL of the bus; borrowed                         */
+    const char *session; /* name in channels; NULL: the server's; borrowed   */
+} pal_lcm_bridge_options;
+
+typedef struct pal_lcm_bridge_counts {
+    uint64_t n_frame, n_frame_dropped, n_state, n_state_refused, n_model, n_status;
+    int n_tool; /* with a member now */
+} pal_lcm_bridge_counts;
+
+/* REFUSED: a URL. Borrows loop. */
+pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_note *note,
+                            pal_lcm_bridge **out);
+void pal_lcm_bridge_close(pal_lcm_bridge *bridge); /* after the loop is destroyed; NULL is fine */
+pal_lcm_bridge_counts pal_lcm_bridge_count(const pal_lcm_bridge *bridge);
+#endif

@@ -1,0 +1,19 @@
+/* palpate.v1 structs to LCM messages of haptics.md 5 and back. The messages decoded here have passed the length walk;
+ * what a message may not say (version, tool, counts, ranges) is refused here. Thread: any. */
+#ifndef PAL_CLIENTS_LINK_LCM_CONVERT_H
+#define PAL_CLIENTS_LINK_LCM_CONVERT_H
+#include "palpate_haptic_model_t.h"
+#include "palpate_tool_state_t.h"
+#include "protocol/wire.h"
+#include "server/base/err.h"
+
+#include <stddef.h>
+
+/* encoded tool_state_t to a pose; REFUSED: version, tool, place or quaternion out of range */
+pal_err pal_lcm_to_pose(const void *bytes, size_t n_byte, pal_wire_pose *out);
+void pal_lcm_from_pose(const pal_wire_pose *pose, palpate_tool_state_t *out);
+/* encoded haptic_model_t to HAPTIC; REFUSED: version, tool, number of patches, flags */
+pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out);
+/* patches are written to patch [PAL_WIRE_PATCH_MAX], which out borrows */
+void pal_lcm_from_haptic(const pal_wire_haptic *haptic, palpate_haptic_model_t *out, palpate_contact_patch_t *patch);
+#endif

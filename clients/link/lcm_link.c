@@ -1,0 +1,227 @@
+#include "clients/link/lcm_link.h"
+#include "server/base/log.h"
+
+#include <arpa/inet.h>
+#include <ctype.h>
+#include <errno.h>
+#include <lcm/lcm.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { LCM_SUBSCRIPTIONS = 8, LCM_URL_BYTES = 256, LCM_RETRY_S = 5, LCM_BUFFER_WANTED = 4000000, LCM_QUEUE = 100 };
+#define LCM_DEFAULT_GROUP "239.255.76.67:7667"
+
+typedef struct lcm_subscriber {
+    pal_lcm_link *link;
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
+    const lcm_type_info_t *type;
+} lcm_subscriber;
+
+struct pal_lcm_link {
+    pal_link_loop *loop;
+    char url[LCM_URL_BYTES];
+    bool memory, warned;
+    const pal_lcm_events *events;
+    void *user;
+    lcm_t *lcm;
+    int n_subscriber;
+    lcm_subscriber subscriber[LCM_SUBSCRIPTIONS];
+    uint8_t *buffer; /* of publish  [PAL_LCM_DATAGRAM_MAX + 512] */
+};
+
+/* is there a route to the group? connecting a datagram socket sends nothing and tells */
+static bool lcm_route(const char *url)
+{
+    char host[64];
+    const char *at = strstr(url, "://") + 3;
+    const size_t n = strcspn(at, ":/?");
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(7667)};
+    if (n == 0 || n >= sizeof host) return true;
+    memcpy(host, at, n);
+    host[n] = 0;
+    if (inet_pton(AF_INET, host, &to.sin_addr) != 1) return true;
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    if (fd < 0) return true;
+    const bool reachable = connect(fd, (struct sockaddr *)&to, sizeof to) == 0 || errno != ENETUNREACH;
+    close(fd);
+    return reachable;
+}
+
+/* LCM asks the kernel for a buffer that a plain system cuts to 208 KiB */
+static void lcm_check_buffer(void)
+{
+    FILE *file = fopen("/proc/sys/net/core/rmem_max", "r");
+    long most = 0;
+    if (!file) return;
+    if (fscanf(file, "%ld", &most) == 1 && most < LCM_BUFFER_WANTED)
+        pal_log(PAL_LOG_INFO, "lcm_buffer",
+                "the kernel allows %ld bytes of receive buffer; bursts are lost less with `sysctl -w "
+                "net.core.rmem_max=%d`",
+                most, LCM_BUFFER_WANTED);
+    fclose(file);
+}
+
+static void lcm_received(const lcm_recv_buf_t *buffer, const char *channel, void *user)
+{
+    lcm_subscriber *s = user;
+    pal_walk walk = pal_lcm_walk(s->type, buffer->data, buffer->data_size);
+    if (strnlen(channel, PAL_LCM_CHANNEL_MAX + 1) > PAL_LCM_CHANNEL_MAX) walk = PAL_WALK_STRING;
+    if (!walk)
+        s->link->events->message(s->link->user, channel, buffer->data, buffer->data_size);
+    else if (s->link->events->refused)
+        s->link->events->refused(s->link->user, channel, walk);
+}
+
+static pal_err lcm_attach(pal_lcm_link *link, lcm_subscriber *s)
+{
+    lcm_subscription_t *subscription = lcm_subscribe(link->lcm, s->channel, lcm_received, s);
+    if (!subscription) return PAL_ERR_MEMORY;
+    lcm_subscription_set_queue_capacity(subscription, LCM_QUEUE);
+    return PAL_ERR_OK;
+}
+
+static void lcm_readable(void *user)
+{
+    pal_lcm_link *link = user;
+    /* one message a time: the loop comes again while there are more */
+    lcm_handle_timeout(link->lcm, 0);
+}
+
+static bool lcm_try(pal_lcm_link *link)
+{
+    if (!link->memory && !lcm_route(link->url)) {
+        if (!link->warned)
+            pal_log(PAL_LOG_WARN, "lcm_route",
+                    "no multicast route, LCM stays off (all else runs); add one with `ip route add 224.0.0.0/4 dev "
+                    "lo` (or the rig's interface)");
+        link->warned = true;
+        return false;
+    }
+    link->lcm = lcm_create(link->url);
+    if (!link->lcm) {
+        if (!link->warned)
+            pal_log(PAL_LOG_WARN, "lcm_open", "%s: LCM cannot be opened, it will be tried again", link->url);
+        link->warned = true;
+        return false;
+    }
+    for (int i = 0; i < link->n_subscriber; i++) lcm_attach(link, &link->subscriber[i]);
+    if (link->loop) pal_link_watch(link->loop, lcm_get_fileno(link->lcm), lcm_readable, link);
+    return true;
+}
+
+static void lcm_retry(void *user)
+{
+    pal_lcm_link *link = user;
+    if (!link->lcm && lcm_try(link)) pal_log(PAL_LOG_INFO, "lcm_open", "%s is open", link->url);
+}
+
+/* lcm:// is udpm://, with the default group when none is named, and a large receive buffer unless one is */
+static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, pal_note *note)
+{
+    const char *rest = NULL;
+    *memory = !strcmp(url, "memq://");
+    if (!strncmp(url, "lcm://", 6)) rest = url + 6;
+    if (!strncmp(url, "udpm://", 7)) rest = url + 7;
+    if (*memory) {
+        strcpy(out, url);
+        return PAL_ERR_OK;
+    }
+    if (!rest) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not an lcm://, udpm:// or memq:// address", url);
+    const size_t n_host = strcspn(rest, "?");
+    char host[128];
+    if (n_host >= sizeof host) return pal_note_set(note, PAL_ERR_REFUSED, "%s: too long", url);
+    memcpy(host, rest, n_host);
+    host[n_host] = 0;
+    const char *options = rest[n_host] ? rest + n_host + 1 : "ttl=0";
+    char buffer[40] = "";
+    if (!strstr(options, "recv_buf_size")) snprintf(buffer, sizeof buffer, "&recv_buf_size=%d", LCM_BUFFER_WANTED);
+    const int n = snprintf(out, LCM_URL_BYTES, "udpm://%s?%s%s", n_host ? host : LCM_DEFAULT_GROUP, options, buffer);
+    return n < LCM_URL_BYTES ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_REFUSED, "%s: too long", url);
+}
+
+pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
+                          pal_note *note, pal_lcm_link **out)
+{
+    pal_lcm_link *link = calloc(1, sizeof *link);
+    if (!link) return PAL_ERR_MEMORY;
+    link->buffer = malloc(PAL_LCM_DATAGRAM_MAX + 512);
+    link->events = events;
+    link->user = user;
+    pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, note) : PAL_ERR_MEMORY;
+    /* a memory queue belongs to its caller's own loop of calls */
+    link->loop = link->memory ? NULL : loop;
+    if (!err && link->loop && !pal_link_every(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link)) err = PAL_ERR_MEMORY;
+    if (err) {
+        pal_lcm_link_close(link);
+        return err;
+    }
+    if (!link->memory) lcm_check_buffer();
+    lcm_try(link);
+    *out = link;
+    return PAL_ERR_OK;
+}
+
+void pal_lcm_link_close(pal_lcm_link *link)
+{
+    if (!link) return;
+    if (link->lcm) lcm_destroy(link->lcm);
+    free(link->buffer);
+    free(link);
+}
+
+bool pal_lcm_link_up(const pal_lcm_link *link)
+{
+    return link->lcm != NULL;
+}
+
+pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type)
+{
+    if (link->n_subscriber == LCM_SUBSCRIPTIONS) return PAL_ERR_FULL;
+    lcm_subscriber *s = &link->subscriber[link->n_subscriber++];
+    s->link = link;
+    s->type = type;
+    strncpy(s->channel, channel, sizeof s->channel - 1);
+    return link->lcm ? lcm_attach(link, s) : PAL_ERR_OK;
+}
+
+pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type, const void *message)
+{
+    if (!link->lcm) return PAL_ERR_STATE;
+    const int wanted = type->encoded_size(message);
+    if (wanted < 0 || wanted > PAL_LCM_DATAGRAM_MAX + 512 - 128) return PAL_ERR_REFUSED;
+    const int n = type->encode(link->buffer, 0, wanted, message);
+    if (n < 0) return PAL_ERR_REFUSED;
+    return lcm_publish(link->lcm, channel, link->buffer, (unsigned)n) == 0 ? PAL_ERR_OK : PAL_ERR_IO;
+}
+
+void pal_lcm_link_handle(pal_lcm_link *link)
+{
+    while (link->lcm && lcm_handle_timeout(link->lcm, 0) > 0) {
+    }
+}
+
+void pal_lcm_channel(char channel[PAL_LCM_CHANNEL_MAX + 1], const char *session, const char *what, int n)
+{
+    char clean[32], number[16] = "";
+    size_t k = 0;
+    for (; session[k] && k < sizeof clean - 1; k++) {
+        const char c = session[k];
+        clean[k] = isalnum((unsigned char)c) || c == '.' || c == '-' ? c : '_';
+    }
+    clean[k] = 0;
+    if (n >= 0) snprintf(number, sizeof number, "/%d", n);
+    snprintf(channel, PAL_LCM_CHANNEL_MAX + 1, PAL_LCM_PREFIX "/%s/%.12s%.6s", clean, what, number);
+}
+
+int pal_lcm_channel_index(const char *channel, const char *session, const char *what)
+{
+    const char *slash = strrchr(channel, '/');
+    if (!slash || !isdigit((unsigned char)slash[1]) || strlen(slash + 1) > 3) return -1;
+    const int n = atoi(slash + 1);
+    char wanted[PAL_LCM_CHANNEL_MAX + 1];
+    pal_lcm_channel(wanted, session, what, n);
+    return strcmp(wanted, channel) ? -1 : n;
+}
