@@ -6,9 +6,7 @@
 #include <string.h>
 
 static const pal_command_entry command[] = {
-#ifdef PAL_WITH_SERVE
     {"serve", "run scenes and let browsers and devices touch them", command_serve},
-#endif
     {"prepare", "turn a surface or a segmented scan into a scene that serve can run", command_prepare},
     {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
     {"replay", "run a recorded input log again and compare the world's hashes", command_replay},

@@ -23,4 +23,5 @@ int command_bench(int argc, char **argv);
 int bench_mesh(const char *ply_path_or_null, bool json);
 int bench_springs(bool json);
 int bench_protocol(bool json);
+int bench_latency(bool json);
 #endif
