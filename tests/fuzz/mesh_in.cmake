@@ -1,0 +1,2 @@
+pal_fuzz(mesh_file LINK pal_mesh)
+pal_fuzz(label_volume LINK pal_mesh)
