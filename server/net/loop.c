@@ -74,6 +74,8 @@ static pal_err open_context(pal_loop *loop, int most_socket, pal_note *note)
     info.timeout_secs = 5;
     loop->context = lws_create_context(&info);
     if (!loop->context) return pal_note_set(note, PAL_ERR_IO, "the network context could not be made");
+    /* requests are matched to vhosts by port: this one must not look like a server */
+    info.port = CONTEXT_PORT_NO_LISTEN;
     info.vhost_name = "wake";
     info.protocols = wake_protocols;
     if (!lws_create_vhost(loop->context, &info))
@@ -94,14 +96,18 @@ pal_err pal_loop_create(bool sockets, int most_socket, pal_note *note, pal_loop 
     return PAL_ERR_OK;
 }
 
+void pal_loop_shut(pal_loop *loop)
+{
+    if (!loop || !loop->context) return;
+    lws_sul_schedule(loop->context, 0, &loop->tick_timer, NULL, LWS_SET_TIMER_USEC_CANCEL);
+    lws_sul_schedule(loop->context, 0, &loop->due_timer, NULL, LWS_SET_TIMER_USEC_CANCEL);
+    lws_context_destroy(loop->context);
+    loop->context = NULL;
+}
+
 void pal_loop_destroy(pal_loop *loop)
 {
-    if (!loop) return;
-    if (loop->context) {
-        lws_sul_schedule(loop->context, 0, &loop->tick_timer, NULL, LWS_SET_TIMER_USEC_CANCEL);
-        lws_sul_schedule(loop->context, 0, &loop->due_timer, NULL, LWS_SET_TIMER_USEC_CANCEL);
-        lws_context_destroy(loop->context);
-    }
+    pal_loop_shut(loop);
     free(loop);
 }
 

@@ -20,7 +20,9 @@ typedef struct pal_loop_events {
 
 /* sockets: false makes a loop driven by pal_loop_turn; most_socket bounds the descriptors of the context. [load] */
 pal_err pal_loop_create(bool sockets, int most_socket, pal_note *note, pal_loop **out);
-void pal_loop_destroy(pal_loop *loop);                               /* roads first; NULL is fine. [load] */
+/* closes every socket; roads then hear of their peers for the last time, and may be closed. [load] */
+void pal_loop_shut(pal_loop *loop);
+void pal_loop_destroy(pal_loop *loop);                               /* after its roads; NULL is fine. [load] */
 void pal_loop_listen(pal_loop *loop, const pal_loop_events *events); /* copies; one listener */
 
 uint64_t pal_loop_now_ns(const pal_loop *loop);           /* pal_clock_ns, or the time of the last turn */

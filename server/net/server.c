@@ -139,6 +139,7 @@ void pal_server_close(pal_server *server)
 {
     if (!server) return;
     disconnect(server);
+    pal_loop_shut(server->loop);
     if (server->transport) server->road->close(server->transport);
     pal_hub_destroy(server->hub);
     pal_loop_destroy(server->loop);

@@ -52,7 +52,7 @@ struct pal_transport_ops {
     int (*port)(const pal_transport *transport); /* 0: none */
     void (*ready)(pal_peer *peer);               /* next has something */
     void (*drop)(pal_peer *peer);                /* drop_code is set: close as soon as possible */
-    void (*close)(pal_transport *transport);     /* every peer's closed is called. [load] */
+    void (*close)(pal_transport *transport);     /* after pal_loop_shut; peers still there are closed. [load] */
 };
 
 extern const pal_transport_ops pal_ws_road, pal_mem_road;

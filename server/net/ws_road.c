@@ -30,7 +30,7 @@ struct pal_transport {
     struct lws_vhost *vhost;
     int listen_fd, spare_fd; /* spare: given up to turn a caller away when descriptors run out */
     int port;
-    bool any_host;
+    bool any_host, adopted; /* adopted: lws closes listen_fd with the loop */
     uint8_t chunk[LWS_PRE + CHUNK];
 };
 
@@ -327,8 +327,6 @@ static int listen_callback(struct lws *wsi, enum lws_callback_reasons reason, vo
 {
     (void)own, (void)in, (void)n_byte;
     if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(road_of(wsi));
-    /* lws has closed the descriptor */
-    if (reason == LWS_CALLBACK_RAW_CLOSE_FILE) road_of(wsi)->listen_fd = -1;
     return 0;
 }
 
@@ -399,9 +397,7 @@ static pal_err open_socket(pal_transport *t, const char *url, pal_note *note)
 static void ws_close(pal_transport *transport)
 {
     if (!transport) return;
-    if (transport->vhost)
-        lws_vhost_destroy(transport->vhost); /* calls closed for every peer, and closes the listening socket */
-    if (transport->listen_fd >= 0) close(transport->listen_fd);
+    if (!transport->adopted && transport->listen_fd >= 0) close(transport->listen_fd);
     if (transport->spare_fd >= 0) close(transport->spare_fd);
     free(transport);
 }
@@ -432,6 +428,7 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
         ws_close(t);
         return pal_note_set(note, PAL_ERR_IO, "the network context could not listen");
     }
+    t->adopted = true;
     *out = t;
     return PAL_ERR_OK;
 }
