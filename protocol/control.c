@@ -443,8 +443,8 @@ static int read_scalar(const field *f, const cJSON *item, uint8_t *at)
     if (f->type <= U64) {
         refusal = read_integer(item, 0, most[f->type], &v);
         const uint64_t u64 = (uint64_t)v;
-        const uint32_t u32 = (uint32_t)v;
-        const uint16_t u16 = (uint16_t)v;
+        const uint32_t u32 = (uint32_t)u64;
+        const uint16_t u16 = (uint16_t)u64;
         if (f->type == U16) memcpy(at, &u16, sizeof u16);
         if (f->type == U32) memcpy(at, &u32, sizeof u32);
         if (f->type == U64) memcpy(at, &u64, sizeof u64);

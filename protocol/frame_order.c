@@ -138,7 +138,8 @@ static void predict(const builder *b, uint32_t v, const uint32_t *candidate, int
         good = sum > 0 && quantise(y, sum, n_pick, weight);
     }
     if (!good) quantise((const double[]){1, 1, 1, 1}, n_pick, n_pick, weight);
-    for (int j = 0; j < n_pick; j++) neighbour[j] = candidate[pick[j]];
+    for (int j = 0; j < n_pick; j++)
+        if (weight[j]) neighbour[j] = candidate[pick[j]];
 }
 
 /* keeps the N_CANDIDATE nearest of those offered, nearest first */

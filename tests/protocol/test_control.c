@@ -1,0 +1,195 @@
+/* Control messages: limits, fields, hostile text. That both directions agree is in test_golden.c. */
+#include "protocol/control.h"
+#include "tests/check.h"
+#include "tests/protocol/golden.h"
+
+static pal_control c;
+
+static int from_client(const char *text)
+{
+    return pal_control_get(text, strlen(text), false, &c);
+}
+
+static void reads_what_a_client_says(void)
+{
+    CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"A\\u00e9\",\"role\":\"trainee\",\"tool\":-1}"), 0);
+    CHECK_INT(c.type, PAL_CONTROL_JOIN);
+    CHECK_TEXT(c.join.name, "A\xC3\xA9");
+    CHECK_INT(c.join.role, PAL_WIRE_ROLE_TRAINEE);
+    CHECK_INT(c.join.tool, PAL_WIRE_TOOL_ANY);
+    CHECK_INT(from_client(" {\"role\":\"viewer\",\"later\":[1,{}],\"type\":\"join\",\"name\":\"\",\"tool\":null}\n"),
+              0);
+    CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\"}"), 0);
+    CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(from_client("{\"type\":\"command\",\"verb\":\"pause\"}"), 0);
+    CHECK_TEXT(c.order.verb, "pause");
+    CHECK_INT(c.order.n_arg, 0);
+    CHECK_INT(from_client("{\"type\":\"command\",\"verb\":\"material\",\"args\":{\"young_Pa\":8e3,\"poisson\":0.45}}"),
+              0);
+    CHECK_INT(c.order.n_arg, 2);
+    CHECK_TEXT(c.order.arg[0].key, "young_Pa");
+    CHECK_NEAR(c.order.arg[0].value, 8000, 0);
+    CHECK_INT(from_client("{\"type\":\"take\",\"tool\":3}"), 0);
+    CHECK_INT(c.tool, 3);
+    CHECK_INT(from_client("{\"type\":\"leave\"}"), 0);
+    CHECK_INT(from_client("{\"type\":\"ping\",\"stamp_ms\":-1.5}"), 0);
+    CHECK_NEAR(c.stamp_ms, -1.5, 0);
+}
+
+static void refuses_what_is_no_message(void)
+{
+    static const struct {
+        const char *text;
+        int refusal;
+    } bad[] = {
+        {"", PAL_REFUSAL_JSON},
+        {"{", PAL_REFUSAL_JSON},
+        {"null", PAL_REFUSAL_FIELD},
+        {"[]", PAL_REFUSAL_FIELD},
+        {"{}", PAL_REFUSAL_FIELD},
+        {"{\"type\":1}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"unknown\"}", PAL_REFUSAL_KIND},
+        {"{\"type\":\"hello\"}", PAL_REFUSAL_KIND},
+        {"{\"type\":\"leave\"}{}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"leave\"} x", PAL_REFUSAL_JSON},
+        {"{\"type\":\"join\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"join\",\"name\":3,\"role\":\"viewer\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"join\",\"name\":\"x\",\"role\":\"boss\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"join\",\"name\":\"a\\nb\",\"role\":\"viewer\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"join\",\"name\":\"0123456789012345678901234567890x\",\"role\":\"viewer\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"join\",\"name\":\"\xC3\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"join\",\"name\":\"\xED\xA0\x80\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"join\",\"name\":\"\xC0\xAF\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"take\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"take\",\"tool\":null}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"take\",\"tool\":32}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take\",\"tool\":0.5}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take\",\"tool\":-2}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take\",\"tool\":1e400}", PAL_REFUSAL_NAN},
+        {"{\"type\":\"ping\",\"stamp_ms\":1e999}", PAL_REFUSAL_NAN},
+        {"{\"type\":\"ping\",\"stamp_ms\":\"1\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"command\",\"verb\":\"x\",\"args\":[1]}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":\"b\"}}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":1,\"b\":1,\"c\":1,\"d\":1,\"e\":1,\"f\":1,\"g\":1,"
+         "\"h\":1,\"i\":1}}",
+         PAL_REFUSAL_COUNT}};
+    c.type = PAL_CONTROL_COUNT;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        int refusal = from_client(bad[i].text);
+        if (refusal != bad[i].refusal) printf("  %s\n", bad[i].text);
+        CHECK_INT(refusal, bad[i].refusal);
+    }
+    CHECK_INT(c.type, PAL_CONTROL_COUNT); /* out is untouched by refusals */
+    CHECK_INT(pal_control_get("{\"type\":\"leave\"\0}", 17, false, &c), PAL_REFUSAL_JSON);
+}
+
+static void refuses_text_beyond_the_limits_before_parsing_it(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 2];
+    memset(text, ' ', sizeof text);
+    memcpy(text, "{\"type\":\"leave\"}", 16);
+    CHECK_INT(pal_control_get(text, PAL_CONTROL_IN_MAX, false, &c), 0);
+    CHECK_INT(pal_control_get(text, PAL_CONTROL_IN_MAX + 1, false, &c), PAL_REFUSAL_LONG);
+    CHECK_INT(pal_control_get(text, PAL_CONTROL_OUT_MAX + 1, true, &c), PAL_REFUSAL_LONG);
+    /* nesting and number of values */
+    memset(text, '[', 4096);
+    CHECK_INT(pal_control_get(text, 4096, false, &c), PAL_REFUSAL_JSON);
+    for (int depth = 1; depth < 12; depth++) {
+        char deep[64] = "{\"type\":\"leave\",\"x\":";
+        size_t n = strlen(deep);
+        for (int k = 0; k < depth; k++) deep[n++] = '[';
+        for (int k = 0; k < depth; k++) deep[n++] = ']';
+        deep[n++] = '}';
+        CHECK_INT(pal_control_get(deep, n, false, &c), depth <= 7 ? PAL_REFUSAL_NONE : PAL_REFUSAL_JSON);
+    }
+    size_t n = (size_t)snprintf(text, sizeof text, "{\"type\":\"leave\",\"x\":[0");
+    for (int k = 0; k < 1000; k++) n += (size_t)snprintf(text + n, sizeof text - n, ",0");
+    n += (size_t)snprintf(text + n, sizeof text - n, "]}");
+    CHECK_INT(pal_control_get(text, n, false, &c), PAL_REFUSAL_JSON);
+}
+
+static void refuses_every_prefix(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    for (int type = 0; type < PAL_CONTROL_COUNT; type++) {
+        size_t n;
+        static pal_control golden;
+        golden_control((pal_control_type)type, &golden);
+        REQUIRE(pal_control_put(text, sizeof text, &golden, &n) == 0);
+        for (size_t cut = 0; cut < n; cut++) {
+            char *exact = malloc(cut + 1);
+            memcpy(exact, text, cut);
+            CHECK_INT(pal_control_get(exact, cut, type < PAL_CONTROL_JOIN, &c), PAL_REFUSAL_JSON);
+            free(exact);
+        }
+    }
+}
+
+static void largest_messages_fit_their_limit(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    static pal_control full, again;
+    size_t n;
+    full.type = PAL_CONTROL_MEMBERS;
+    full.members.n_member = PAL_WIRE_MEMBER_MAX;
+    for (int i = 0; i < PAL_WIRE_MEMBER_MAX; i++) {
+        pal_wire_member *m = &full.members.member[i];
+        *m = (pal_wire_member){65535, PAL_WIRE_ROLE_INSTRUCTOR, 31, 0xFFFFFF, ""};
+        memset(m->name, '"', sizeof m->name - 1);
+    }
+    CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
+    CHECK_INT(pal_control_get(text, n, true, &again), 0);
+    CHECK_INT(again.members.n_member, PAL_WIRE_MEMBER_MAX);
+
+    memset(&full, 0, sizeof full);
+    full.type = PAL_CONTROL_HELLO;
+    golden_hello(&full.hello);
+    full.hello.n_part = PAL_WIRE_PART_MAX;
+    full.hello.n_tool = PAL_WIRE_TOOL_MAX;
+    full.hello.n_row = PAL_WIRE_ROW_MAX;
+    golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
+    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
+    for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
+    CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
+    CHECK_INT(pal_control_get(text, n, true, &again), 0);
+    CHECK_INT(again.hello.n_row, PAL_WIRE_ROW_MAX);
+    CHECK_TEXT(again.hello.tool[31].name, full.hello.tool[31].name);
+}
+
+static void writer_refuses_what_the_reader_would(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    size_t n = 77;
+    golden_control(PAL_CONTROL_STATUS, &c);
+    CHECK_INT(pal_control_put(text, 20, &c, &n), PAL_REFUSAL_SPACE);
+    CHECK_INT(pal_control_put(text, 0, &c, &n), PAL_REFUSAL_SPACE);
+    c.status.rtt_ms = NAN;
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_NAN);
+    golden_control(PAL_CONTROL_STATUS, &c);
+    c.status.n_row = PAL_WIRE_ROW_MAX + 1;
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_RANGE);
+    golden_control(PAL_CONTROL_ERROR, &c);
+    memset(c.problem.text, 'x', sizeof c.problem.text);
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_FIELD);
+    golden_control(PAL_CONTROL_ERROR, &c);
+    snprintf(c.problem.text, sizeof c.problem.text, "two\nlines");
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_FIELD);
+    golden_control(PAL_CONTROL_TAKE, &c);
+    c.tool = 99;
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_RANGE);
+    c.type = PAL_CONTROL_COUNT;
+    CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_KIND);
+    CHECK_INT(n, 77);
+}
+
+int main(void)
+{
+    RUN(reads_what_a_client_says);
+    RUN(refuses_what_is_no_message);
+    RUN(refuses_text_beyond_the_limits_before_parsing_it);
+    RUN(refuses_every_prefix);
+    RUN(largest_messages_fit_their_limit);
+    RUN(writer_refuses_what_the_reader_would);
+    return check_report();
+}
