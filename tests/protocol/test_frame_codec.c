@@ -104,9 +104,273 @@ static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
     rig_release(&r);
 }
 
+/* encodes motion k and decodes it with a new decoder: frames need no history */
+static void any_frame_serves_a_client_that_joins(void)
+{
+    rig r;
+    REQUIRE(rig_create(&r, 12));
+    pal_frame_given given = given_of(&r, 5e-5);
+    for (int k = 0; k < 40; k++) {
+        pal_frame_result result;
+        pal_frame_head head;
+        pal_frame_decoder *joined = NULL;
+        shape_move(&r.s, (shape_motion)(k % MOTION_COUNT), k, r.given);
+        REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+        REQUIRE(pal_frame_decoder_create(&r.asset, &joined) == 0);
+        CHECK_INT(pal_frame_get(joined, r.bytes, result.n_byte, &head, r.shown), 0);
+        CHECK_LE(largest_error(&r), result.error_m);
+        pal_frame_decoder_destroy(joined);
+    }
+    rig_release(&r);
+}
+
+static void part_at_rest_is_reported_unchanged(void)
+{
+    rig r;
+    pal_frame_result result;
+    REQUIRE(rig_create(&r, 12));
+    pal_frame_given given = given_of(&r, 5e-5);
+    static const struct {
+        int frame;
+        bool changed;
+    } step[] = {{0, true}, {0, false}, {5, true}, {5, false}, {0, true}};
+    for (size_t k = 0; k < 5; k++) {
+        shape_move(&r.s, MOTION_BUMP, step[k].frame, r.given);
+        REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+        CHECK_INT(result.changed, step[k].changed);
+    }
+    /* far below the bound nothing is seen; another accuracy is another frame */
+    for (size_t i = 0; i < 3 * (size_t)r.s.n_vertex; i++) r.given[i] += 1e-9f;
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    CHECK_INT(result.changed, false);
+    given.error_m = 1e-4;
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    CHECK_INT(result.changed, true);
+    rig_release(&r);
+}
+
+static void refuses_positions_that_are_none_and_goes_on(void)
+{
+    static const float bad[] = {NAN, INFINITY, -INFINITY};
+    rig r;
+    pal_frame_result result;
+    pal_frame_head head;
+    REQUIRE(rig_create(&r, 12));
+    pal_frame_given given = given_of(&r, 5e-5);
+    shape_move(&r.s, MOTION_BEND, 9, r.given);
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    size_t n_byte = result.n_byte;
+    for (size_t i = 0; i < 3 * (size_t)r.s.n_vertex; i += 101) {
+        float kept = r.given[i];
+        r.given[i] = bad[i % 3];
+        CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_NAN);
+        r.given[i] = kept;
+    }
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    CHECK_INT(result.changed, false);
+    CHECK_INT(result.n_byte, n_byte);
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap - 1, &result), PAL_REFUSAL_SPACE);
+    given.error_m = 0;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_RANGE);
+    given.error_m = NAN;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_RANGE);
+    given.error_m = 5e-5;
+    for (size_t i = 0; i < 3 * (size_t)r.s.n_vertex; i++) r.given[i] = i % 2 ? 3e38f : -3e38f;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_RANGE);
+    shape_move(&r.s, MOTION_STORM, 9, r.given);
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), 0);
+    CHECK_INT(pal_frame_get(r.d, r.bytes, result.n_byte, &head, r.shown), 0);
+    CHECK_LE(largest_error(&r), 5e-5);
+    rig_release(&r);
+}
+
+static void raises_the_step_for_far_jumps_and_says_so(void)
+{
+    rig r;
+    pal_frame_result result;
+    pal_frame_head head;
+    REQUIRE(rig_create(&r, 12));
+    pal_frame_given given = given_of(&r, 1e-6);
+    for (double jump = 0.001; jump < 1e5; jump *= 7) {
+        for (size_t i = 0; i < 3 * (size_t)r.s.n_vertex; i++)
+            r.given[i] = r.s.rest_m[i] + (float)(i % 5 == 0 ? jump : -jump);
+        REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+        REQUIRE(pal_frame_get(r.d, r.bytes, result.n_byte, &head, r.shown) == 0);
+        CHECK_LE(largest_error(&r), result.error_m);
+        CHECK((result.error_m > 1e-6) == (jump > 0.015));
+        CHECK_LE(result.error_m, 1e-6 + jump * 5e-5);
+    }
+    rig_release(&r);
+}
+
+static void affine_map_carries_large_motion(void)
+{
+    static const float turn[12] = {0.8f, -0.6f, 0, 0.3f, 0.6f, 0.8f, 0, -0.2f, 0, 0, 1, 0.1f};
+    static const float flat[12] = {1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
+    rig r;
+    pal_frame_result result;
+    pal_frame_head head;
+    REQUIRE(rig_create(&r, 24));
+    pal_frame_given given = given_of(&r, 5e-5);
+    shape_move(&r.s, MOTION_BUMP, 9, r.given);
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    size_t still = result.n_byte;
+    for (size_t i = 0; i < r.s.n_vertex; i++) {
+        float *p = r.given + 3 * i, x = p[0], y = p[1];
+        p[0] = 0.8f * x - 0.6f * y + 0.3f;
+        p[1] = 0.6f * x + 0.8f * y - 0.2f;
+        p[2] += 0.1f;
+    }
+    given.affine = turn;
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    REQUIRE(pal_frame_get(r.d, r.bytes, result.n_byte, &head, r.shown) == 0);
+    CHECK_LE(largest_error(&r), result.error_m);
+    CHECK_LE(result.error_m, 5e-5);
+    CHECK_LE((double)result.n_byte, 1.4 * (double)still + 48);
+    CHECK(!memcmp(head.affine, turn, sizeof turn));
+    given.affine = flat;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_RANGE);
+    rig_release(&r);
+}
+
+static void tiny_and_loose_meshes_stay_within_the_bound(void)
+{
+    const float rest[18] = {0, 0, 0, 0.1f, 0, 0, 0, 0.1f, 0, 0, 0, 0.1f, 0, 0, 0, 0.05f, 0.05f, 0.05f};
+    const uint32_t triangle[6] = {0, 1, 2, 0, 1, 3};
+    uint64_t random = 9;
+    for (uint32_t n = 1; n <= 6; n++) {
+        pal_frame_order *order = NULL;
+        pal_frame_encoder *e = NULL;
+        pal_frame_decoder *d = NULL;
+        uint8_t bytes[2048];
+        float given_m[18], shown[18];
+        uint32_t n_triangle = n < 3 ? 0 : n < 4 ? 1 : 2;
+        REQUIRE(pal_frame_order_create(rest, n, triangle, n_triangle, &order) == 0);
+        const pal_asset asset = {n_triangle, (float *)(uintptr_t)rest, (uint32_t *)(uintptr_t)triangle, order};
+        REQUIRE(pal_frame_encoder_create(rest, order, &e) == 0 && pal_frame_decoder_create(&asset, &d) == 0);
+        for (int k = 0; k < 200; k++) {
+            pal_frame_result result;
+            pal_frame_head head;
+            for (size_t i = 0; i < 3 * n; i++) given_m[i] = rest[i] + 0.05f * (float)shape_random(&random);
+            const pal_frame_given given = {.error_m = 5e-5, .position_m = given_m};
+            REQUIRE(pal_frame_put(e, &given, bytes, sizeof bytes, &result) == 0);
+            REQUIRE(pal_frame_get(d, bytes, result.n_byte, &head, shown) == 0);
+            for (size_t i = 0; i < 3 * n; i++) CHECK_LE(fabs((double)given_m[i] - (double)shown[i]), 5e-5);
+        }
+        pal_frame_encoder_destroy(e);
+        pal_frame_decoder_destroy(d);
+        pal_frame_order_destroy(order);
+    }
+}
+
+/* decodes a heap copy of exactly the right size */
+static int decode_copy(rig *r, const uint8_t *bytes, size_t n_byte)
+{
+    pal_frame_head head;
+    uint8_t *exact = malloc(n_byte + 1);
+    memcpy(exact, bytes, n_byte);
+    int refusal = pal_frame_get(r->d, exact, n_byte, &head, r->shown);
+    free(exact);
+    return refusal;
+}
+
+static void refuses_every_prefix_and_survives_every_changed_byte(void)
+{
+    static const float turn[12] = {0.8f, -0.6f, 0, 0.3f, 0.6f, 0.8f, 0, -0.2f, 0, 0, 1, 0.1f};
+    rig r;
+    REQUIRE(rig_create(&r, 5));
+    for (int motion = MOTION_BUMP; motion < MOTION_COUNT; motion++) {
+        pal_frame_given given = given_of(&r, 5e-5);
+        pal_frame_result result;
+        if (motion == MOTION_BEND) given.affine = turn;
+        shape_move(&r.s, (shape_motion)motion, 11, r.given);
+        REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+        for (size_t cut = 0; cut < result.n_byte; cut++) CHECK_INT(decode_copy(&r, r.bytes, cut), PAL_REFUSAL_SHORT);
+        r.bytes[result.n_byte] = 0;
+        CHECK_INT(decode_copy(&r, r.bytes, result.n_byte + 1), PAL_REFUSAL_LONG);
+        for (size_t at = 0; at < result.n_byte; at++)
+            for (int bit = 0; bit < 8; bit++) {
+                r.bytes[at] ^= (uint8_t)(1 << bit);
+                int refusal = decode_copy(&r, r.bytes, result.n_byte);
+                CHECK(refusal >= 0 && refusal < PAL_REFUSAL_END);
+                r.bytes[at] ^= (uint8_t)(1 << bit);
+            }
+        CHECK_INT(decode_copy(&r, r.bytes, result.n_byte), 0);
+    }
+    rig_release(&r);
+}
+
+static void put32(uint8_t *at, uint32_t v)
+{
+    for (int i = 0; i < 4; i++) at[i] = (uint8_t)(v >> (8 * i));
+}
+
+static void refuses_lying_heads(void)
+{
+    rig r;
+    pal_frame_result result;
+    REQUIRE(rig_create(&r, 5));
+    pal_frame_given given = given_of(&r, 5e-5);
+    shape_move(&r.s, MOTION_BEND, 11, r.given);
+    static const struct {
+        size_t at;
+        uint32_t value;
+        int refusal;
+    } lie[] = {{32, 151, PAL_REFUSAL_COUNT},
+               {32, 0, PAL_REFUSAL_COUNT},
+               {32, 0xFFFFFFFF, PAL_REFUSAL_COUNT},
+               {36, 0, PAL_REFUSAL_COUNT},
+               {36, 0xFFFFFFFF, PAL_REFUSAL_COUNT},
+               {36, 700, PAL_REFUSAL_LZ4},
+               {40, 0xFFFFFFFF, PAL_REFUSAL_SHORT},
+               {40, 1, PAL_REFUSAL_LONG},
+               {28, 0x7FC00000, PAL_REFUSAL_NAN},
+               {28, 0x80000000, PAL_REFUSAL_RANGE},
+               {28, 0xBF800000, PAL_REFUSAL_RANGE},
+               {20, 0x00200000, PAL_REFUSAL_RANGE},
+               {4, PAL_WIRE_TOOLS, PAL_REFUSAL_KIND},
+               {4, PAL_WIRE_FRAME | 2 << 8, PAL_REFUSAL_FLAGS},
+               {4, PAL_WIRE_FRAME | 16 << 16, PAL_REFUSAL_RANGE}};
+    for (size_t k = 0; k < sizeof lie / sizeof *lie; k++) {
+        REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+        put32(r.bytes + lie[k].at, lie[k].value);
+        CHECK_INT(decode_copy(&r, r.bytes, result.n_byte), lie[k].refusal);
+    }
+    rig_release(&r);
+}
+
+static void refuses_blocks_that_expand_to_another_length(void)
+{
+    rig r;
+    uint8_t bytes[400] = {0};
+    pal_frame_result result;
+    REQUIRE(rig_create(&r, 5));
+    pal_frame_given given = given_of(&r, 5e-5);
+    shape_move(&r.s, MOTION_REST, 0, r.given);
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    /* a match of 255 bytes for each byte of the block: far more than the stated length */
+    memcpy(bytes, r.bytes, PAL_FRAME_HEAD_BYTES);
+    memset(bytes + PAL_FRAME_HEAD_BYTES, 255, sizeof bytes - PAL_FRAME_HEAD_BYTES);
+    memcpy(bytes + PAL_FRAME_HEAD_BYTES, "\x1f\x00\x01\x00", 4);
+    put32(bytes + 40, sizeof bytes - PAL_FRAME_HEAD_BYTES);
+    CHECK_INT(decode_copy(&r, bytes, sizeof bytes), PAL_REFUSAL_LZ4);
+    put32(bytes + 36, 10);
+    CHECK_INT(decode_copy(&r, bytes, sizeof bytes), PAL_REFUSAL_COUNT);
+    rig_release(&r);
+}
+
 int main(void)
 {
     RUN(error_stays_within_its_bound_in_every_frame);
     RUN(live_deformation_costs_less_than_half_a_byte_per_vertex);
+    RUN(any_frame_serves_a_client_that_joins);
+    RUN(part_at_rest_is_reported_unchanged);
+    RUN(refuses_positions_that_are_none_and_goes_on);
+    RUN(raises_the_step_for_far_jumps_and_says_so);
+    RUN(affine_map_carries_large_motion);
+    RUN(tiny_and_loose_meshes_stay_within_the_bound);
+    RUN(refuses_every_prefix_and_survives_every_changed_byte);
+    RUN(refuses_lying_heads);
+    RUN(refuses_blocks_that_expand_to_another_length);
     return check_report();
 }
