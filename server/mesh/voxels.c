@@ -19,16 +19,16 @@ void pal_voxels_free(pal_voxels *voxels)
     memset(voxels, 0, sizeof *voxels);
 }
 
-/* box of the finite corners of triangles; false when there is none */
-static bool find_box(const pal_surface *surface, double low[3], double high[3])
+/* box of the finite corners of triangles (vertices of no triangle do not count); false when there is none */
+static bool find_box(const pal_surface *surface, const uint8_t *used, double low[3], double high[3])
 {
     for (int k = 0; k < 3; k++) low[k] = INFINITY, high[k] = -INFINITY;
-    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) {
-        const double *x = surface->x + 3 * (size_t)surface->tri[i];
-        if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) continue;
+    for (size_t v = 0; v < (size_t)surface->n_vertex; v++) {
+        const double *x = surface->x + 3 * v;
+        if (!used[v] || !isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) continue;
         for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], x[k]);
-            high[k] = fmax(high[k], x[k]);
+            low[k] = x[k] < low[k] ? x[k] : low[k];
+            high[k] = x[k] > high[k] ? x[k] : high[k];
         }
     }
     return low[0] <= high[0];
@@ -40,7 +40,12 @@ static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *opt
     if (options->resolution < 1 || options->resolution > MOST_RESOLUTION)
         return pal_note_set(note, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
                             MOST_RESOLUTION);
-    if (!find_box(surface, low, high))
+    uint8_t *used = calloc(surface->n_vertex ? (size_t)surface->n_vertex : 1, 1);
+    if (!used) return PAL_ERR_MEMORY;
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) used[surface->tri[i]] = 1;
+    bool any = find_box(surface, used, low, high);
+    free(used);
+    if (!any)
         return pal_note_set(note, PAL_ERR_REFUSED, "no volume (reason 1): none of %d triangles has finite corners",
                             surface->n_tri);
     for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
