@@ -98,7 +98,7 @@ static void pick_best(double m[N_CANDIDATE][N_CANDIDATE], int n, double ridge, i
 /* weights to Q12 with an exact sum; false when their absolute sum is too large */
 static bool quantise(const double *y, double sum, int n, int16_t *weight)
 {
-    long total = 0, absolute = 0, q[4];
+    long total = 0, absolute = 0, q[4] = {0};
     int largest = 0;
     for (int j = 0; j < n; j++) {
         double w = y[j] / sum;
