@@ -4,7 +4,8 @@
  * A collapse u -> v locks u and v only. The triangles around an unlocked vertex are then still those of the pass's
  * start, less the ones that shrank to an edge, with corners renamed by `remap`; so its ring is known without keeping
  * the adjacency up to date. A collapse is allowed when it keeps the topology (link condition), turns no triangle by
- * more than about 75 degrees and makes none much thinner than the thinnest before. */
+ * more than about 75 degrees and adds at most one thin one. Before each pass badly shaped pairs of triangles flip their
+ * common edge. */
 #include "server/mesh/decimate.h"
 
 #include "server/base/vec3.h"
@@ -12,11 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_RING = 24 };
+enum { MOST_RING = 24, MOST_DEGREE = 12 };
 /* pull to the edge's middle, as part of the quadric's area: spreads vertices evenly where the surface is flat */
 static const double pull = 1e-3;
 /* triangles below this shape (0 flat, 0.577 equilateral) are thin */
 static const double thin = 0.12;
+/* triangles below this shape are offered a flip */
+static const double bad_shape = 0.3;
+/* a collapse may make triangles thinner by this in sum: flips mend one thin triangle, but not a cluster of them */
+static const double thin_room = 0.1;
 
 /* x'Ax + 2b'x + c with A symmetric (xx xy xz yy yz zz), and the area it stands for */
 typedef struct quadric {
@@ -167,15 +172,21 @@ static double thinness(const double a[3], const double b[3], const double c[3], 
     return sum > 0 ? 2 * pal_norm3(n) / sum : 0;
 }
 
-/* do the triangles of one end stay upright and not too thin when it moves to x? other: the end that vanishes with it.
- * The normal of a thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
-static bool shape_allows(const pass *p, int32_t u, int32_t other, int32_t ring[MOST_RING][2], int n, const double x[3])
+/* by how much the thin triangles around both ends of an edge are too thin, in sum, before and after its collapse */
+typedef struct thin_sum {
+    double before, after;
+} thin_sum;
+
+/* do the triangles of one end stay upright when it moves to x? other: the end that vanishes with it. The normal of a
+ * thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
+static bool stays_upright(const pass *p, int32_t u, int32_t other, int32_t ring[MOST_RING][2], int n, const double x[3],
+                          thin_sum *sum)
 {
-    double least_before = 1, least_after = 1, largest = 0, shape[MOST_RING], normal[MOST_RING][3], mean[3] = {0, 0, 0};
+    double largest = 0, shape[MOST_RING], normal[MOST_RING][3], mean[3] = {0, 0, 0};
     const double *xs = p->s->x, *xu = xs + 3 * (size_t)u;
     for (int k = 0; k < n; k++) {
         shape[k] = thinness(xu, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], normal[k]);
-        least_before = fmin(least_before, shape[k]);
+        sum->before += ring[k][0] == other ? 0 : fmax(0, thin - shape[k]);
         largest = fmax(largest, pal_norm3(normal[k]));
         pal_add3(mean, mean, normal[k]);
     }
@@ -183,10 +194,10 @@ static bool shape_allows(const pass *p, int32_t u, int32_t other, int32_t ring[M
         if (ring[k][0] == other || ring[k][1] == other) continue;
         bool vague = shape[k] < thin || pal_norm3(normal[k]) < largest / 20;
         double after[3], *before = vague ? mean : normal[k];
-        least_after = fmin(least_after, thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
+        sum->after += fmax(0, thin - thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
         if (!(pal_dot3(before, after) > 0.25 * pal_norm3(before) * pal_norm3(after))) return false;
     }
-    return least_after > thin || least_after > least_before;
+    return true;
 }
 
 /* collapses u into v if that is allowed */
@@ -194,11 +205,13 @@ static bool collapse(pass *p, int32_t u, int32_t v)
 {
     int32_t ru[MOST_RING][2], rv[MOST_RING][2];
     int nu = ring_of(p, u, ru), nv = ring_of(p, v, rv);
-    if (nu < 3 || nv < 3 || nu + nv - 4 > MOST_RING) return false;
+    if (nu < 3 || nv < 3 || nu + nv - 4 > MOST_DEGREE) return false;
     if (!ring_closed(ru, nu) || !ring_closed(rv, nv) || !link_allows(ru, nu, rv, nv)) return false;
     double x[3];
     collapse_place(p, u, v, x);
-    if (!shape_allows(p, u, v, ru, nu, x) || !shape_allows(p, v, u, rv, nv, x)) return false;
+    thin_sum sum = {0, 0};
+    if (!stays_upright(p, u, v, ru, nu, x, &sum) || !stays_upright(p, v, u, rv, nv, x, &sum)) return false;
+    if (sum.after > sum.before + thin_room) return false;
     pal_copy3(p->s->x + 3 * (size_t)v, x);
     quadric_add(&p->q[v], &p->q[u]);
     p->remap[u] = v;
@@ -247,6 +260,72 @@ static void sort_edges(pass *p, uint32_t *spare)
     if (from != p->order) memcpy(p->order, from, n * sizeof *from);
 }
 
+/* the triangle that runs through the edge from a to b; count: triangles at this edge in either direction */
+static int32_t triangle_at(const pass *p, int32_t a, int32_t b, int *count)
+{
+    int32_t found = -1;
+    *count = 0;
+    for (int k = p->start[a]; k < p->start[a + 1]; k++) {
+        const int32_t *c = p->s->tri + 3 * (size_t)p->item[k];
+        int i = c[0] == a ? 0 : c[1] == a ? 1 : 2;
+        if (c[(i + 1) % 3] == b) found = p->item[k];
+        *count += c[(i + 1) % 3] == b || c[(i + 2) % 3] == b;
+    }
+    return found;
+}
+
+/* would the two triangles beside the edge a-b, with apexes o (left) and d (right), be better shaped beside o-d? */
+static bool flip_helps(const double *a, const double *b, const double *o, const double *d)
+{
+    double n[4][3], sum[3];
+    double before = fmin(thinness(a, b, o, n[0]), thinness(b, a, d, n[1]));
+    double after = fmin(thinness(o, a, d, n[2]), thinness(d, b, o, n[3]));
+    pal_add3(sum, n[0], n[1]);
+    if (!(after > 1.2 * before)) return false;
+    for (int k = 2; k < 4; k++)
+        if (!(pal_dot3(n[k], sum) > 0.9 * pal_norm3(n[k]) * pal_norm3(sum))) return false;
+    return true;
+}
+
+/* turns the longest edge of a badly shaped triangle if that helps; collapses alone cannot mend caps, which have no
+ * short edge. Every vertex takes part in one flip at most, so that the fans stay good enough */
+static bool flip(pass *p, int32_t t)
+{
+    int32_t *c = p->s->tri + 3 * (size_t)t;
+    double n[3];
+    const double *xs = p->s->x;
+    if (thinness(xs + 3 * (size_t)c[0], xs + 3 * (size_t)c[1], xs + 3 * (size_t)c[2], n) > bad_shape) return false;
+    int k = 0, n_edge, n_across;
+    double length[3];
+    for (int i = 0; i < 3; i++) {
+        length[i] = pal_dist3(xs + 3 * (size_t)c[i], xs + 3 * (size_t)c[(i + 1) % 3]);
+        if (length[i] > length[k]) k = i;
+    }
+    int32_t a = c[k], b = c[(k + 1) % 3], o = c[(k + 2) % 3], other = triangle_at(p, b, a, &n_edge);
+    if (other < 0 || n_edge != 2) return false;
+    int32_t *e = p->s->tri + 3 * (size_t)other;
+    int32_t d = (int32_t)((int64_t)e[0] + e[1] + e[2] - a - b);
+    triangle_at(p, o, d, &n_across);
+    bool few = p->start[a + 1] - p->start[a] < 4 || p->start[b + 1] - p->start[b] < 4;
+    if (few || n_across > 0 || o == d || p->locked[a] || p->locked[b] || p->locked[o] || p->locked[d]) return false;
+    if (!flip_helps(xs + 3 * (size_t)a, xs + 3 * (size_t)b, xs + 3 * (size_t)o, xs + 3 * (size_t)d)) return false;
+    p->locked[a] = p->locked[b] = p->locked[o] = p->locked[d] = 1;
+    c[0] = o, c[1] = a, c[2] = d;
+    e[0] = d, e[1] = b, e[2] = o;
+    return true;
+}
+
+/* one round of flips; false: no memory */
+static bool flip_all(pass *p)
+{
+    if (pal_surface_fans(p->s, &p->start, &p->item)) return false;
+    memset(p->locked, 0, (size_t)p->s->n_vertex);
+    for (int32_t t = 0; t < p->s->n_tri; t++) flip(p, t);
+    free(p->start);
+    free(p->item);
+    return true;
+}
+
 /* renames corners and drops triangles that shrank to an edge */
 static void apply_remap(pass *p)
 {
@@ -263,7 +342,7 @@ static void apply_remap(pass *p)
 /* one pass; limited: only collapses about as cheap as the ones needed. Number of collapses, -1: no memory */
 static int run_pass(pass *p, int n_tri, bool limited, uint32_t *spare)
 {
-    if (pal_surface_fans(p->s, &p->start, &p->item)) return -1;
+    if (!flip_all(p) || pal_surface_fans(p->s, &p->start, &p->item)) return -1;
     for (int i = 0; i < p->s->n_vertex; i++) p->remap[i] = i;
     memset(p->locked, 0, (size_t)p->s->n_vertex);
     p->n_left = p->s->n_tri;
