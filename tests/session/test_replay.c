@@ -1,0 +1,256 @@
+/* Input logs: what a live session recorded gives the same hashes again; a log that is broken, cut, foreign or not whole
+ * is refused with one sentence. */
+#include "server/base/clock.h"
+#include "server/session/input_log.h"
+#include "server/session/replay.h"
+#include "tests/check.h"
+#include "tests/session/small_scene.h"
+
+#include <sys/stat.h>
+
+static pal_scene scene;
+static pal_prepared mesh;
+static char path[] = "/tmp/palpate_replay_XXXXXX";
+static uint8_t whole[1 << 20]; /* the log of the live session */
+static size_t n_whole;
+
+static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
+{
+    FILE *file = fopen(name, "rb");
+    size_t n = file ? fread(bytes, 1, cap, file) : 0;
+    if (file) fclose(file);
+    return n;
+}
+
+/* a few hundred steps with presses, a grab, a material edit, a reset and a tool that falls silent */
+static bool record(void)
+{
+    pal_session *s;
+    pal_note note = {""};
+    pal_session_options options = {.record_path = path, .lease_s = 0.02};
+    if (pal_session_open(&scene, &options, &note, &s)) return false;
+    uint64_t tick = 0, seq = 0;
+    for (const pal_frame *f; tick < 150;) {
+        f = pal_session_take_frame(s);
+        if (!f) {
+            usleep(200);
+            continue;
+        }
+        tick = f->tick;
+        seq++;
+        pal_pose pose = {.position_m = {0.001 * (double)(seq % 40), 0, 0.055 - 0.0005 * (double)(seq % 30)},
+                         .quat = {1, 0, 0, 0},
+                         .buttons = seq % 50 > 20,
+                         .seq = (uint32_t)seq};
+        if (seq % 60 < 45) pal_session_put_pose(s, 0, &pose);
+        if (seq == 40)
+            pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_MATERIAL, .material = {3000, 0.4, 900, 2}});
+        if (seq == 70) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET}), tick = 0;
+        if (seq < 80) tick = 0;
+    }
+    pal_session_close(s);
+    return true;
+}
+
+static void a_recorded_session_gives_the_same_hashes_again(void)
+{
+    pal_replay_report report;
+    pal_note note = {""};
+    REQUIRE(record());
+    n_whole = slurp(path, whole, sizeof whole);
+    REQUIRE(n_whole > 1000 && n_whole < sizeof whole);
+    pal_err err = pal_replay_run(path, &scene, &report, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    CHECK(report.n_tick > 200);
+    CHECK(report.n_pose > 50);
+    CHECK_INT(report.n_command, 2);
+    CHECK(report.n_hash > 3);
+    CHECK_INT(report.n_hash_equal, report.n_hash);
+    CHECK(report.first_difference == UINT64_MAX);
+    CHECK(report.last_hash != 0);
+}
+
+/* changes one byte of the payload of every record of a kind; the step of the first one, 0: there is none */
+static uint64_t change(uint8_t *bytes, pal_input_kind kind, size_t byte)
+{
+    size_t at = 0;
+    uint64_t first = 0;
+    pal_input_header header;
+    pal_input_record record_;
+    if (pal_input_get_header("log", bytes, n_whole, &header, &at, NULL)) return 0;
+    for (size_t place = at; !pal_input_get_record("log", bytes, n_whole, &at, &record_, NULL); place = at) {
+        if (record_.kind != kind) continue;
+        bytes[place + PAL_INPUT_HEAD + byte] ^= 4;
+        if (!first) first = record_.step;
+    }
+    return first;
+}
+
+static void changed_poses_and_materials_are_found_at_the_next_hash(void)
+{
+    static uint8_t bytes[sizeof whole];
+    const struct {
+        pal_input_kind kind;
+        size_t byte;
+    } what[] = {{PAL_INPUT_POSE, 2 * 8 + 6}, {PAL_INPUT_MATERIAL, 0}};
+    REQUIRE(n_whole > 0);
+    for (int k = 0; k < 2; k++) {
+        pal_replay_report report;
+        pal_note note = {""};
+        memcpy(bytes, whole, n_whole);
+        uint64_t when = change(bytes, what[k].kind, what[k].byte);
+        REQUIRE(when > 0);
+        REQUIRE(!pal_replay_parse("log", bytes, n_whole, &scene, &report, &note));
+        CHECK(report.n_hash_equal < report.n_hash);
+        CHECK(report.first_difference > when);
+        if (k == 1) CHECK_LE((double)report.first_difference, (double)when + PAL_INPUT_HASH_STEPS);
+    }
+}
+
+static void every_cut_is_refused_with_its_byte(void)
+{
+    pal_replay_report report;
+    pal_note note;
+    REQUIRE(n_whole > 0);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, &report, &note), 0);
+    for (size_t n = 0; n < n_whole; n += n < 300 ? 1 : 977) {
+        note.text[0] = 0;
+        CHECK_INT(pal_replay_parse("log", whole, n, NULL, &report, &note), PAL_ERR_REFUSED);
+        CHECK(!strncmp(note.text, "log: byte ", 10));
+    }
+}
+
+static void refused(const uint8_t *bytes, size_t n, const char *part)
+{
+    pal_replay_report report;
+    pal_note note = {""};
+    CHECK_INT(pal_replay_parse("log", bytes, n, &scene, &report, &note), PAL_ERR_REFUSED);
+    if (!strstr(note.text, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, part);
+}
+
+static void broken_logs_are_refused_with_one_sentence(void)
+{
+    static uint8_t bytes[sizeof whole];
+    REQUIRE(n_whole > 0);
+    const struct {
+        size_t place;
+        uint8_t value;
+        const char *part;
+    } fault[] = {{0, 'x', "not an input log"},
+                 {8, 2, "version 2"},
+                 {13, 0xff, "steps between hashes"},
+                 {24, (uint8_t)(whole[24] ^ 1), "another scene"},
+                 {PAL_INPUT_HEADER, 77, "no record of kind 77"},
+                 {PAL_INPUT_HEADER + 4, 1, "no record of kind"},
+                 {PAL_INPUT_HEADER + 1, 5, "no tool 5"},
+                 {PAL_INPUT_HEADER + 12, 9, "does not follow"}};
+    for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
+        memcpy(bytes, whole, n_whole);
+        bytes[fault[k].place] = fault[k].value;
+        refused(bytes, n_whole, fault[k].part);
+    }
+    memcpy(bytes, whole, n_whole);
+    bytes[n_whole - 1] = 1;
+    refused(bytes, n_whole, "records were lost");
+    memcpy(bytes, whole, n_whole);
+    refused(bytes, n_whole + 1, "1 bytes after the end");
+    refused(whole, 0, "not an input log");
+}
+
+static void a_log_of_another_material_is_refused_and_texts_do_not_matter(void)
+{
+    pal_replay_report report;
+    pal_note note = {""};
+    pal_scene other = scene;
+    REQUIRE(n_whole > 0);
+    snprintf(other.title, sizeof other.title, "another title");
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &note), 0);
+    other.body[0].material.young_Pa = nextafter(5000, 6000);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "another scene") != NULL);
+    CHECK_INT(pal_replay_run("/no/such/log", &scene, &report, &note), PAL_ERR_IO);
+}
+
+/* far more than a ring of 1 KiB holds before the writer comes round */
+static void what_does_not_fit_is_counted_and_makes_the_log_invalid(void)
+{
+    pal_input_log *log = NULL;
+    pal_note note = {""};
+    pal_replay_report report;
+    char name[] = "/tmp/palpate_small_XXXXXX";
+    int file = mkstemp(name);
+    REQUIRE(file >= 0);
+    close(file);
+    REQUIRE(!pal_input_log_open(name, &scene, 1024, &note, &log));
+    for (int k = 0; k < 20000; k++)
+        pal_input_log_put(log, &(pal_input_record){.kind = PAL_INPUT_POSE, .pose = {.quat = {1, 0, 0, 0}}});
+    uint64_t n = pal_input_log_dropped(log);
+    CHECK(n > 0);
+    CHECK_INT(pal_input_log_close(log, 0, 7), 0);
+    CHECK_INT(pal_replay_run(name, &scene, &report, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "records were lost") != NULL);
+    unlink(name);
+}
+
+static void a_full_disk_is_told_at_close(void)
+{
+    pal_input_log *log = NULL;
+    pal_note note = {""};
+    pal_err err = pal_input_log_open("/dev/full", &scene, 1024, &note, &log);
+    /* the header is written at once, so that a place that cannot be written is refused before the session starts */
+    CHECK_INT(err, PAL_ERR_IO);
+    CHECK(strstr(note.text, "/dev/full") != NULL);
+}
+
+static void records_survive_the_round_trip_bit_by_bit(void)
+{
+    pal_input_log *log = NULL;
+    pal_note note = {""};
+    static uint8_t bytes[4096];
+    REQUIRE(!pal_input_log_open(path, &scene, 0, &note, &log));
+    const pal_input_record in[] = {
+        {.kind = PAL_INPUT_POSE,
+         .index = 1,
+         .step = 1ull << 40,
+         .pose = {{0.1, -0.0, 5e-324}, {0.5, 0.5, -0.5, 0.5}, {1e300, -1, 3}, 0xdeadbeef, 77, 0}},
+        {.kind = PAL_INPUT_LET_GO, .step = 1ull << 40},
+        {.kind = PAL_INPUT_RESET, .step = 1ull << 41},
+        {.kind = PAL_INPUT_MATERIAL, .step = 1ull << 41, .material = {1234.5, 0.3, 999, 0.25}},
+        {.kind = PAL_INPUT_HASH, .step = 1ull << 63, .hash = 0xfedcba9876543210u}};
+    const int n_in = sizeof in / sizeof in[0];
+    for (int k = 0; k < n_in; k++) pal_input_log_put(log, &in[k]);
+    CHECK_INT(pal_input_log_close(log, 1ull << 63, 42), 0);
+    size_t n = slurp(path, bytes, sizeof bytes), at = 0;
+    pal_input_header header;
+    pal_input_record out;
+    REQUIRE(!pal_input_get_header("log", bytes, n, &header, &at, &note));
+    CHECK(header.fingerprint == pal_scene_fingerprint(&scene));
+    CHECK_NEAR(header.step_s, scene.step_s, 0);
+    for (int k = 0; k < n_in; k++) {
+        REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &note));
+        CHECK_INT(out.kind, in[k].kind);
+        CHECK(out.index == in[k].index && out.step == in[k].step && out.hash == in[k].hash);
+        CHECK(!memcmp(&out.pose, &in[k].pose, sizeof out.pose));
+        CHECK(!memcmp(&out.material, &in[k].material, sizeof out.material));
+    }
+    REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &note));
+    CHECK(out.kind == PAL_INPUT_END && out.hash == 42 && out.n_dropped == 0 && at == n);
+}
+
+int main(void)
+{
+    int file = mkstemp(path);
+    if (file < 0 || !small_scene(&scene, &mesh, 6)) return 1;
+    close(file);
+    RUN(a_recorded_session_gives_the_same_hashes_again);
+    RUN(changed_poses_and_materials_are_found_at_the_next_hash);
+    RUN(every_cut_is_refused_with_its_byte);
+    RUN(broken_logs_are_refused_with_one_sentence);
+    RUN(a_log_of_another_material_is_refused_and_texts_do_not_matter);
+    RUN(what_does_not_fit_is_counted_and_makes_the_log_invalid);
+    RUN(a_full_disk_is_told_at_close);
+    RUN(records_survive_the_round_trip_bit_by_bit);
+    unlink(path);
+    pal_prepared_free(&mesh);
+    return check_report();
+}
