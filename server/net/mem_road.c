@@ -102,6 +102,11 @@ const pal_packet *pal_mem_receive(pal_mem_peer *peer)
     return peer->held;
 }
 
+void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply)
+{
+    transport->events.get(transport->events.user, path, reply);
+}
+
 bool pal_mem_told(const pal_mem_peer *peer)
 {
     return peer->told;

@@ -13,6 +13,8 @@ void pal_mem_leave(pal_mem_peer *peer);
 void pal_mem_send(pal_mem_peer *peer, const void *bytes, size_t n_byte, bool text);
 /* next message of the hub or NULL; valid until the next call for this peer */
 const pal_packet *pal_mem_receive(pal_mem_peer *peer);
+/* what GET would give (assets); the caller drops the body */
+void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply);
 bool pal_mem_told(const pal_mem_peer *peer); /* has the hub said since the last receive that something waits? */
 int pal_mem_code(const pal_mem_peer *peer);  /* close code, 0: open */
 const char *pal_mem_reason(const pal_mem_peer *peer);

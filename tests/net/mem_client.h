@@ -1,0 +1,127 @@
+/* A client of palpate.v1 on the mem road: what it has been told, and its copy of the tissue. */
+#ifndef TESTS_NET_MEM_CLIENT_H
+#define TESTS_NET_MEM_CLIENT_H
+#include "protocol/asset.h"
+#include "protocol/control.h"
+#include "protocol/frame_codec.h"
+#include "server/net/mem_road.h"
+#include "tests/check.h"
+
+typedef struct mem_client {
+    pal_transport *road;
+    pal_mem_peer *peer;
+    pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
+    int n_text[PAL_CONTROL_COUNT];
+    int n_frame, n_tools, n_haptic, n_bad;
+    pal_frame_head frame;
+    pal_wire_tools tools;
+    pal_wire_haptic haptic;
+    pal_asset *asset;
+    pal_frame_decoder *decoder;
+    float *position_m; /* [n_vertex][3] */
+    bool mute;         /* does not acknowledge */
+} mem_client;
+
+static inline void mem_say(mem_client *c, const pal_control *message)
+{
+    char text[PAL_CONTROL_IN_MAX + 1];
+    size_t n = 0;
+    CHECK_INT(pal_control_put(text, sizeof text, message, &n), 0);
+    pal_mem_send(c->peer, text, n, true);
+}
+
+static inline void mem_text(mem_client *c, const char *text)
+{
+    pal_mem_send(c->peer, text, strlen(text), true);
+}
+
+static inline void mem_join(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool)
+{
+    pal_control join = {.type = PAL_CONTROL_JOIN};
+    memset(c, 0, sizeof *c);
+    c->road = road;
+    c->peer = pal_mem_connect(road, "");
+    join.join.role = role;
+    join.join.tool = tool;
+    snprintf(join.join.name, sizeof join.join.name, "%s", name);
+    mem_say(c, &join);
+}
+
+static inline void mem_load_asset(mem_client *c)
+{
+    pal_reply reply;
+    pal_mem_get(c->road, c->last[PAL_CONTROL_HELLO].hello.part[0].asset, &reply);
+    CHECK_INT(reply.status, 200);
+    if (!reply.body) return;
+    CHECK_INT(pal_asset_decode(reply.body->bytes, reply.body->n_byte, &c->asset), 0);
+    CHECK_INT(pal_frame_decoder_create(c->asset, &c->decoder), 0);
+    c->position_m = calloc(c->asset->order->n_vertex, 3 * sizeof(float));
+    pal_packet_drop(reply.body);
+}
+
+static inline void mem_take_text(mem_client *c, const pal_packet *p)
+{
+    static pal_control in;
+    int refusal = pal_control_get((const char *)p->bytes, p->n_byte, true, &in);
+    if (refusal) {
+        c->n_bad++;
+        return;
+    }
+    c->last[in.type] = in;
+    c->n_text[in.type]++;
+    if (in.type == PAL_CONTROL_HELLO) mem_load_asset(c);
+}
+
+static inline void mem_take_binary(mem_client *c, const pal_packet *p)
+{
+    pal_wire_head head;
+    int refusal = pal_wire_get_head(p->bytes, p->n_byte, &head);
+    if (refusal) {
+        c->n_bad++;
+    } else if (head.kind == PAL_WIRE_FRAME) {
+        c->n_frame++;
+        if (!c->decoder || pal_frame_get(c->decoder, p->bytes, p->n_byte, &c->frame, c->position_m)) c->n_bad++;
+    } else if (head.kind == PAL_WIRE_TOOLS) {
+        c->n_tools++;
+        if (pal_wire_get_tools(p->bytes, p->n_byte, &c->tools)) c->n_bad++;
+        if (!c->mute) {
+            uint8_t ack[PAL_WIRE_ACK_BYTES];
+            pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = c->tools.cycle});
+            pal_mem_send(c->peer, ack, sizeof ack, false);
+        }
+    } else {
+        c->n_haptic++;
+        if (pal_wire_get_haptic(p->bytes, p->n_byte, &c->haptic)) c->n_bad++;
+    }
+}
+
+/* takes at most n messages; the result is how many there were */
+static inline int mem_pull(mem_client *c, int n)
+{
+    int taken = 0;
+    for (const pal_packet *p; taken < n && (p = pal_mem_receive(c->peer)); taken++)
+        if (p->text)
+            mem_take_text(c, p);
+        else
+            mem_take_binary(c, p);
+    return taken;
+}
+
+static inline void mem_pose(mem_client *c, int tool, uint32_t seq, const double position_m[3])
+{
+    uint8_t bytes[PAL_WIRE_POSE_BYTES];
+    pal_wire_pose pose = {.tool = (uint16_t)tool, .seq = seq, .stamp_us = 1000 + seq, .quaternion = {1, 0, 0, 0}};
+    for (int i = 0; i < 3; i++) pose.position_m[i] = position_m[i];
+    CHECK_INT(pal_wire_put_pose(bytes, sizeof bytes, &pose), PAL_WIRE_POSE_BYTES);
+    pal_mem_send(c->peer, bytes, sizeof bytes, false);
+}
+
+static inline void mem_end(mem_client *c)
+{
+    if (c->peer) pal_mem_leave(c->peer);
+    pal_frame_decoder_destroy(c->decoder);
+    pal_asset_destroy(c->asset);
+    free(c->position_m);
+    memset(c, 0, sizeof *c);
+}
+#endif

@@ -1,0 +1,33 @@
+/* A small organ of our own as a scene, built in the test: no files needed. */
+#ifndef TESTS_NET_SMALL_SCENE_H
+#define TESTS_NET_SMALL_SCENE_H
+#include "server/mesh/organ.h"
+#include "server/sim/def.h"
+#include "tests/check.h"
+
+typedef struct small_scene {
+    pal_prepared mesh;
+    pal_scene scene;
+} small_scene;
+
+static inline bool small_scene_make(small_scene *s, const char *name)
+{
+    pal_surface surface;
+    pal_voxel_options options = {.resolution = 6, .border = true};
+    pal_prepare_report report;
+    pal_note note = {""};
+    memset(s, 0, sizeof *s);
+    if (pal_organ_make(1500, &surface)) return false;
+    pal_err err = pal_prepared_make(&surface, &options, &s->mesh, &report, &note);
+    pal_surface_free(&surface);
+    if (err) printf("  no scene: %s\n", note.text);
+    pal_scene_default(&s->scene);
+    snprintf(s->scene.name, sizeof s->scene.name, "%s", name);
+    snprintf(s->scene.title, sizeof s->scene.title, "Small \"organ\"");
+    snprintf(s->scene.source, sizeof s->scene.source, "made by the test");
+    s->scene.n_body = 1;
+    pal_body_default(&s->scene.body[0], "organ", &s->mesh);
+    pal_tools_default(&s->scene, 2);
+    return !err;
+}
+#endif

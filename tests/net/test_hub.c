@@ -1,0 +1,475 @@
+/* The hub over mem://, with a real session: what clients are told, what they may do, and what hostile and slow ones
+ * cost the others. Time is the test's own. */
+#include "server/net/server.h"
+#include "server/net/stream.h"
+#include "tests/net/mem_client.h"
+#include "tests/net/small_scene.h"
+
+#include <time.h>
+
+#define FRAME_NS 16666667ull
+
+static small_scene organ;
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pal_transport *road;
+static uint64_t now_ns;
+
+static void begin(bool paused, int most_clients)
+{
+    pal_session *list[1];
+    pal_note note = {""};
+    gate = pal_server_gate_create();
+    pal_session_options options = {
+        .lease_s = 60, .start_paused = paused, .unpaced = !paused, .wake = pal_server_gate_wake, .user = gate};
+    pal_server_options net = {.road = "mem", .most_clients = most_clients};
+    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    list[0] = session;
+    if (pal_server_open(&net, list, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    pal_server_connect(server, gate);
+    road = pal_server_transport(server);
+    now_ns = 1000000000ull;
+}
+
+static void end(void)
+{
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+}
+
+static void nap(void)
+{
+    nanosleep(&(struct timespec){0, 200000}, NULL);
+}
+
+/* one frame time on; then everybody named takes what waits */
+static void turn(mem_client *a, mem_client *b)
+{
+    now_ns += FRAME_NS;
+    pal_server_turn(server, now_ns);
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+    nap();
+}
+
+/* turns until the condition holds, at most 10,000 times */
+#define UNTIL(condition, a, b)                                                                                         \
+    do {                                                                                                               \
+        int turns = 0;                                                                                                 \
+        while (!(condition) && turns++ < 10000) turn(a, b);                                                            \
+        CHECK(condition);                                                                                              \
+    } while (0)
+
+static void frames_decode_to_the_sessions_positions(void)
+{
+    pal_stream *s = NULL;
+    pal_asset *asset = NULL;
+    pal_frame_decoder *decoder = NULL;
+    pal_frame_head head;
+    bool used[PAL_STREAM_TIER] = {true, true, true};
+    pal_stream_tool tool[PAL_TOOL_MAX] = {{0}};
+    pal_session_options options = {.unpaced = true};
+    REQUIRE(pal_session_open(&organ.scene, &options, NULL, &session) == PAL_ERR_OK);
+    REQUIRE(pal_stream_open(session, 0, NULL, &s) == PAL_ERR_OK);
+    CHECK(s->error_m > 0 && s->error_m <= 5e-5);
+    REQUIRE(pal_asset_decode(s->part[0].asset->bytes, s->part[0].asset->n_byte, &asset) == 0);
+    REQUIRE(pal_frame_decoder_create(asset, &decoder) == 0);
+    CHECK_INT(s->part[0].info.n_vertex, asset->order->n_vertex);
+    int n = (int)asset->order->n_vertex, n_cycle = 0;
+    float *x = malloc((size_t)n * 3 * sizeof *x);
+    double worst[PAL_STREAM_TIER] = {0};
+    for (int i = 0; i < 20000 && n_cycle < 40; i++) {
+        if (!pal_stream_turn(s, (uint64_t)i, used, tool)) {
+            nap();
+            continue;
+        }
+        n_cycle++;
+        for (int t = 0; t < PAL_STREAM_TIER; t++) {
+            const pal_packet *p = s->part[0].frame[t];
+            REQUIRE(p && pal_frame_get(decoder, p->bytes, p->n_byte, &head, x) == 0);
+            CHECK_INT(head.cycle, s->part[0].frame_cycle[t]);
+            for (int k = 0; k < 3 * n; k++)
+                worst[t] = fmax(worst[t], fabs((double)x[k] - (double)s->frame->part[0].position_m[k]));
+        }
+    }
+    CHECK_INT(n_cycle, 40);
+    for (int t = 0; t < PAL_STREAM_TIER; t++) CHECK_LE(worst[t], pal_stream_tier_error_m(s, t));
+    free(x);
+    pal_frame_decoder_destroy(decoder);
+    pal_asset_destroy(asset);
+    pal_stream_close(s);
+    pal_session_close(session);
+}
+
+static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
+{
+    mem_client ada;
+    begin(true, 0);
+    UNTIL(pal_session_alive(session), NULL, NULL);
+    turn(NULL, NULL);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    CHECK_INT(mem_pull(&ada, 1), 1);
+    CHECK_INT(ada.n_text[PAL_CONTROL_HELLO], 1);
+    const pal_wire_hello *hello = &ada.last[PAL_CONTROL_HELLO].hello;
+    CHECK_TEXT(hello->session, "small");
+    CHECK_TEXT(hello->you_name, "Ada");
+    CHECK_TEXT(hello->title, "Small \"organ\"");
+    CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 && hello->n_row > 0);
+    CHECK(hello->box_max_m[0] > hello->box_min_m[0] && hello->tool[0].radius_m > 0 && hello->credit >= 2);
+    CHECK_INT(mem_pull(&ada, 1), 1);
+    CHECK_INT(ada.n_text[PAL_CONTROL_MEMBERS], 1);
+    CHECK_TEXT(ada.last[PAL_CONTROL_MEMBERS].members.member[0].name, "Ada");
+    UNTIL(ada.n_tools > 0, &ada, NULL);
+    CHECK(ada.n_frame >= 1 && ada.n_bad == 0);
+    CHECK_INT(ada.frame.epoch, 1);
+    UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 0, &ada, NULL);
+    CHECK(ada.last[PAL_CONTROL_STATUS].status.paused);
+    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_row, hello->n_row);
+    mem_end(&ada);
+    end();
+}
+
+static void late_joiner_sees_the_paused_tissue_as_everybody_does(void)
+{
+    mem_client ada, bob;
+    begin(false, 0);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    UNTIL(ada.n_tools > 5, &ada, NULL);
+    mem_text(&ada, "{\"type\":\"command\",\"verb\":\"pause\"}");
+    UNTIL(ada.last[PAL_CONTROL_STATUS].status.paused, &ada, NULL);
+    uint32_t frames = (uint32_t)ada.n_frame;
+    for (int i = 0; i < 30; i++) turn(&ada, NULL);
+    CHECK_INT(ada.n_frame, frames); /* nothing moves, nothing is sent */
+    mem_join(&bob, road, "Bob", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_pull(&bob, 1000);
+    CHECK_INT(bob.n_frame, 1); /* from what the hub holds, without another step */
+    CHECK_INT(bob.n_tools, 1);
+    REQUIRE(bob.position_m && ada.position_m);
+    CHECK(memcmp(bob.position_m, ada.position_m, bob.asset->order->n_vertex * 3 * sizeof(float)) == 0);
+    CHECK_INT(bob.n_bad + ada.n_bad, 0);
+    mem_end(&bob);
+    mem_end(&ada);
+    end();
+}
+
+static void stalled_client_costs_little_and_is_current_within_two_frames(void)
+{
+    mem_client fast, slow;
+    begin(false, 0);
+    mem_join(&fast, road, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&slow, road, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    UNTIL(fast.n_tools > 3 && slow.n_tools > 3, &fast, &slow);
+    turn(&fast, &slow);
+    size_t held = pal_packet_total(), most = 0;
+    int got = fast.n_tools;
+    /* 5 s: the slow one reads nothing at all */
+    for (int i = 0; i < 300; i++) {
+        turn(&fast, NULL);
+        if (pal_packet_total() > most) most = pal_packet_total();
+    }
+    CHECK(fast.n_tools - got > 100);
+    CHECK_LE((double)most, (double)held + 65536); /* a cycle of this organ is 1 to 3 kB */
+    /* it wakes: the newest cycle is among the first two */
+    int before = slow.n_tools;
+    for (int i = 0; slow.n_tools < before + 2 && i < 50; i++) mem_pull(&slow, 1);
+    CHECK_INT(slow.tools.cycle, fast.tools.cycle);
+    REQUIRE(slow.position_m && fast.position_m);
+    CHECK(memcmp(slow.position_m, fast.position_m, slow.asset->order->n_vertex * 3 * sizeof(float)) == 0);
+    CHECK_INT(pal_mem_code(slow.peer), 0);
+    mem_end(&slow);
+    mem_end(&fast);
+    end();
+}
+
+static void without_acknowledgement_frames_stop_and_control_goes_on(void)
+{
+    mem_client deaf, other;
+    begin(false, 0);
+    mem_join(&deaf, road, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&other, road, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    deaf.mute = true;
+    UNTIL(other.n_tools > 60, &other, &deaf);
+    CHECK_INT(deaf.n_tools, 3); /* the credit at the start */
+    mem_text(&deaf, "{\"type\":\"ping\",\"stamp_ms\":12.5}");
+    mem_pull(&deaf, 1000);
+    CHECK_NEAR(deaf.last[PAL_CONTROL_PONG].stamp_ms, 12.5, 0);
+    CHECK(deaf.n_text[PAL_CONTROL_STATUS] > 1);
+    for (int i = 0; i < 700 && !pal_mem_code(deaf.peer); i++) turn(&other, &deaf);
+    CHECK_INT(pal_mem_code(deaf.peer), PAL_WIRE_CLOSE_STALLED);
+    CHECK_INT(pal_mem_code(other.peer), 0);
+    CHECK_INT(other.last[PAL_CONTROL_MEMBERS].members.n_member, 1);
+    mem_end(&deaf);
+    mem_end(&other);
+    end();
+}
+
+static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void)
+{
+    mem_client c;
+    begin(false, 0);
+    mem_join(&c, road, "c", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    UNTIL(c.n_frame > 5, &c, NULL);
+    double fine = (double)c.frame.q_m;
+    /* every third cycle only */
+    for (int i = 0; i < 1500 && (double)c.frame.q_m < 1.5 * fine; i++) turn(i % 3 ? NULL : &c, NULL);
+    CHECK_NEAR((double)c.frame.q_m / fine, 2, 1e-5);
+    for (int i = 0; i < 20000 && (double)c.frame.q_m > 1.5 * fine; i++) turn(&c, NULL);
+    CHECK_NEAR((double)c.frame.q_m / fine, 1, 1e-5);
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+static void a_tool_has_one_holder(void)
+{
+    mem_client a, b, c;
+    begin(true, 0);
+    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_join(&b, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_pull(&a, 1000), mem_pull(&b, 1000);
+    CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_tool, 1);
+    CHECK_INT(b.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
+    CHECK_TEXT(b.last[PAL_CONTROL_ERROR].problem.code, "tool_taken");
+    CHECK(strcmp(b.last[PAL_CONTROL_HELLO].hello.you_name, "Ada") != 0); /* names are unique */
+    mem_text(&b, "{\"type\":\"take\",\"tool\":0}");
+    mem_join(&c, road, "Eve", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_ANY);
+    mem_pull(&c, 1000);
+    CHECK_INT(c.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool_taken");
+    mem_text(&c, "{\"type\":\"take\",\"tool\":7}");
+    mem_pull(&c, 1000);
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool");
+    /* one who goes leaves the tool to others */
+    mem_end(&a);
+    mem_text(&c, "{\"type\":\"take\",\"tool\":1}");
+    mem_pull(&c, 1000);
+    CHECK_INT(c.last[PAL_CONTROL_MEMBERS].members.n_member, 2);
+    CHECK_INT(c.last[PAL_CONTROL_MEMBERS].members.member[1].tool >= 0, 1);
+    mem_text(&c, "{\"type\":\"leave\"}");
+    mem_text(&b, "{\"type\":\"take\",\"tool\":1}");
+    mem_pull(&b, 1000);
+    bool held = false;
+    for (int i = 0; i < 2; i++) {
+        const pal_wire_member *m = &b.last[PAL_CONTROL_MEMBERS].members.member[i];
+        held |= m->id == b.last[PAL_CONTROL_HELLO].hello.you_id && m->tool == 1;
+    }
+    CHECK(held);
+    mem_end(&b);
+    mem_end(&c);
+    end();
+}
+
+static void pose_of_the_holder_moves_the_tool_and_is_echoed(void)
+{
+    mem_client a, b;
+    const double at[3] = {0.01, -0.02, 0.3}, elsewhere[3] = {0.5, 0.5, 0.5};
+    begin(false, 0);
+    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&b, road, "Bob", PAL_WIRE_ROLE_TRAINEE, 1);
+    UNTIL(a.n_tools && b.n_tools, &a, &b);
+    CHECK(a.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY);
+    mem_pose(&a, 0, 7, at);
+    mem_pose(&b, 0, 9, elsewhere); /* not his */
+    UNTIL(b.tools.tool[0].echo_seq == 7, &a, &b);
+    CHECK_INT(b.tools.tool[0].echo_stamp_us, 1007);
+    CHECK_INT(b.tools.tool[0].holder, a.last[PAL_CONTROL_HELLO].hello.you_id);
+    for (int i = 0; i < 3; i++) CHECK_NEAR((double)b.tools.tool[0].position_m[i], at[i], 1e-7);
+    CHECK(b.tools.tool[0].colour != b.tools.tool[1].colour);
+    /* its contact model goes to the holder alone */
+    UNTIL(a.n_haptic > 0 && a.haptic.echo_seq == 7, &a, &b);
+    CHECK_INT(b.n_haptic, 0);
+    CHECK_INT(a.haptic.tool, 0);
+    /* the next holder has nothing to be echoed */
+    mem_end(&a);
+    mem_text(&b, "{\"type\":\"take\",\"tool\":0}");
+    turn(&b, NULL);
+    UNTIL(b.tools.tool[0].holder == b.last[PAL_CONTROL_HELLO].hello.you_id, &b, NULL);
+    CHECK_INT(b.tools.tool[0].echo_seq, 0);
+    mem_end(&b);
+    end();
+}
+
+static void viewer_moves_no_tool_and_gives_no_command(void)
+{
+    mem_client v, t;
+    const double at[3] = {0, 0, 0.1};
+    begin(false, 0);
+    mem_join(&v, road, "Vera", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_ANY);
+    mem_join(&t, road, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    UNTIL(v.n_tools && t.n_tools, &v, &t);
+    CHECK_INT(v.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
+    for (uint32_t i = 1; i < 20; i++) {
+        mem_pose(&v, 0, i, at);
+        turn(&v, &t);
+    }
+    CHECK_TEXT(v.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 1); /* said once a second, not every time */
+    CHECK(t.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY);
+    mem_text(&v, "{\"type\":\"take\",\"tool\":0}");
+    mem_text(&v, "{\"type\":\"command\",\"verb\":\"pause\"}");
+    for (int i = 0; i < 40; i++) turn(&v, &t);
+    CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 3);
+    CHECK(!v.last[PAL_CONTROL_STATUS].status.paused);
+    CHECK_INT(pal_mem_code(v.peer), 0);
+    mem_end(&v);
+    mem_end(&t);
+    end();
+}
+
+static void commands_are_checked_and_carried_out(void)
+{
+    mem_client a;
+    begin(true, 0);
+    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    static const char *const refused[][2] = {
+        {"{\"type\":\"command\",\"verb\":\"explode\"}", "verb"},
+        {"{\"type\":\"command\",\"verb\":\"material\",\"target\":\"brain\",\"args\":{\"young_Pa\":1}}", "target"},
+        {"{\"type\":\"command\",\"verb\":\"material\",\"target\":\"organ\",\"args\":{\"taste\":1}}", "args"},
+        {"{\"type\":\"join\",\"name\":\"again\",\"role\":\"viewer\",\"tool\":-1}", "joined"}};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        mem_text(&a, refused[i][0]);
+        mem_pull(&a, 1000);
+        CHECK_INT(a.n_text[PAL_CONTROL_ERROR], (int)i + 1);
+        CHECK_TEXT(a.last[PAL_CONTROL_ERROR].problem.code, refused[i][1]);
+    }
+    UNTIL(a.n_text[PAL_CONTROL_STATUS] > 0, &a, NULL);
+    uint64_t tick = a.last[PAL_CONTROL_STATUS].status.tick;
+    mem_text(&a, "{\"type\":\"command\",\"verb\":\"step\"}");
+    UNTIL(a.last[PAL_CONTROL_STATUS].status.tick == tick + 1, &a, NULL);
+    mem_text(&a, "{\"type\":\"command\",\"verb\":\"reset\"}");
+    UNTIL(a.last[PAL_CONTROL_STATUS].status.tick == 0, &a, NULL);
+    /* a material that the world refuses is told in the status, and the session lives */
+    mem_text(&a, "{\"type\":\"command\",\"verb\":\"material\",\"target\":\"organ\",\"args\":{\"young_Pa\":1e14}}");
+    UNTIL(a.last[PAL_CONTROL_STATUS].status.note[0] || a.n_text[PAL_CONTROL_ERROR] > 4, &a, NULL);
+    mem_text(&a, "{\"type\":\"command\",\"verb\":\"resume\"}");
+    UNTIL(!a.last[PAL_CONTROL_STATUS].status.paused && a.last[PAL_CONTROL_STATUS].status.tick > 0, &a, NULL);
+    CHECK_INT(pal_mem_code(a.peer), 0);
+    mem_end(&a);
+    end();
+}
+
+static void hostile_messages_close_with_a_reason_and_nobody_else_notices(void)
+{
+    mem_client good, bad;
+    uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES], long_one[5000] = {0};
+    pal_wire_pose p = {.quaternion = {1, 0, 0, 0}};
+    pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = 99999999});
+    begin(false, 0);
+    mem_join(&good, road, "good", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    for (int kind = 0; kind < 11; kind++) {
+        int code = PAL_WIRE_CLOSE_PROTOCOL;
+        pal_wire_put_pose(pose, sizeof pose, &p);
+        mem_join(&bad, road, "bad", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+        UNTIL(bad.n_tools > 0, &good, &bad);
+        switch (kind) {
+        case 0:
+            mem_text(&bad, "{not json");
+            break;
+        case 1:
+            mem_text(&bad, "{\"type\":\"hello\"}");
+            break; /* the server's own */
+        case 2:
+            mem_text(&bad, "{\"type\":\"take\",\"tool\":\"x\"}");
+            break;
+        case 3:
+            pal_mem_send(bad.peer, "\xFF\xFE\x00", 3, true);
+            break;
+        case 4:
+            pal_mem_send(bad.peer, "garbage!garbage!", 16, false);
+            break;
+        case 5:
+            pal_mem_send(bad.peer, pose, sizeof pose - 1, false);
+            break;
+        case 6:
+            memcpy(pose + 24, "\0\0\0\0\0\0\xF8\x7F", 8), pal_mem_send(bad.peer, pose, sizeof pose, false);
+            break;
+        case 7:
+            pal_mem_send(bad.peer, ack, sizeof ack, false);
+            break;
+        case 8:
+            pal_mem_send(bad.peer, "", 0, false);
+            break;
+        case 9:
+            pal_mem_send(bad.peer, long_one, sizeof long_one, false), code = PAL_WIRE_CLOSE_TOO_BIG;
+            break;
+        default:
+            for (int i = 0; i < 400; i++) mem_text(&bad, "{\"type\":\"leave\"}");
+            code = PAL_WIRE_CLOSE_RATE;
+        }
+        if (pal_mem_code(bad.peer) != code)
+            CHECK_FAIL("hostile message %d: closed with %d, wanted %d", kind, pal_mem_code(bad.peer), code);
+        CHECK(strlen(pal_mem_reason(bad.peer)) > 10);
+        int before = good.n_tools;
+        UNTIL(good.n_tools > before + 1, &good, &bad);
+        mem_end(&bad);
+    }
+    turn(&good, NULL);
+    CHECK_INT(good.last[PAL_CONTROL_MEMBERS].members.n_member, 1);
+    CHECK_INT(good.n_bad, 0);
+    CHECK_INT(pal_mem_code(good.peer), 0);
+    mem_end(&good);
+    end();
+}
+
+static void strangers_are_turned_away(void)
+{
+    mem_client a, b;
+    begin(true, 3);
+    pal_mem_peer *lost = pal_mem_connect(road, "no-such-session"), *silent = pal_mem_connect(road, "small");
+    CHECK_INT(pal_mem_code(lost), PAL_WIRE_CLOSE_NO_SESSION);
+    const double at[3] = {0, 0, 0};
+    mem_client early = {.road = road, .peer = pal_mem_connect(road, "")};
+    mem_pose(&early, 0, 1, at);
+    CHECK_INT(pal_mem_code(early.peer), PAL_WIRE_CLOSE_POLICY); /* join comes first */
+    mem_end(&early);
+    mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&b, road, "b", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    pal_mem_peer *fourth = pal_mem_connect(road, "");
+    CHECK_INT(pal_mem_code(fourth), PAL_WIRE_CLOSE_FULL);
+    for (int i = 0; i < 330 && !pal_mem_code(silent); i++) turn(&a, &b); /* 5.5 s */
+    CHECK_INT(pal_mem_code(silent), PAL_WIRE_CLOSE_POLICY);
+    CHECK_INT(pal_mem_code(a.peer) + pal_mem_code(b.peer), 0);
+    pal_mem_leave(lost);
+    pal_mem_leave(silent);
+    pal_mem_leave(fourth);
+    mem_end(&a);
+    mem_end(&b);
+    end();
+}
+
+static void answers_that_nobody_reads_close_the_peer(void)
+{
+    mem_client a;
+    begin(true, 0);
+    mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    size_t held = pal_packet_total();
+    int n = 0;
+    while (!pal_mem_code(a.peer) && n < 100) mem_text(&a, "{\"type\":\"ping\",\"stamp_ms\":1}"), n++;
+    CHECK_INT(pal_mem_code(a.peer), PAL_WIRE_CLOSE_POLICY);
+    CHECK(n > 16 && n < 64);
+    CHECK_LE((double)pal_packet_total(), (double)held); /* what waited is gone */
+    mem_end(&a);
+    end();
+}
+
+int main(void)
+{
+    if (!small_scene_make(&organ, "small")) return 1;
+    RUN(frames_decode_to_the_sessions_positions);
+    RUN(newcomer_gets_hello_members_frame_and_tools_in_this_order);
+    RUN(late_joiner_sees_the_paused_tissue_as_everybody_does);
+    RUN(stalled_client_costs_little_and_is_current_within_two_frames);
+    RUN(without_acknowledgement_frames_stop_and_control_goes_on);
+    RUN(slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up);
+    RUN(a_tool_has_one_holder);
+    RUN(pose_of_the_holder_moves_the_tool_and_is_echoed);
+    RUN(viewer_moves_no_tool_and_gives_no_command);
+    RUN(commands_are_checked_and_carried_out);
+    RUN(hostile_messages_close_with_a_reason_and_nobody_else_notices);
+    RUN(strangers_are_turned_away);
+    RUN(answers_that_nobody_reads_close_the_peer);
+    pal_prepared_free(&organ.mesh);
+    return check_report();
+}

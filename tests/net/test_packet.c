@@ -1,0 +1,184 @@
+/* Packets, credit, rate limit, plain text and the viewer's files: the parts of the network room without a network. */
+#include "server/net/credit.h"
+#include "server/net/packet.h"
+#include "server/net/plain_text.h"
+#include "server/net/site.h"
+#include "tests/check.h"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#define MS 1000000ull
+
+static void packet_lives_as_long_as_its_last_user(void)
+{
+    size_t before = pal_packet_total();
+    pal_packet *p = pal_packet_create("abc", 3, true), *place = NULL;
+    REQUIRE(p);
+    CHECK_INT(pal_packet_total(), before + 3);
+    pal_packet_replace(&place, pal_packet_hold(p));
+    pal_packet_drop(p);
+    CHECK(place == p && memcmp(place->bytes, "abc", 3) == 0);
+    memset(p->bytes - PAL_PACKET_FRONT, 0xFF, PAL_PACKET_FRONT);
+    CHECK(p->n_byte == 3 && p->text && p->n_user == 1);
+    pal_packet_replace(&place, NULL);
+    CHECK_INT(pal_packet_total(), before);
+    CHECK(pal_packet_create(NULL, SIZE_MAX - 8, false) == NULL);
+}
+
+static void credit_follows_the_smallest_round_trip(void)
+{
+    pal_credit c;
+    uint64_t now = 1000 * MS;
+    pal_credit_begin(&c, 60);
+    /* 100 ms: 1 + ceil(60 x 0.1) = 7 */
+    pal_credit_sent(&c, 1, now);
+    CHECK(pal_credit_acknowledge(&c, 1, now + 100 * MS));
+    CHECK_INT(c.most, 7);
+    /* one of 1 ms: the least of 2 */
+    pal_credit_sent(&c, 2, now);
+    CHECK(pal_credit_acknowledge(&c, 2, now + 1 * MS));
+    CHECK_INT(c.most, 2);
+    /* a network that became slow is believed after two windows; never more than 12 */
+    for (uint32_t i = 3; i < 80; i++, now += 400 * MS) {
+        pal_credit_sent(&c, i, now);
+        CHECK(pal_credit_acknowledge(&c, i, now + 390 * MS));
+    }
+    CHECK_INT(c.most, PAL_CREDIT_MOST);
+}
+
+static void credit_runs_out_and_comes_back(void)
+{
+    pal_credit c;
+    pal_credit_begin(&c, 60);
+    int n = 0;
+    for (uint32_t cycle = 10; pal_credit_free(&c); cycle += 5, n++) pal_credit_sent(&c, cycle, 0);
+    CHECK_INT(n, 3);
+    CHECK(pal_credit_acknowledge(&c, 15, 5 * MS)); /* takes 10 with it */
+    CHECK_INT(c.n_flight, 1);
+    CHECK(pal_credit_acknowledge(&c, 15, 5 * MS)); /* again: harmless */
+    CHECK(pal_credit_acknowledge(&c, 10, 5 * MS));
+    CHECK(!pal_credit_acknowledge(&c, 17, 5 * MS)); /* never sent */
+    CHECK(!pal_credit_acknowledge(&c, 25, 5 * MS)); /* to come   */
+    CHECK_INT(c.n_flight, 1);
+}
+
+static void acknowledging_nothing_is_a_stall(void)
+{
+    pal_credit c;
+    pal_credit_begin(&c, 60);
+    CHECK(!pal_credit_stalled(&c, 60000 * MS, 10000 * MS)); /* nothing sent, nothing owed */
+    pal_credit_sent(&c, 1, 60000 * MS);
+    CHECK(!pal_credit_stalled(&c, 69999 * MS, 10000 * MS));
+    CHECK(pal_credit_stalled(&c, 70001 * MS, 10000 * MS));
+    CHECK(pal_credit_acknowledge(&c, 1, 70001 * MS));
+    CHECK(!pal_credit_stalled(&c, 90000 * MS, 10000 * MS));
+}
+
+static void bucket_lets_the_rate_through_and_no_more(void)
+{
+    pal_bucket b;
+    pal_bucket_begin(&b, 600, 300, 0);
+    int n = 0;
+    for (int i = 0; i < 1000; i++) n += pal_bucket_take(&b, 0);
+    CHECK_INT(n, 300);
+    n = 0;
+    for (int i = 1; i <= 10000; i++) n += pal_bucket_take(&b, (uint64_t)i * MS); /* 1000 a second for 10 s */
+    CHECK_NEAR(n, 6000, 2);
+}
+
+static void text_becomes_valid_without_control_characters(void)
+{
+    char out[32];
+    pal_plain_text(out, sizeof out, "a\nb\x7f\xC2\x85z");
+    CHECK_TEXT(out, "a b  z");
+    pal_plain_text(out, sizeof out, "\xFFx\xC0\xAF\xED\xA0\x80\xF5y");
+    CHECK_TEXT(out, "?x??????y");
+    pal_plain_text(out, 6, "ab\xC3\xA4\xC3\xB6");
+    CHECK_TEXT(out, "ab\xC3\xA4"); /* cut at a character */
+    pal_plain_json(out, sizeof out, "say \"a\\b\"");
+    CHECK_TEXT(out, "say \\\"a\\\\b\\\"");
+    pal_plain_json(out, 6, "abcd\"");
+    CHECK_TEXT(out, "abcd");
+}
+
+static void put(const char *folder, const char *name, const char *text)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "w");
+    if (f) fputs(text, f), fclose(f);
+}
+
+static void files_come_only_from_inside_the_folder(void)
+{
+    char folder[] = "/tmp/palpate_site_XXXXXX", path[300],
+         *bad[] = {"/secret.html", "/../out.html",   "/link.html", "/.hidden.html",   "/sub/../index.html",
+                   "//index.html", "/%2e%2e/x.html", "index.html", "/a b.html",       "/noise",
+                   "/noise.exe",   "/sub",           "/sub/",      "/up/passwd.html", ""};
+    pal_site *site = NULL;
+    pal_site_file file;
+    REQUIRE(mkdtemp(folder));
+    CHECK_INT(pal_site_open(folder, NULL, &site), PAL_ERR_IO); /* no index.html */
+    put(folder, "index.html", "<p>one");
+    put(folder, ".hidden.html", "no");
+    put(folder, "noise.exe", "no");
+    snprintf(path, sizeof path, "%s/sub", folder);
+    mkdir(path, 0700);
+    put(path, "code.mjs", "export {}");
+    snprintf(path, sizeof path, "%s/link.html", folder);
+    CHECK_INT(symlink("/etc/passwd", path), 0);
+    snprintf(path, sizeof path, "%s/up", folder);
+    CHECK_INT(symlink("/etc", path), 0);
+    REQUIRE(pal_site_open(folder, NULL, &site) == PAL_ERR_OK);
+    CHECK(pal_site_get(site, "/", &file));
+    CHECK_TEXT(file.type, "text/html; charset=utf-8");
+    CHECK(pal_site_get(site, "/sub/code.mjs", &file));
+    CHECK_TEXT(file.type, "text/javascript; charset=utf-8");
+    CHECK(file.bytes->n_byte == 9 && strlen(file.etag) == 34);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        if (pal_site_get(site, bad[i], &file)) CHECK_FAIL("%s was served", bad[i]);
+    snprintf(path, sizeof path, "rm -r %s", folder);
+    pal_site_close(site);
+    CHECK_INT(system(path), 0);
+}
+
+static void changed_file_has_another_tag(void)
+{
+    char folder[] = "/tmp/palpate_site_XXXXXX", path[300], tag[64];
+    pal_site *site = NULL;
+    pal_site_file file;
+    REQUIRE(mkdtemp(folder));
+    put(folder, "index.html", "<p>one");
+    REQUIRE(pal_site_open(folder, NULL, &site) == PAL_ERR_OK);
+    REQUIRE(pal_site_get(site, "/index.html", &file));
+    snprintf(tag, sizeof tag, "%s", file.etag);
+    pal_packet *held = pal_packet_hold(file.bytes);
+    REQUIRE(pal_site_get(site, "/", &file));
+    CHECK_TEXT(file.etag, tag);
+    CHECK(file.bytes == held); /* not read again */
+    put(folder, "index.html", "<p>three");
+    REQUIRE(pal_site_get(site, "/", &file));
+    CHECK(strcmp(file.etag, tag) != 0);
+    CHECK(file.bytes->n_byte == 8 && held->n_byte == 6); /* a reply that is under way keeps its bytes */
+    pal_packet_drop(held);
+    snprintf(path, sizeof path, "%s/index.html", folder);
+    unlink(path);
+    CHECK(!pal_site_get(site, "/", &file));
+    pal_site_close(site);
+    rmdir(folder);
+}
+
+int main(void)
+{
+    RUN(packet_lives_as_long_as_its_last_user);
+    RUN(credit_follows_the_smallest_round_trip);
+    RUN(credit_runs_out_and_comes_back);
+    RUN(acknowledging_nothing_is_a_stall);
+    RUN(bucket_lets_the_rate_through_and_no_more);
+    RUN(text_becomes_valid_without_control_characters);
+    RUN(files_come_only_from_inside_the_folder);
+    RUN(changed_file_has_another_tag);
+    return check_report();
+}
