@@ -44,7 +44,7 @@ static void main_watch(void *user)
 
 typedef struct totals {
     pal_samples latency, decode, gap;
-    uint64_t frames, cycles, poses, bytes, asset_bytes, fault[PAL_FAULT_COUNT];
+    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fault[PAL_FAULT_COUNT];
     int joined, with_tool, reconnects, old_after_stall, stalls_done, silent, unanswered;
     double seconds, moved_m, force_N;
     const char *first_fault, *closed;
@@ -55,7 +55,8 @@ static void main_add(totals *sum, const pal_trainee_result *r)
     pal_samples_merge(&sum->latency, &r->latency_ms);
     pal_samples_merge(&sum->decode, &r->decode_ms);
     pal_samples_merge(&sum->gap, &r->gap_ms);
-    sum->frames += r->n_frame, sum->cycles += r->n_cycle, sum->poses += r->n_pose, sum->bytes += r->bytes_in;
+    sum->frames += r->n_frame, sum->coarse += r->n_coarse, sum->cycles += r->n_cycle, sum->poses += r->n_pose,
+        sum->bytes += r->bytes_in;
     sum->asset_bytes += r->asset_bytes;
     for (int i = 0; i < PAL_FAULT_COUNT; i++) sum->fault[i] += r->fault[i];
     sum->joined += r->joined, sum->with_tool += r->tool >= 0;
@@ -90,6 +91,7 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
     cJSON_AddNumberToObject(o, "with_tool", sum->with_tool);
     cJSON_AddNumberToObject(o, "seconds", sum->seconds);
     cJSON_AddNumberToObject(o, "frames", (double)sum->frames);
+    cJSON_AddNumberToObject(o, "coarse_frames", (double)sum->coarse);
     cJSON_AddNumberToObject(o, "cycles", (double)sum->cycles);
     cJSON_AddNumberToObject(o, "poses", (double)sum->poses);
     cJSON_AddNumberToObject(o, "frames_per_s", (double)sum->frames / seconds / n_client);
