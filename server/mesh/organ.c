@@ -34,8 +34,8 @@ static double liver(const void *self, const double p[3])
     double left = ellipsoid(p, (const double[3]){0.045, 0.018, 0.012}, (const double[3]){0.062, 0.036, 0.034});
     double body = blend(right, left, 0.035, 1);
     double hollow = ellipsoid(p, (const double[3]){0.015, -0.085, -0.012}, (const double[3]){0.075, 0.060, 0.062});
-    double fissure = ellipsoid(p, (const double[3]){0.024, -0.022, 0.050}, (const double[3]){0.006, 0.035, 0.030});
-    return blend(blend(body, -hollow, 0.030, -1), -fissure, 0.012, -1);
+    double fissure = ellipsoid(p, (const double[3]){0.022, -0.030, 0.058}, (const double[3]){0.012, 0.045, 0.030});
+    return blend(blend(body, -hollow, 0.030, -1), -fissure, 0.020, -1);
 }
 
 pal_err pal_organ_make(int n_tri_about, pal_surface *out)
