@@ -17,7 +17,7 @@
 #error "the prepared file is copied from memory: a big-endian machine needs a swap here"
 #endif
 
-enum { VERSION = 1, N_COUNT = 7, N_SECTION = 13, HEAD = 32, TABLE = HEAD + 8 * N_COUNT + 8 * 4, ENTRY = 24 };
+enum { VERSION = 2, N_COUNT = 7, N_SECTION = 14, HEAD = 32, TABLE = HEAD + 8 * N_COUNT + 8 * 4, ENTRY = 24 };
 static const char MAGIC[8] = "PALPREP1";
 
 /* one array of a prepared mesh: where it is kept, its item size and how many items the counts call for */
@@ -41,6 +41,7 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
         {&p->skin.frame, 4, n_frame},
         {&p->skin.frame_edge, 4, 2 * n_frame},
         {&p->skin.frame_turn, 4, 2 * n_frame},
+        {&p->skin.frame_rest, 4, 3 * n_frame},
         {&p->skin.fan_start, 4, n_frame + 1},
         {&p->skin.fan, 4, 2 * n_fan},
         {&p->skin.near, 4, PAL_SKIN_NEAR * n_vertex},
@@ -268,7 +269,8 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
     if (!fans_are_rows(skin, count[6])) return "the skin's fans are not ascending rows";
     if (!all_within(skin->fan, 2 * count[6], 0, n_node)) return "a skin fan's corner is out of range";
     if (!all_within(skin->near, PAL_SKIN_NEAR * count[0], 0, n_frame)) return "a vertex's skin frame is out of range";
-    if (!all_finite_float(skin->coef, 4 * PAL_SKIN_NEAR * count[0]) || !all_finite_float(skin->frame_turn, 2 * n_frame))
+    if (!all_finite_float(skin->coef, 4 * PAL_SKIN_NEAR * count[0]) ||
+        !all_finite_float(skin->frame_turn, 2 * n_frame) || !all_finite_float(skin->frame_rest, 3 * n_frame))
         return "a skin weight is not finite";
     for (uint64_t i = 0; i < n_node; i++)
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";

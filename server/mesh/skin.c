@@ -11,12 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* |sum of normals| over the root of the sum of squares: below this there is no normal to speak of. In a step the frame
- * then stays as it was; at rest the node is not used. */
-#define LEAST_NORMAL_REST 0.5
-#define LEAST_NORMAL_STEP 1e-3
-/* tangential part of an edge over its length */
-#define LEAST_TANGENT_STEP 0.05
+/* |sum of normals| over the root of the sum of squares: below this a node has no normal to speak of at rest and is not
+ * used */
+#define LEAST_NORMAL 0.5
+/* share of its rest length below which an axis shrinks */
+#define COLLAPSED 0.5
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
 
@@ -27,6 +26,7 @@ void pal_skin_free(pal_skin *skin)
     free(skin->frame);
     free(skin->frame_edge);
     free(skin->frame_turn);
+    free(skin->frame_rest);
     free(skin->fan_start);
     free(skin->fan);
     free(skin->near);
@@ -51,17 +51,24 @@ static double fan_normal(const double *x, int node, const int32_t *fan, int n, d
     return squares;
 }
 
-/* part of the edge from a to b normal to unit X, made unit; false when it is too short */
-static bool tangent(const double a[3], const double b[3], const double X[3], double least, double out[3])
+/* part of the edge from a to b normal to X */
+static void tangential(const double a[3], const double b[3], const double X[3], double out[3])
 {
-    double e[3];
-    pal_sub3(e, b, a);
-    double length2 = pal_dot3(e, e);
-    pal_axpy3(e, -pal_dot3(e, X), X);
-    double part2 = pal_dot3(e, e);
-    if (!(part2 > least * least * length2) || !(part2 < 1e300)) return false;
-    pal_scale3(out, 1 / sqrt(part2), e);
-    return true;
+    pal_sub3(out, b, a);
+    pal_axpy3(out, -pal_dot3(out, X), X);
+}
+
+/* a over its length, or over COLLAPSED times its rest length when that is more; the share of the latter it has, at most
+ * 1. An axis without a rest length is 0. */
+static double unit_or_less(double a[3], double rest)
+{
+    double length = pal_norm3(a), least = COLLAPSED * rest;
+    if (!(least > 0)) {
+        pal_set3(a, 0, 0, 0);
+        return 0;
+    }
+    pal_scale3(a, 1 / (length > least ? length : least), a);
+    return length > least ? 1 : length / least;
 }
 
 /* boundary faces around every node, as sparse rows of their other two corners; MEMORY */
@@ -100,8 +107,7 @@ static int find_candidates(const pal_tets *tets, const int32_t *start, const int
             int n_fan = start[i + 1] - start[i];
             if (n_fan == 0) continue;
             double squares = fan_normal(tets->x, i, fan + 2 * (size_t)start[i], n_fan, normal);
-            if (pass == 1 || pal_dot3(normal, normal) > LEAST_NORMAL_REST * LEAST_NORMAL_REST * squares)
-                candidate[n++] = i;
+            if (pass == 1 || pal_dot3(normal, normal) > LEAST_NORMAL * LEAST_NORMAL * squares) candidate[n++] = i;
         }
     return n;
 }
@@ -135,35 +141,38 @@ static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_c
     return PAL_ERR_OK;
 }
 
-/* the two edges of a frame and the turn between them (B15) */
-static void choose_edges(const double *x, int node, const int32_t *fan, int n_fan, int32_t edge[2], float turn[2])
+/* the two edges of a frame, the turn between them (B15) and the rest lengths */
+static void choose_edges(const double *x, int node, const int32_t *fan, int n_fan, int32_t edge[2], float turn[2],
+                         float rest[3])
 {
-    double normal[3], best = -1, second = -1, first_tangent[3] = {0}, second_tangent[3] = {0}, z[3];
+    double normal[3], best = 0, second = 0, first_tangent[3] = {0}, second_tangent[3] = {0}, z[3];
     fan_normal(x, node, fan, n_fan, normal);
     edge[0] = fan[0], edge[1] = -1;
     turn[0] = 1, turn[1] = 0;
+    rest[0] = (float)pal_norm3(normal);
+    rest[1] = rest[2] = 0;
     if (!pal_unit3(normal, normal, 0)) return;
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < 2 * n_fan; i++) {
-            double t[3], e[3];
-            const double *a = x + 3 * (size_t)node, *b = x + 3 * (size_t)fan[i];
-            if (!tangent(a, b, normal, 1e-6, t)) continue;
-            pal_sub3(e, b, a);
-            double part = pal_dot3(e, t);
+            double t[3];
+            tangential(x + 3 * (size_t)node, x + 3 * (size_t)fan[i], normal, t);
+            double part = pal_norm3(t);
             if (pass == 0 && part > best * (1 + 1e-9)) {
                 best = part, edge[0] = fan[i];
-                pal_copy3(first_tangent, t);
+                pal_scale3(first_tangent, 1 / part, t);
             }
             /* the fallback must not run along the first edge, which may have turned along X */
-            if (pass == 1 && part > second * (1 + 1e-9) && fabs(pal_dot3(t, first_tangent)) < 0.9) {
+            if (pass == 1 && part > second * (1 + 1e-9) && fabs(pal_dot3(t, first_tangent)) < 0.9 * part) {
                 second = part, edge[1] = fan[i];
-                pal_copy3(second_tangent, t);
+                pal_scale3(second_tangent, 1 / part, t);
             }
         }
+    rest[1] = (float)best;
     if (edge[1] < 0) return;
     pal_cross3(z, normal, second_tangent);
     turn[0] = (float)pal_dot3(first_tangent, second_tangent);
     turn[1] = (float)pal_dot3(first_tangent, z);
+    rest[2] = (float)second;
 }
 
 /* numbers the nodes in use as frames, ascending, and gives each its fan and edges; place [n_node] is scratch */
@@ -188,9 +197,11 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
     skin->frame = malloc(room * sizeof *skin->frame);
     skin->frame_edge = malloc(room * 2 * sizeof *skin->frame_edge);
     skin->frame_turn = malloc(room * 2 * sizeof *skin->frame_turn);
+    skin->frame_rest = malloc(room * 3 * sizeof *skin->frame_rest);
     skin->fan_start = malloc((room + 1) * sizeof *skin->fan_start);
     skin->fan = malloc((n_fan ? n_fan : 1) * 2 * sizeof *skin->fan);
-    if (!skin->frame || !skin->frame_edge || !skin->frame_turn || !skin->fan_start || !skin->fan) return PAL_ERR_MEMORY;
+    if (!skin->frame || !skin->frame_edge || !skin->frame_turn || !skin->frame_rest || !skin->fan_start || !skin->fan)
+        return PAL_ERR_MEMORY;
     skin->fan_start[0] = 0;
     for (int i = 0; i < tets->n_node; i++) {
         if (place[i] < 0) continue;
@@ -199,7 +210,8 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
         skin->frame[f] = i;
         memcpy(skin->fan + 2 * (size_t)skin->fan_start[f], fan + 2 * (size_t)start[i], 2 * (size_t)n * sizeof *fan);
         skin->fan_start[f + 1] = skin->fan_start[f] + n;
-        choose_edges(tets->x, i, fan + 2 * (size_t)start[i], n, skin->frame_edge + 2 * f, skin->frame_turn + 2 * f);
+        choose_edges(tets->x, i, fan + 2 * (size_t)start[i], n, skin->frame_edge + 2 * f, skin->frame_turn + 2 * f,
+                     skin->frame_rest + 3 * f);
     }
     return PAL_ERR_OK;
 }
@@ -252,29 +264,31 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
     return err;
 }
 
-/* unit Y from the first edge, else from the second turned by its angle at rest; false when neither serves */
-static bool frame_edge(const pal_skin *skin, size_t f, const double *x, const double X[3], double Y[3])
+/* Y from the first edge; as far as that has collapsed, from the second turned by its angle at rest */
+static void frame_edge(const pal_skin *skin, size_t f, const double *x, const double X[3], double Y[3])
 {
     const double *o = x + 3 * (size_t)skin->frame[f];
     const int32_t *edge = skin->frame_edge + 2 * f;
-    if (tangent(o, x + 3 * (size_t)edge[0], X, LEAST_TANGENT_STEP, Y)) return true;
-    if (edge[1] < 0 || !tangent(o, x + 3 * (size_t)edge[1], X, LEAST_TANGENT_STEP, Y)) return false;
-    double z[3], c = (double)skin->frame_turn[2 * f], s = (double)skin->frame_turn[2 * f + 1];
-    pal_cross3(z, X, Y);
-    for (int k = 0; k < 3; k++) Y[k] = c * Y[k] + s * z[k];
-    return true;
+    tangential(o, x + 3 * (size_t)edge[0], X, Y);
+    double share = unit_or_less(Y, (double)skin->frame_rest[3 * f + 1]);
+    if (share == 1 || edge[1] < 0) return;
+    double t[3], z[3], c = (double)skin->frame_turn[2 * f], s = (double)skin->frame_turn[2 * f + 1];
+    tangential(o, x + 3 * (size_t)edge[1], X, t);
+    unit_or_less(t, (double)skin->frame_rest[3 * f + 2]);
+    pal_cross3(z, X, t);
+    for (int k = 0; k < 3; k++) Y[k] += (1 - share) * (c * t[k] + s * z[k]);
 }
 
 static void update_frame(const pal_skin *skin, size_t f, const double *x, float *frames)
 {
     double X[3], Y[3], Z[3];
     int32_t a = skin->fan_start[f], n = skin->fan_start[f + 1] - a;
-    double squares = fan_normal(x, skin->frame[f], skin->fan + 2 * (size_t)a, n, X);
-    double length2 = pal_dot3(X, X);
-    if (!(length2 > LEAST_NORMAL_STEP * LEAST_NORMAL_STEP * squares) || !(length2 < 1e300)) return;
-    pal_scale3(X, 1 / sqrt(length2), X);
-    if (!frame_edge(skin, f, x, X, Y)) return;
+    fan_normal(x, skin->frame[f], skin->fan + 2 * (size_t)a, n, X);
+    unit_or_less(X, (double)skin->frame_rest[3 * f]);
+    frame_edge(skin, f, x, X, Y);
     pal_cross3(Z, X, Y);
+    double sum = X[0] + X[1] + X[2] + Y[0] + Y[1] + Y[2];
+    if (!(fabs(sum) < 1e30)) return;
     float *to = frames + 16 * f;
     for (int k = 0; k < 3; k++) to[k] = (float)X[k], to[4 + k] = (float)Y[k], to[8 + k] = (float)Z[k];
 }

@@ -22,6 +22,8 @@ typedef struct pal_skin {
     int32_t *frame;      /* node of each frame, ascending                          [n_frame]             */
     int32_t *frame_edge; /* other ends of its two candidate edges (second may be -1) [n_frame][2]        */
     float *frame_turn;   /* cos, sin of the angle about X from second to first edge at rest [n_frame][2] */
+    float *frame_rest;   /* rest lengths: sum of the fan's cross products, m^2; tangential parts of the two edges, m
+                                                                                   [n_frame][3]          */
     int32_t *fan_start;  /* boundary faces around each frame's node, as sparse rows [n_frame+1]          */
     int32_t *fan;        /* the two other corners of each face, in outward order    [fan_start[n_frame]][2] */
     int32_t *near;       /* frames of each vertex                                   [n_vertex][5]        */
@@ -40,8 +42,7 @@ static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
 {
     return (size_t)skin->n_frame * 64;
 }
-/* axes from node positions x [n_node][3]. A flat or inverted neighbourhood keeps the axes that the buffer holds from
- * the last call (so fill it once at rest). [sim] */
+/* axes from node positions x [n_node][3]; a frame whose nodes are not finite keeps what the buffer holds. [sim] */
 void pal_skin_frames(const pal_skin *skin, const double *x, void *frames);
 /* the same for the n frames of list only [sim] */
 void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames);

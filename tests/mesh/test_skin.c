@@ -210,6 +210,56 @@ static void flat_inverted_and_collapsed_bodies_stay_finite_and_near(void)
     unbind(&b);
 }
 
+/* largest motion of a shown vertex over the largest motion of a node since the last call */
+static double jump(bound *b, float *before, double *x_before)
+{
+    double moved = 0, most = 0;
+    memcpy(before, b->out, 3 * (size_t)b->surface.n_vertex * sizeof *before);
+    for (int i = 0; i < b->tets.n_node; i++) moved = fmax(moved, pal_dist3(b->x + 3 * i, x_before + 3 * i));
+    show(b);
+    for (int v = 0; v < b->surface.n_vertex; v++) {
+        double d[3];
+        for (int k = 0; k < 3; k++) d[k] = (double)b->out[3 * v + k] - (double)before[3 * v + k];
+        most = fmax(most, pal_norm3(d));
+    }
+    memcpy(x_before, b->x, 3 * (size_t)b->tets.n_node * sizeof *x_before);
+    return most / moved;
+}
+
+static void pressed_through_itself_or_crumpled_the_surface_does_not_jump(void)
+{
+    bound b;
+    uint64_t state = 6;
+    REQUIRE(bind_surface(shape_ball(0.1, 60, 30, 0.2), 12, &b));
+    show(&b);
+    float *before = malloc(3 * (size_t)b.surface.n_vertex * sizeof *before);
+    double *x_before = malloc(3 * (size_t)b.tets.n_node * sizeof *x_before), pressed = 0, crumpled = 0;
+    REQUIRE(before && x_before);
+    memcpy(x_before, b.x, 3 * (size_t)b.tets.n_node * sizeof *x_before);
+    for (int step = 1; step <= 200; step++) {
+        for (int i = 0; i < b.tets.n_node; i++) b.x[3 * i + 2] = b.tets.x[3 * i + 2] * (1 - 0.01 * step);
+        pressed = fmax(pressed, jump(&b, before, x_before));
+    }
+    /* every node goes its own way, a fiftieth of a voxel a step, up to a voxel from its place */
+    memcpy(b.x, b.tets.x, 3 * (size_t)b.tets.n_node * sizeof *x_before);
+    jump(&b, before, x_before);
+    double *way = malloc(3 * (size_t)b.tets.n_node * sizeof *way);
+    REQUIRE(way);
+    for (int i = 0; i < 3 * b.tets.n_node; i++) way[i] = 0.02 * b.tets.h_m * shape_uniform(&state);
+    for (int step = 0; step < 50; step++) {
+        for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += way[i];
+        crumpled = fmax(crumpled, jump(&b, before, x_before));
+        check_bounded(&b);
+    }
+    printf("  largest jump over the nodes' motion: pressed %.2f, crumpled %.2f\n", pressed, crumpled);
+    CHECK_LE(pressed, 3);
+    CHECK_LE(crumpled, 3);
+    free(before);
+    free(x_before);
+    free(way);
+    unbind(&b);
+}
+
 static void voxels_that_touch_along_an_edge_carry_no_frame_there(void)
 {
     /* two cubes that share one edge: its middle nodes have no normal */
@@ -254,6 +304,7 @@ int main(void)
     RUN(a_vertex_on_a_node_gets_it_exactly);
     RUN(one_vertex_is_the_same_as_all);
     RUN(flat_inverted_and_collapsed_bodies_stay_finite_and_near);
+    RUN(pressed_through_itself_or_crumpled_the_surface_does_not_jump);
     RUN(voxels_that_touch_along_an_edge_carry_no_frame_there);
     RUN(a_mesh_without_a_surface_is_refused);
     return check_report();
