@@ -310,6 +310,15 @@ static bool take_patch(const uint8_t **at, pal_wire_patch *p)
     return finite;
 }
 
+/* a unit normal and no negative constant but the slope: what a bridge renders unseen must at least be passive */
+static bool good_patch(const pal_wire_patch *p)
+{
+    double norm2 = 0;
+    for (int i = 0; i < 3; i++) norm2 += (double)p->n[i] * (double)p->n[i];
+    return fabs(norm2 - 1) <= 1e-3 && p->k1_N_m >= 0 && p->b_N_s_m >= 0 && p->kt_N_m >= 0 && p->mu_s >= 0 &&
+           p->mu_d >= 0 && p->radius_m >= 0;
+}
+
 int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *out)
 {
     pal_wire_haptic h = {0};
@@ -339,7 +348,9 @@ int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *ou
 
     if (!finite) return PAL_REFUSAL_NAN;
     if (h.flags & ~(uint32_t)PAL_WIRE_HAPTIC_FLAGS) return PAL_REFUSAL_FLAGS;
-    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grip > 1) return PAL_REFUSAL_RANGE;
+    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grip > 1 || h.grip_b_N_s_m < 0) return PAL_REFUSAL_RANGE;
+    for (uint32_t i = 0; i < h.n_patch; i++)
+        if (!good_patch(&h.patch[i])) return PAL_REFUSAL_RANGE;
     if (h.stamp_us >= STAMP_MAX || h.echo_stamp_us >= STAMP_MAX) return PAL_REFUSAL_RANGE;
     *out = h;
     return 0;

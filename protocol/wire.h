@@ -140,9 +140,9 @@ int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out)
 typedef struct pal_wire_patch {
     uint16_t id, group;
     float p_m[3]; /* point of the zero-force surface, relative to the model's origin */
-    float n[3];   /* unit normal, out of the tissue                                  */
+    float n[3];   /* unit normal, out of the tissue; |n|^2 is 1 +- 1e-3           */
     float v_m_s[3];
-    float k1_N_m, k2_N_m2, b_N_s_m, kt_N_m, mu_s, mu_d, radius_m;
+    float k1_N_m, k2_N_m2, b_N_s_m, kt_N_m, mu_s, mu_d, radius_m; /* >= 0, k2 of any sign */
 } pal_wire_patch;
 enum {
     PAL_WIRE_HAPTIC_FREEZE = 1,

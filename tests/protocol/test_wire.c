@@ -155,6 +155,26 @@ static void refuses_poses_out_of_range(void)
 #undef EXPECT
 }
 
+static void refuses_contact_patches_that_are_not_passive(void)
+{
+    uint8_t bytes[PAL_WIRE_HAPTIC_MAX];
+    pal_wire_haptic h, out;
+    float *const number[] = {&h.patch[1].k1_N_m, &h.patch[1].b_N_s_m, &h.patch[1].kt_N_m,   &h.patch[1].mu_s,
+                             &h.patch[1].mu_d,   &h.patch[1].n[1],    &h.patch[1].radius_m, &h.grip_b_N_s_m};
+    for (int i = 0; i < 8; i++) {
+        h = golden_haptic();
+        size_t n = pal_wire_put_haptic(bytes, sizeof bytes, &h);
+        CHECK_INT(pal_wire_get_haptic(bytes, n, &out), PAL_REFUSAL_NONE);
+        *number[i] = -0.5f;
+        n = pal_wire_put_haptic(bytes, sizeof bytes, &h);
+        CHECK_INT(pal_wire_get_haptic(bytes, n, &out), PAL_REFUSAL_RANGE);
+    }
+    h = golden_haptic();
+    h.patch[0].k2_N_m2 = -100;
+    size_t n = pal_wire_put_haptic(bytes, sizeof bytes, &h);
+    CHECK_INT(pal_wire_get_haptic(bytes, n, &out), PAL_REFUSAL_NONE);
+}
+
 static void refuses_lying_counts(void)
 {
     uint8_t bytes[PAL_WIRE_TOOLS_MAX + PAL_WIRE_HAPTIC_MAX];
@@ -219,6 +239,7 @@ int main(void)
     RUN(writes_nothing_into_too_small_a_buffer);
     RUN(refuses_poses_with_numbers_that_are_none);
     RUN(refuses_poses_out_of_range);
+    RUN(refuses_contact_patches_that_are_not_passive);
     RUN(refuses_lying_counts);
     RUN(sha256_gives_the_vectors_of_the_standard);
     RUN(every_refusal_has_name_and_sentence);

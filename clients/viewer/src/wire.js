@@ -162,6 +162,8 @@ export function readTools(bytes) {
 function readPatch(r) {
   const id = r.u16(), group = r.u16(), p = r.floats(3), n = r.floats(3), v = r.floats(3);
   const [k1, k2, b, kt, muS, muD, radius] = r.floats(7);
+  const passive = Math.min(k1, b, kt, muS, muD, radius) >= 0;
+  need(passive && Math.abs(n[0] ** 2 + n[1] ** 2 + n[2] ** 2 - 1) <= 1e-3, "RANGE", "contact patch");
   return { id, group, p, n, v, k1, k2, b, kt, muS, muD, radius };
 }
 
@@ -181,7 +183,7 @@ export function readHaptic(bytes) {
   const origin = r.doubles(3), fRef = r.floats(3), hasGrip = r.u32();
   const grip = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
   need(flags < 8, "FLAGS", `haptic flags ${flags}`);
-  need(tool < TOOL_MAX && hasGrip <= 1, "RANGE", "tool or grip");
+  need(tool < TOOL_MAX && hasGrip <= 1 && grip.b >= 0, "RANGE", "tool or grip");
   const patches = Array.from({ length: nPatch }, () => readPatch(r));
   return { tool, seq, flags, stampUs, echoStampUs, echoSeq, holdUs, frameUs, origin, fRef, grip: hasGrip ? grip : null, patches };
 }
