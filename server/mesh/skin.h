@@ -5,8 +5,15 @@
  * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the node's
  * position is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
  * is the one with the largest tangential part at rest, with another as fallback (B15), whose angle to the first is
- * stored, so that the fallback gives the same axes. Binding is [load]; evaluation is [sim], without heap use. One
- * pal_skin may serve several threads; each needs its own frames buffer. */
+ * stored, so that the fallback gives the same axes.
+ *
+ * Frames depend on the present positions only. Where a neighbourhood has collapsed (its normal sum or its edge is less
+ * than half of its length at rest) the axes shrink in proportion instead of turning about at once, so the surface
+ * closes in on the nodes, passes smoothly through flat and inverted states and stays finite. Elsewhere the axes are
+ * unit vectors.
+ *
+ * Binding is [load]; evaluation is [sim], without heap use. One pal_skin may serve several threads; each needs its own
+ * frames buffer. */
 #ifndef PAL_MESH_SKIN_H
 #define PAL_MESH_SKIN_H
 #include "server/base/arena.h"
