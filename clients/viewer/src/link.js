@@ -6,6 +6,8 @@ import { vertexNormals } from "./normals.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
 const RETRY_MS = 500, RETRY_MOST_MS = 5000;
+const BEAT_MS = 50; // a resting tool is said again this often: the server lets a silent one go
+const PAGE_MS = 3000; // unless the page itself has been silent for so long
 /** close codes after which trying again makes no sense, with what to tell people */
 const FINAL = new Map([
   [1002, "the server refused what this page sent"], [1008, "not allowed here"], [1009, "the server refused what this page sent"],
@@ -23,6 +25,8 @@ const FINAL = new Map([
  * @typedef {{decoder: FrameDecoder, triangles: Uint32Array, epoch: number, n: number, spare: {positions: Float32Array, normals: Float32Array}[]}} Part
  */
 
+export { BEAT_MS };
+
 export class Link {
   /** @type {WebSocket | null} */
   socket = null;
@@ -30,6 +34,10 @@ export class Link {
   tries = 0;
   generation = 0; // of the connection: what belongs to an older one is ignored
   poseSeq = 0;
+  /** @type {{tool: number, position: number[] | null, grab: boolean, away: boolean} | null} what the tool does now */
+  held = null;
+  heldAt = 0; // when the page last said so
+  saidAt = 0; // when the server was last told
   /** @type {number[]} */
   lastPosition = [0, 0, 0];
   figuresAt = 0;
@@ -53,6 +61,7 @@ export class Link {
   }
 
   fresh() {
+    this.held = null;
     this.parts.clear();
     this.kept.clear();
     this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
@@ -118,7 +127,23 @@ export class Link {
 
   /** @param {{tool: number, position: number[] | null, grab: boolean, away: boolean}} pose */
   pose(pose) {
+    this.held = pose.away ? null : pose;
+    this.heldAt = this.around.now();
+    this.sendPose(pose);
+  }
+
+  /** called every BEAT_MS: drawing may hold the page up for longer than the server waits for a tool */
+  beat() {
+    const now = this.around.now();
+    if (!this.held || now - this.saidAt < 0.8 * BEAT_MS) return;
+    if (now - this.heldAt < PAGE_MS) this.sendPose(this.held);
+    else this.pose({ ...this.held, position: null, grab: false, away: true });
+  }
+
+  /** @param {{tool: number, position: number[] | null, grab: boolean, away: boolean}} pose */
+  sendPose(pose) {
     if (this.socket?.readyState !== 1) return;
+    this.saidAt = this.around.now();
     this.lastPosition = pose.position ?? this.lastPosition;
     this.socket.send(writePose({
       tool: pose.tool, seq: ++this.poseSeq, flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),

@@ -1,5 +1,5 @@
 // The worker: owns the socket and the decoders, hands decoded arrays to the page without copying.
-import { Link } from "./link.js";
+import { BEAT_MS, Link } from "./link.js";
 
 const scope = /** @type {any} */ (globalThis);
 const link = new Link({
@@ -13,6 +13,7 @@ const link = new Link({
   now: () => performance.now(),
   later: (call, ms) => setTimeout(call, ms),
 });
+setInterval(() => link.beat(), BEAT_MS);
 
 scope.onmessage = (/** @type {MessageEvent} */ { data }) => {
   switch (data.type) {

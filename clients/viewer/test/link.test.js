@@ -138,6 +138,25 @@ test("a pose carries tool, grab and clock, and lifting the tool keeps its last p
   assert.ok(second.getUint32(12, true) & POSE_FLAG.AWAY);
 });
 
+test("a resting tool is said again until the page has been silent for 3 s", async () => {
+  const { s } = await joined();
+  s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
+  for (let k = 0; k < 58; k++) {
+    s.time += 50;
+    s.link.beat();
+  }
+  const poses = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+  assert.equal(poses.length, 59);
+  assert.ok(poses.every((v) => v.getUint32(132, true) === 1));
+  for (let k = 0; k < 10; k++) {
+    s.time += 50;
+    s.link.beat();
+  }
+  const last = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+  assert.equal(last.length, 61); // one more at 2950 ms, then one that lifts the tool
+  assert.ok(last[60].getUint32(12, true) & POSE_FLAG.AWAY);
+});
+
 test("reconnects with growing pauses after a lost connection", () => {
   const s = stand();
   s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
