@@ -1,0 +1,13 @@
+/* Input logs from untrusted bytes: the check that comes before any world is made. */
+#include "server/session/replay.h"
+
+#include <stdint.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
+{
+    pal_replay_report report;
+    pal_note note;
+    (void)pal_replay_parse("fuzz", bytes, n_byte, NULL, &report, &note);
+    return 0;
+}

@@ -1,0 +1,1 @@
+pal_fuzz(scene_json LINK pal_scene)

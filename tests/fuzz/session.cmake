@@ -1,0 +1,1 @@
+pal_fuzz(replay_log LINK pal_session)

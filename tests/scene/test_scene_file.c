@@ -1,0 +1,463 @@
+/* Scene files: every fault has its one sentence that names file and entry; what is saved loads to the same world. */
+#include "server/scene/scene_file.h"
+#include "server/sim/effect.h"
+#include "server/sim/world.h"
+#include "tests/check.h"
+#include "tests/session/small_scene.h"
+
+#include <sys/stat.h>
+
+static char folder[] = "/tmp/palpate_scene_XXXXXX";
+static pal_scene plain;
+static pal_prepared mesh;
+
+static char *in_folder(const char *name)
+{
+    static char path[4][512];
+    static int turn;
+    char *out = path[turn++ & 3];
+    snprintf(out, 512, "%s/%s", folder, name);
+    return out;
+}
+
+static bool write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "wb");
+    if (!file) return false;
+    fputs(text, file);
+    return fclose(file) == 0;
+}
+
+/* body of a scene around `inner`, which replaces the text after "mesh" */
+static void expect_refusal(const char *text, const char *sentence)
+{
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
+    CHECK(err != PAL_ERR_OK);
+    CHECK(loaded == NULL);
+    if (!err) {
+        CHECK_FAIL("taken: %s", text);
+        pal_scene_free(loaded);
+    }
+    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
+    if (strncmp(note.text, "s.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", note.text);
+    if (strchr(note.text, '\n')) CHECK_FAIL("\"%s\" has a line end", note.text);
+}
+
+static void what_is_not_json_is_refused_with_its_line(void)
+{
+    expect_refusal("", "not JSON");
+    expect_refusal("{\n\n\"name\": \n}", "line 4: not JSON");
+    expect_refusal("[1]", "not a JSON object");
+    expect_refusal("7", "not a JSON object");
+    expect_refusal("{} {}", "line 1: more text behind the end");
+    expect_refusal("{\"name\": \"a\xff\"}", "line 1: byte 11 is not UTF-8");
+    expect_refusal("[[[[[[[[[[[[[[[[[[[[[[", "nested deeper than 16");
+    expect_refusal("{\"a\":[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]}", "nested deeper than 16");
+    expect_refusal("{\"name\": \"[[[[[[[[[[[[[[[[[[[[[[[[[[\"}", "name: has other characters");
+}
+
+static void big_files_are_refused_before_they_are_parsed(void)
+{
+    size_t n = (1 << 20) + 1;
+    char *text = malloc(n + 1);
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    REQUIRE(text != NULL);
+    memset(text, ' ', n);
+    text[n] = 0;
+    CHECK_INT(pal_scene_parse("s.json", text, n, folder, &loaded, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "more than 1048576") != NULL);
+    free(text);
+}
+
+static void every_bad_scene_has_its_sentence(void)
+{
+    static const struct {
+        const char *text, *sentence;
+    } bad[] = {
+        {"{}", "bodies: a scene needs at least one body"},
+        {"{\"bodies\": []}", "bodies: a scene needs at least one body"},
+        {"{\"bodies\": {}}", "bodies: is not a list"},
+        {"{\"bodies\": [1]}", "bodies[0]: is not an object"},
+        {"{\"nme\": \"x\"}", "nme: unknown key; known are name, title"},
+        {"{\"name\": \"x\", \"name\": \"x\"}", "name: the key is there twice"},
+        {"{\"name\": 4}", "name: is not a text"},
+        {"{\"name\": \"\"}", "name: is empty"},
+        {"{\"name\": \"Liver\"}", "name: has other characters"},
+        {"{\"name\": \"0123456789012345678901234567890123456789012345678\"}", "name: 49 bytes of text, more than 47"},
+        {"{\"title\": \"a\\u0007\"}", "title: has a control character"},
+        {"{\"title\": \"a\\u202e\"}", "title: has a control character"},
+        {"{\"step_s\": \"fast\"}", "step_s: is not a number"},
+        {"{\"step_s\": 1}", "step_s: 1 is outside 0.0001 .. 0.1"},
+        {"{\"step_s\": 1e999}", "step_s: inf is outside"},
+        {"{\"gravity_m_s2\": null}", "gravity_m_s2: is not a number"},
+        {"{\"most_substep\": 1.5}", "most_substep: 1.5 is not whole"},
+        {"{\"most_substep\": 0}", "most_substep: 0 is outside 1 .. 1e+06"},
+        {"{\"up\": [0, 1]}", "up: is not a list of three numbers"},
+        {"{\"up\": [0, 1, 2, 3]}", "up: is not a list of three numbers"},
+        {"{\"up\": [0, 1, \"z\"]}", "up: is not a list of three numbers"},
+        {"{\"tools\": 3}", "tools: is not a list"},
+        {"{\"tools\": [{}, {\"radius\": 1}]}", "tools[1].radius: unknown key"},
+        {"{\"tools\": [{\"radius_m\": -1}]}", "tools[0].radius_m: -1 is outside 0 .. 1"},
+        {"{\"tools\": [{\"force_cap_N\": 0}]}", "tools[0].force_cap_N: 0 is outside"},
+        {"{\"tools\": [{},{},{},{},{},{},{},{},{}]}", "tools: 9 entries, more than 8"},
+        {"{\"bodies\": [{},{},{},{},{},{},{},{},{}]}", "bodies: 9 entries, more than 8"},
+        {"{\"bodies\": [{}]}", "bodies[0]: needs either mesh or surface"},
+        {"{\"bodies\": [{\"mesh\": \"a\", \"surface\": \"b\"}]}", "bodies[0]: needs either mesh or surface"},
+        {"{\"bodies\": [{\"mesh\": \"none.palmesh\"}]}", "bodies[0].mesh: "},
+        {"{\"bodies\": [{\"mesh\": \"none.palmesh\"}]}", "none.palmesh"},
+        {"{\"bodies\": [{\"mesh\": 4}]}", "bodies[0].mesh: is not a text"},
+        {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"units\": \"mm\"}]}", "bodies[0].units: only goes with surface"},
+        {"{\"bodies\": [{\"surface\": \"x.stl\", \"units\": \"mile\"}]}", "bodies[0].units: is not m, cm, mm"},
+        {"{\"bodies\": [{\"surface\": \"x.stl\", \"resolution\": 2000}]}", "bodies[0].resolution: 2000 is outside"},
+        {"{\"bodies\": [{\"surface\": \"x.stl\"}]}", "bodies[0].surface: "},
+        {"{\"bodies\": [{\"surface\": \"scene.json\"}]}", "bodies[0].surface: "},
+        {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"x\": 1}]}", "bodies[0].x: unknown key"},
+        {"{\"bodies\": [{\"material\": []}]}", "bodies[0].material: is not an object"},
+        {"{\"bodies\": [{\"material\": {\"E\": 1}}]}", "bodies[0].material.E: unknown key; known are young_Pa"},
+        {"{\"bodies\": [{\"material\": {\"young_Pa\": 0}}]}", "bodies[0].material.young_Pa: 0 is outside"},
+        {"{\"bodies\": [{\"material\": {\"young_Pa\": 1e13}}]}", "bodies[0].material.young_Pa: 1e+13 is outside"},
+        {"{\"bodies\": [{\"material\": {\"poisson\": 0.6}}]}", "bodies[0].material.poisson: 0.6 is outside"},
+        {"{\"bodies\": [{\"material\": {\"density_kg_m3\": -1}}]}", "bodies[0].material.density_kg_m3: -1 is outside"},
+        {"{\"bodies\": [{\"material\": {\"damping_1_s\": true}}]}", "bodies[0].material.damping_1_s: is not a number"},
+        {"{\"bodies\": [{\"model\": \"tet_springs\"}]}", "bodies[0].model: is not an object"},
+        {"{\"bodies\": [{\"model\": {}}]}", "bodies[0].model: has no name"},
+        {"{\"bodies\": [{\"model\": {\"name\": \"a\", \"k\": {}}}]}", "bodies[0].model.k: is not a number, text"},
+        {"{\"bodies\": [{\"model\": {\"name\": \"a\", \"k\": 1, \"k\": 2}}]}",
+         "bodies[0].model.k: the key is there twice"},
+        {"{\"bodies\": [{\"effects\": [{\"name\": \"gravity\"}, {\"nam\": 1}]}]}", "bodies[0].effects[1]: has no name"},
+        {"{\"bodies\": [{\"effects\": [{\"name\": \"a\", \"k\": [1, \"b\"]}]}]}",
+         "bodies[0].effects[0].k: is not a list of numbers"},
+        {"{\"bodies\": [{\"effects\": [{\"name\": \"a\", \"k\": [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1]}]}]}",
+         "bodies[0].effects[0].k: more than 16 numbers"},
+        {"{\"bodies\": [{\"supports\": [{}]}]}", "bodies[0].supports[0]: needs either lowest or box"},
+        {"{\"bodies\": [{\"supports\": [{\"lowest\": 2}]}]}", "bodies[0].supports[0].lowest: 2 is outside 0 .. 1"},
+        {"{\"bodies\": [{\"supports\": [{\"box\": {\"low_m\": [0,0,0]}}]}]}",
+         "bodies[0].supports[0].box: needs low_m and high_m"},
+        {"{\"bodies\": [{\"supports\": [{\"box\": {\"low_m\": [0,2,0], \"high_m\": [1,1,1]}}]}]}",
+         "bodies[0].supports[0].box: low_m[1] 2 is above high_m[1] 1"},
+        {"{\"bodies\": [{\"supports\": [{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},"
+         "{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},{\"lowest\":0}]}]}",
+         "bodies[0].supports: 9 entries, more than 8"},
+        {"{\"up\": [0, 0, 2], \"bodies\": [{\"mesh\": \"ball.palmesh\"}]}", "up: length 2"},
+        {"{\"bodies\": [{\"name\": \"a\", \"mesh\": \"ball.palmesh\"}, {\"name\": \"a\", \"mesh\": \"ball.palmesh\"}]}",
+         "bodies[1]: the name \"a\" is there twice"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) expect_refusal(bad[k].text, bad[k].sentence);
+}
+
+static void absent_keys_take_the_defaults(void)
+{
+    const char *text = "{\"bodies\": [{\"mesh\": \"ball.palmesh\"}]}";
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_scene want;
+    pal_body_def body;
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    pal_scene_default(&want);
+    pal_body_default(&body, "body 1", NULL);
+    const pal_scene *got = &loaded->scene;
+    CHECK_TEXT(got->name, want.name);
+    CHECK_NEAR(got->step_s, want.step_s, 0);
+    CHECK_NEAR(got->gravity_m_s2, want.gravity_m_s2, 0);
+    CHECK_INT(got->n_tool, 3);
+    CHECK_TEXT(got->tool[2].name, "probe 3");
+    CHECK_TEXT(got->body[0].name, "body 1");
+    CHECK_NEAR(got->body[0].material.young_Pa, 5000, 0);
+    CHECK_INT(got->body[0].n_effect, body.n_effect);
+    CHECK_TEXT(got->body[0].effect[1].path, "bodies[0].effects[1]");
+    CHECK_INT(got->body[0].n_support, 1);
+    CHECK_NEAR(got->body[0].support[0].fraction, 0.05, 0);
+    CHECK_INT(got->body[0].mesh->tets.n_tet, mesh.tets.n_tet);
+    pal_scene_free(loaded);
+}
+
+static void given_keys_arrive(void)
+{
+    const char *text =
+        "{\"name\": \"two-1\", \"title\": \"Zwei K\xc3\xb6rper\", \"source\": \"here\", \"step_s\": 0.002, \"up\": [0, "
+        "1, "
+        "0], \"gravity_m_s2\": 1.62, \"most_substep\": 77, \"tools\": [{\"name\": \"hook\", \"radius_m\": 0.003, "
+        "\"force_cap_N\": 2}], \"bodies\": [{\"name\": \"a b\", \"mesh\": \"ball.palmesh\", \"material\": "
+        "{\"young_Pa\": "
+        "9000, \"poisson\": 0.3, \"density_kg_m3\": 1100, \"damping_1_s\": 0}, \"model\": {\"name\": \"tet_springs\", "
+        "\"k_distance_J\": 0.5}, \"solver\": {\"name\": \"verlet\"}, \"output\": {\"name\": \"surface_out\"}, "
+        "\"supports\": [{\"lowest\": 0.2}, {\"box\": {\"low_m\": [-1, -2, -3], \"high_m\": [1, 2, 3]}}], \"effects\": "
+        "[{\"name\": \"x\", \"yes\": true, \"word\": \"w\", \"list\": [1, 2.5], \"number\": -3}]}]}";
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    const pal_scene *s = &loaded->scene;
+    const pal_body_def *b = &s->body[0];
+    CHECK_TEXT(s->name, "two-1");
+    CHECK_TEXT(s->title, "Zwei K\xc3\xb6rper");
+    CHECK_NEAR(s->step_s, 0.002, 0);
+    CHECK_NEAR(s->up[1], 1, 0);
+    CHECK_NEAR(s->gravity_m_s2, 1.62, 0);
+    CHECK_INT(s->most_substep, 77);
+    CHECK_INT(s->n_tool, 1);
+    CHECK_TEXT(s->tool[0].name, "hook");
+    CHECK_NEAR(s->tool[0].radius_m, 0.003, 0);
+    CHECK_NEAR(s->tool[0].force_cap_N, 2, 0);
+    CHECK_TEXT(b->name, "a b");
+    CHECK_NEAR(b->material.damping_1_s, 0, 0);
+    CHECK_TEXT(b->solver.name, "verlet");
+    CHECK_TEXT(b->output.name, "surface_out");
+    CHECK_INT(b->n_support, 2);
+    CHECK(b->support[0].lowest && !b->support[1].lowest);
+    CHECK_NEAR(b->support[1].low_m[2], -3, 0);
+    REQUIRE(b->n_effect == 1 && b->effect[0].n_value == 4);
+    CHECK(b->effect[0].value[0].flag);
+    CHECK_TEXT(b->effect[0].value[1].text, "w");
+    CHECK_INT(b->effect[0].value[2].n_number, 2);
+    CHECK_NEAR(b->effect[0].value[3].number[0], -3, 0);
+    pal_item model = b->model;
+    double k = 0;
+    CHECK_INT(pal_item_number(&model, "k_distance_J", 0, 1, &k, &note), 0);
+    CHECK_NEAR(k, 0.5, 0);
+    pal_scene_free(loaded);
+}
+
+static uint64_t hash_after(const pal_scene *scene, int n_step)
+{
+    pal_world *world = NULL;
+    pal_note note = {""};
+    if (pal_world_create(scene, &note, &world)) {
+        CHECK_FAIL("%s", note.text);
+        return 0;
+    }
+    pal_pose pose = {.position_m = {0, 0, 0.045}, .quat = {1, 0, 0, 0}};
+    for (int k = 0; k < n_step; k++) {
+        pose.position_m[2] -= 0.0001;
+        pal_world_pose(world, 0, &pose);
+        pal_world_step(world, scene->step_s);
+    }
+    uint64_t hash = pal_world_hash(world);
+    pal_world_destroy(world);
+    return hash;
+}
+
+static void a_saved_scene_loads_to_the_same_world_for_100_steps(void)
+{
+    pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
+    pal_note note = {""};
+    REQUIRE(in != NULL);
+    in->scene = plain;
+    in->scene.body[0].material = (pal_material){6543.21, 0.41, 1030, 3};
+    in->scene.tool[0].radius_m = 0.1 / 3;
+    pal_item_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
+    in->scene.body[0].n_support = 2;
+    in->scene.body[0].support[1] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {-0.04, 1, 1}};
+    char where[600];
+    snprintf(where, sizeof where, "%s/a/b/saved", folder);
+    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    snprintf(where, sizeof where, "%s/a/b/saved/scene.json", folder);
+    pal_err err = pal_scene_load(where, &out, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    uint64_t before = hash_after(&in->scene, 100);
+    CHECK(before != 0);
+    CHECK(hash_after(&out->scene, 100) == before);
+    CHECK_TEXT(out->scene.title, in->scene.title);
+    /* and the hash does depend on what was saved */
+    out->scene.body[0].material.young_Pa *= 1.0001;
+    CHECK(hash_after(&out->scene, 100) != before);
+    pal_scene_free(out);
+    free(in);
+}
+
+static void two_bodies_of_like_names_get_two_files(void)
+{
+    pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
+    pal_note note = {""};
+    REQUIRE(in != NULL);
+    in->scene = plain;
+    in->scene.n_body = 2;
+    in->scene.body[1] = in->scene.body[0];
+    snprintf(in->scene.body[0].name, PAL_NAME, "Left/../ lobe");
+    snprintf(in->scene.body[1].name, PAL_NAME, "left.. lobe");
+    char where[600];
+    snprintf(where, sizeof where, "%s/two", folder);
+    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    snprintf(where, sizeof where, "%s/two/scene.json", folder);
+    pal_err err = pal_scene_load(where, &out, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    CHECK_INT(out->scene.n_body, 2);
+    CHECK_TEXT(out->scene.body[0].name, "Left/../ lobe");
+    CHECK_TEXT(out->scene.body[1].name, "left.. lobe");
+    pal_scene_free(out);
+    free(in);
+}
+
+static void a_save_that_fails_leaves_nothing(void)
+{
+    pal_loaded_scene *in = calloc(1, sizeof *in);
+    pal_note note = {""};
+    struct stat facts;
+    REQUIRE(in != NULL);
+    in->scene = plain;
+    CHECK_INT(pal_scene_save(in, "/proc/no/such", &note), PAL_ERR_IO);
+    CHECK(strstr(note.text, "/proc/no") != NULL);
+    /* scene.json cannot be written because a folder has its name */
+    char where[600], there[700];
+    snprintf(where, sizeof where, "%s/blocked", folder);
+    snprintf(there, sizeof there, "%s/scene.json", where);
+    REQUIRE(mkdir(where, 0777) == 0 && mkdir(there, 0777) == 0);
+    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_IO);
+    snprintf(there, sizeof there, "%s/ball.palmesh", where);
+    CHECK(stat(there, &facts) != 0);
+    free(in);
+}
+
+/* an OBJ of a ball, in millimetres */
+static bool write_ball(const char *path, int rings)
+{
+    pal_surface ball;
+    FILE *file = fopen(path, "w");
+    if (!file || !small_ball(&ball, 50, rings)) return false;
+    for (int k = 0; k < ball.n_vertex; k++)
+        fprintf(file, "v %.9g %.9g %.9g\n", ball.x[3 * k] + 300, ball.x[3 * k + 1], ball.x[3 * k + 2]);
+    for (int k = 0; k < ball.n_tri; k++)
+        fprintf(file, "f %d %d %d\n", ball.tri[3 * k] + 1, ball.tri[3 * k + 1] + 1, ball.tri[3 * k + 2] + 1);
+    pal_surface_free(&ball);
+    return fclose(file) == 0;
+}
+
+static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
+{
+    pal_surface_scene options = {.label = -1};
+    pal_surface_scene_report report;
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    REQUIRE(write_ball(in_folder("Ball \xc3\xa9\x01 7.obj"), 40));
+    pal_err err = pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    const pal_scene *s = &loaded->scene;
+    CHECK_NEAR(s->body[0].mesh->tets.n_tet, 13000, 2600);
+    CHECK_TEXT(report.unit_name, "mm");
+    CHECK(report.unit_guessed && report.label == -1);
+    CHECK_NEAR(report.unit_m, 1e-3, 0);
+    CHECK_NEAR(report.prepare.voxel.surface_volume_m3, 4.0 / 3 * M_PI * 1.25e-4, 4e-6);
+    CHECK_TEXT(s->name, "ball__7");
+    CHECK_TEXT(s->title, "Ball \xc3\xa9 7");
+    CHECK_TEXT(s->source, "Ball \xc3\xa9 7.obj");
+    CHECK_INT(s->n_tool, 3);
+    CHECK_INT(s->body[0].n_support, 1);
+    CHECK(hash_after(s, 2) != 0);
+    pal_scene_free(loaded);
+    options.unit_m = 1;
+    options.resolution = 10;
+    options.material = (pal_material){1e6, 0.3, 1200, 1};
+    REQUIRE(!pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &note));
+    CHECK_NEAR(report.prepare.voxel.surface_volume_m3, 4.0 / 3 * M_PI * 1.25e5, 4e3);
+    CHECK(!report.unit_guessed);
+    CHECK_INT(report.resolution, 10);
+    CHECK_NEAR(loaded->scene.body[0].material.young_Pa, 1e6, 0);
+    pal_scene_free(loaded);
+}
+
+static void flat_thin_and_long_shapes_also_get_about_13000_tets(void)
+{
+    const double size[][3] = {{100, 100, 2}, {200, 4, 4}, {10, 10, 10}};
+    for (int k = 0; k < 3; k++) {
+        FILE *file = fopen(in_folder("box.obj"), "w");
+        REQUIRE(file != NULL);
+        for (int c = 0; c < 8; c++)
+            fprintf(file, "v %g %g %g\n", c & 1 ? size[k][0] : 0, c & 2 ? size[k][1] : 0, c & 4 ? size[k][2] : 0);
+        fputs("f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n", file);
+        fclose(file);
+        pal_surface_scene options = {.label = -1, .unit_m = 1e-3};
+        pal_loaded_scene *loaded = NULL;
+        pal_note note = {""};
+        pal_err err = pal_scene_from_surface(in_folder("box.obj"), &options, &loaded, NULL, &note);
+        if (err) CHECK_FAIL("%s", note.text);
+        REQUIRE(!err);
+        CHECK_NEAR(log(loaded->scene.body[0].mesh->tets.n_tet / 13000.0), 0, 0.5);
+        pal_scene_free(loaded);
+    }
+}
+
+static void a_scene_may_name_a_surface(void)
+{
+    const char *text = "{\"bodies\": [{\"surface\": \"b.obj\", \"units\": \"cm\", \"resolution\": 9}]}";
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    REQUIRE(write_ball(in_folder("b.obj"), 10));
+    REQUIRE(write_text(in_folder("surface.json"), text));
+    pal_err err = pal_scene_load(in_folder("surface.json"), &loaded, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    CHECK_NEAR(pal_tets_volume(&loaded->mesh[0].tets) / (4.0 / 3 * M_PI * 0.125), 1.5, 0.6);
+    pal_scene_free(loaded);
+}
+
+static void what_is_no_surface_is_refused_and_names_the_file(void)
+{
+    pal_surface_scene options = {.label = -1};
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    CHECK_INT(pal_scene_from_surface("/no/file.stl", &options, &loaded, NULL, &note), PAL_ERR_IO);
+    CHECK(strstr(note.text, "/no/file.stl") != NULL);
+    REQUIRE(write_text(in_folder("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+    CHECK_INT(pal_scene_from_surface(in_folder("flat.obj"), &options, &loaded, NULL, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "flat.obj") != NULL);
+    REQUIRE(write_ball(in_folder("b.obj"), 10));
+    options.label = 3;
+    CHECK_INT(pal_scene_from_surface(in_folder("b.obj"), &options, &loaded, NULL, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "label 3") != NULL);
+    CHECK(loaded == NULL);
+}
+
+static void the_procedural_organ_is_a_scene(void)
+{
+    pal_surface_scene options = {.target_tri = 5000};
+    pal_surface_scene_report report;
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_err err = pal_scene_procedural(&options, &loaded, &report, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    CHECK_NEAR(loaded->scene.body[0].mesh->tets.n_tet, 13000, 2600);
+    CHECK_TEXT(loaded->scene.title, "Procedural organ");
+    CHECK(strstr(loaded->scene.source, "not from a patient") != NULL);
+    CHECK_INT(pal_scene_rename(loaded, "ok", "T", NULL, &note), 0);
+    CHECK_TEXT(loaded->scene.name, "ok");
+    CHECK_TEXT(loaded->scene.title, "T");
+    CHECK_INT(pal_scene_rename(loaded, "Not ok", NULL, NULL, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_scene_rename(loaded, NULL, "a\x1b[31m", NULL, &note), PAL_ERR_REFUSED);
+    CHECK_TEXT(loaded->scene.title, "T");
+    pal_scene_free(loaded);
+    pal_scene_free(NULL);
+}
+
+int main(void)
+{
+    char command[128];
+    pal_note note = {""};
+    if (!mkdtemp(folder) || !small_scene(&plain, &mesh, 8)) return 1;
+    if (pal_prepared_save(&mesh, in_folder("ball.palmesh"), &note)) return 1;
+    RUN(what_is_not_json_is_refused_with_its_line);
+    RUN(big_files_are_refused_before_they_are_parsed);
+    RUN(every_bad_scene_has_its_sentence);
+    RUN(absent_keys_take_the_defaults);
+    RUN(given_keys_arrive);
+    RUN(a_saved_scene_loads_to_the_same_world_for_100_steps);
+    RUN(two_bodies_of_like_names_get_two_files);
+    RUN(a_save_that_fails_leaves_nothing);
+    RUN(a_bare_surface_becomes_a_scene_of_about_13000_tets);
+    RUN(flat_thin_and_long_shapes_also_get_about_13000_tets);
+    RUN(a_scene_may_name_a_surface);
+    RUN(what_is_no_surface_is_refused_and_names_the_file);
+    RUN(the_procedural_organ_is_a_scene);
+    pal_prepared_free(&mesh);
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return check_report() || system(command) != 0;
+}
