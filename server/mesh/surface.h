@@ -25,6 +25,10 @@ typedef struct pal_surface_report {
     int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */
     int64_t n_nonfinite;               /* triangles dropped because a corner is NaN or infinite                  */
     int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
+    int64_t n_folded;                  /* triangles dropped, beside n_duplicate, because their doubles run the other
+                                        * way round: fins that enclose nothing                                   */
+    int64_t n_mended;                  /* triangles without area between three corners: not dropped, which would
+                                        * leave a slit, but mended by splitting their neighbour                  */
 } pal_surface_report;
 
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */

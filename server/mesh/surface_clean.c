@@ -12,6 +12,8 @@
 #define COORDINATE_LIMIT 1e30
 /* a triangle whose height is below this part of its longest side has no area */
 #define HEIGHT_LIMIT 1e-12
+/* flat triangles at a vertex of more triangles than this are dropped, not mended, so that the time stays linear */
+enum { MOST_FAN = 64 };
 
 typedef struct cleaner {
     pal_surface *surface;
@@ -150,6 +152,84 @@ static void drop_degenerate(cleaner *k)
     s->n_tri = n;
 }
 
+static bool repeats_corner(const int32_t *c)
+{
+    return c[0] == c[1] || c[1] == c[2] || c[2] == c[0];
+}
+
+/* the only other triangle at the edge of corners a and b of triangle t, -1: none or several */
+static int32_t neighbour(const pal_surface *s, const int32_t *start, const int32_t *item, int32_t t, int32_t a,
+                         int32_t b)
+{
+    int32_t found = -1, n = 0;
+    if (start[a + 1] - start[a] > MOST_FAN) return -1;
+    for (int k = start[a]; k < start[a + 1]; k++) {
+        const int32_t *c = s->tri + 3 * (size_t)item[k];
+        if (item[k] == t || (c[0] != b && c[1] != b && c[2] != b)) continue;
+        found = item[k];
+        n++;
+    }
+    return n == 1 ? found : -1;
+}
+
+/* a flat triangle with three corners lies along its longest edge a-c with b in between: the triangle a-c-d on the
+ * other side is split at b, which keeps the surface closed where dropping the flat one would leave a slit */
+static bool mend(cleaner *k, const int32_t *start, const int32_t *item, int32_t t)
+{
+    pal_surface *s = k->surface;
+    int32_t *c = s->tri + 3 * (size_t)t;
+    double length[3];
+    int longest = 0;
+    for (int i = 0; i < 3; i++) {
+        length[i] = pal_dist3(s->x + 3 * (size_t)c[i], s->x + 3 * (size_t)c[(i + 1) % 3]);
+        if (length[i] > length[longest]) longest = i;
+    }
+    int32_t to = c[longest], from = c[(longest + 1) % 3], b = c[(longest + 2) % 3];
+    int32_t other = neighbour(s, start, item, t, to, from);
+    if (other < 0) return false;
+    int32_t *e = s->tri + 3 * (size_t)other;
+    int i = 0;
+    while (i < 3 && !(e[i] == from && e[(i + 1) % 3] == to)) i++;
+    if (i == 3) return false;
+    int32_t d = e[(i + 2) % 3];
+    const int32_t one[3] = {from, b, d}, two[3] = {b, to, d};
+    bool busy = start[b + 1] - start[b] > MOST_FAN || k->next[to] || k->next[from] || k->next[b] || k->next[d];
+    if (busy || !has_area(s, one) || !has_area(s, two)) return false;
+    for (int m = start[b]; m < start[b + 1]; m++)
+        for (int a = 0; a < 3; a++)
+            if (s->tri[3 * (size_t)item[m] + (size_t)a] == d) return false;
+    k->next[to] = k->next[from] = k->next[b] = k->next[d] = 1;
+    memcpy(c, one, sizeof one);
+    memcpy(e, two, sizeof two);
+    k->count.n_mended++;
+    return true;
+}
+
+/* mends flat triangles in rounds; a vertex takes part once in a round, so that its fan is still the one at hand */
+static pal_err mend_flat(cleaner *k)
+{
+    pal_surface *s = k->surface;
+    for (int round = 0, n = 1; round < 16 && n > 0; round++) {
+        int n_flat = 0;
+        for (int t = 0; t < s->n_tri; t++) {
+            const int32_t *c = s->tri + 3 * (size_t)t;
+            n_flat += !repeats_corner(c) && !has_area(s, c);
+        }
+        if (n_flat == 0) return PAL_ERR_OK;
+        int32_t *start, *item;
+        PAL_TRY(pal_surface_fans(s, &start, &item));
+        memset(k->next, 0, (size_t)s->n_vertex * sizeof *k->next);
+        n = 0;
+        for (int t = 0; t < s->n_tri; t++) {
+            const int32_t *c = s->tri + 3 * (size_t)t;
+            if (!repeats_corner(c) && !has_area(s, c)) n += mend(k, start, item, t);
+        }
+        free(start);
+        free(item);
+    }
+    return PAL_ERR_OK;
+}
+
 static void sort_corners(int32_t r[3], const int32_t c[3])
 {
     int32_t low = c[0] < c[1] ? c[0] : c[1], high = c[0] < c[1] ? c[1] : c[0];
@@ -158,28 +238,67 @@ static void sort_corners(int32_t r[3], const int32_t c[3])
     r[1] = (int32_t)((int64_t)c[0] + c[1] + c[2] - r[0] - r[2]);
 }
 
+/* 1 or -1 by the sense in which the corners run through their sorted order */
+static int sense(const int32_t c[3])
+{
+    return (c[0] < c[1]) + (c[1] < c[2]) + (c[2] < c[0]) == 2 ? 1 : -1;
+}
+
+/* drops triangles of balance zero (as many run one way as the other) if the rest is no more open without them: such
+ * a fin encloses nothing, but a body whose every triangle is there in both senses is still meant */
+static pal_err drop_folded(cleaner *k, const int8_t *balance)
+{
+    pal_surface *s = k->surface, rest = *s;
+    pal_surface_topology with, without;
+    rest.tri = malloc((3 * (size_t)s->n_tri + 1) * sizeof *rest.tri);
+    if (!rest.tri) return PAL_ERR_MEMORY;
+    rest.n_tri = 0;
+    for (size_t t = 0; t < (size_t)s->n_tri; t++)
+        if (balance[t]) memcpy(rest.tri + 3 * (size_t)rest.n_tri++, s->tri + 3 * t, 3 * sizeof *rest.tri);
+    pal_err err = pal_surface_check(s, &with);
+    if (!err) err = pal_surface_check(&rest, &without);
+    if (!err && rest.n_tri > 0 && rest.n_tri < s->n_tri && without.n_open_edge <= with.n_open_edge) {
+        memcpy(s->tri, rest.tri, 3 * (size_t)rest.n_tri * sizeof *rest.tri);
+        k->count.n_folded += s->n_tri - rest.n_tri;
+        s->n_tri = rest.n_tri;
+    }
+    free(rest.tri);
+    return err;
+}
+
 /* keeps the first of the triangles with the same three corners; open addressing, at most half full */
-static void drop_duplicate(cleaner *k)
+static pal_err drop_duplicate(cleaner *k)
 {
     pal_surface *s = k->surface;
     int n = 0;
+    int8_t *balance = malloc((size_t)s->n_tri + 1);
+    if (!balance) return PAL_ERR_MEMORY;
     for (uint64_t b = 0; b < k->n_bucket; b++) k->bucket[b] = -1;
     for (int t = 0; t < s->n_tri; t++) {
         int32_t c[3], key[3], other[3];
         memcpy(c, s->tri + 3 * (size_t)t, sizeof c);
         sort_corners(key, c);
         uint64_t b = mix(mix(mix(1, (uint64_t)key[0]), (uint64_t)key[1]), (uint64_t)key[2]) & (k->n_bucket - 1);
-        bool again = false;
-        for (; k->bucket[b] >= 0 && !again; b = again ? b : (b + 1) & (k->n_bucket - 1)) {
+        for (; k->bucket[b] >= 0; b = (b + 1) & (k->n_bucket - 1)) {
             sort_corners(other, s->tri + 3 * (size_t)k->bucket[b]);
-            again = memcmp(key, other, sizeof key) == 0;
+            if (memcmp(key, other, sizeof key) == 0) break;
         }
-        if (again) continue;
+        int32_t first = k->bucket[b];
+        if (first >= 0) {
+            bool same = sense(c) == sense(s->tri + 3 * (size_t)first);
+            if (balance[first] < 100 && balance[first] > -100) balance[first] += same ? 1 : -1;
+            continue;
+        }
         k->bucket[b] = n;
+        balance[n] = 1;
         memcpy(s->tri + 3 * (size_t)n++, c, sizeof c);
     }
+    bool again = n < s->n_tri;
     k->count.n_duplicate += s->n_tri - n;
     s->n_tri = n;
+    pal_err err = again ? drop_folded(k, balance) : PAL_ERR_OK;
+    free(balance);
+    return err;
 }
 
 /* keeps the vertices in use, in their order, and puts the box centre at zero */
@@ -234,10 +353,12 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         drop_nonfinite(&k);
         measure(&k, tolerance);
         weld(&k);
+        err = mend_flat(&k);
         drop_degenerate(&k);
-        drop_duplicate(&k);
+        if (!err) err = drop_duplicate(&k);
         compact(&k);
-        if (surface->n_tri == 0)
+        if (err) pal_note_set(note, err, "no memory to clean %d triangles", surface->n_tri);
+        if (!err && surface->n_tri == 0)
             err = pal_note_set(
                 note, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
                 (long long)k.count.n_degenerate, (long long)k.count.n_duplicate, (long long)k.count.n_nonfinite);
@@ -248,6 +369,8 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         report->n_duplicate += k.count.n_duplicate;
         report->n_nonfinite += k.count.n_nonfinite;
         report->n_unused += k.count.n_unused;
+        report->n_folded += k.count.n_folded;
+        report->n_mended += k.count.n_mended;
     }
     free(k.map);
     free(k.next);

@@ -129,8 +129,9 @@ static size_t put(uint8_t *to, const char *type, double value, bool big)
         memcpy(raw, &v, n = sizeof v);                                                                                 \
     }
     PUT("char", int8_t)
-    PUT("uint8", uint8_t) PUT("short", int16_t) PUT("uint16", uint16_t) PUT("int", int32_t) PUT("uint32", uint32_t)
-        PUT("float", float) PUT("float64", double) for (size_t k = 0; k < n; k++) to[k] = raw[big ? n - 1 - k : k];
+    PUT("uint8", uint8_t)
+    PUT("short", int16_t) PUT("uint16", uint16_t) PUT("int", int32_t) PUT("uint32", uint32_t) PUT("float", float)
+        PUT("float64", double) for (size_t k = 0; k < n; k++) to[k] = raw[big ? n - 1 - k : k];
     return n;
 }
 
@@ -539,13 +540,16 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
     pal_surface_free(&back);
 }
 
-/* counts and volumes in file units as README.md of the shared data states them; volume 0: not closed */
+/* counts and volumes in file units as README.md of the shared data states them (the dragons' without their fins and
+ * doubled triangles; -1: not compared); volume 0: not closed */
 static const struct {
     const char *name;
     int n_tri, n_vertex, n_unused, n_open, n_crowded, n_component, n_duplicate;
     double volume;
 } shared[] = {{"bunny_70k_scan.ply", 69451, 34834, 1113, 223, 0, 1, 0, 0},
               {"bunny_70k_closed.ply", 69664, 34834, 0, 0, 0, 1, 0, 0.0007549},
+              {"dragon_203k.ply", 199702, 99770, 480, 0, -1, -1, 1489, 0.0004779},
+              {"dragon_11k.ply", 10322, 5136, 69, 0, -1, -1, 502, 0.0004693},
               {"happy_16k.ply", 15536, 7751, 0, 0, 2, 1, 0, 0.3538},
               {"gear_pinion_1300.off", 1300, 650, 0, 0, 0, 1, 0, 0.821},
               {"gear_procedural_1k.stl", 1008, 504, 0, 0, 0, 1, 0, 1.588e5},
@@ -593,9 +597,12 @@ static void shared_models_have_their_known_counts_and_volumes(void)
         CHECK_INT(s.n_vertex, shared[k].n_vertex);
         CHECK_INT(r.n_unused, shared[k].n_unused);
         CHECK_INT(topology.n_open_edge, shared[k].n_open);
-        CHECK_INT(topology.n_crowded_edge, shared[k].n_crowded);
-        CHECK_INT(n_component, shared[k].n_component);
-        if (shared[k].volume > 0) CHECK_NEAR(pal_surface_volume(&s) / shared[k].volume, 1, 6e-4);
+        CHECK_INT(r.n_duplicate, shared[k].n_duplicate);
+        if (shared[k].n_crowded >= 0) CHECK_INT(topology.n_crowded_edge, shared[k].n_crowded);
+        if (shared[k].n_component >= 0) CHECK_INT(n_component, shared[k].n_component);
+        /* stated with four digits, and for the dragons before the doubled triangles are dropped */
+        if (shared[k].volume > 0)
+            CHECK_NEAR(pal_surface_volume(&s) / shared[k].volume, 1, shared[k].n_duplicate ? 3e-3 : 6e-4);
         pal_surface_free(&s);
     }
 }

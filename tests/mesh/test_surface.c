@@ -188,6 +188,73 @@ static void welding_joins_triangle_soup_within_the_tolerance_only(void)
     }
 }
 
+static void a_fin_vanishes_but_a_body_drawn_twice_stays(void)
+{
+    /* two triangles back to back between a corner edge of the cube and a point outside */
+    pal_surface s = cube();
+    grow(&s, 9, 24);
+    add_vertex(&s, -1, -1, 0.5);
+    add_tri(&s, 0, 4, 8);
+    add_tri(&s, 4, 0, 8);
+    pal_surface_report report = {0};
+    pal_surface_topology topology;
+    REQUIRE(pal_surface_clean(&s, 0, &report, NULL) == PAL_ERR_OK);
+    REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
+    CHECK_INT(s.n_tri, 12);
+    CHECK_INT(s.n_vertex, 8);
+    CHECK_INT(report.n_duplicate, 1);
+    CHECK_INT(report.n_folded, 1);
+    CHECK(topology.closed && topology.manifold);
+    /* every triangle again, the other way round */
+    grow(&s, 8, 24);
+    for (int t = 0; t < 12; t++) add_tri(&s, s.tri[3 * t + 1], s.tri[3 * t], s.tri[3 * t + 2]);
+    report = (pal_surface_report){0};
+    REQUIRE(pal_surface_clean(&s, 0, &report, NULL) == PAL_ERR_OK);
+    CHECK_INT(s.n_tri, 12);
+    CHECK_INT(report.n_duplicate, 12);
+    CHECK_INT(report.n_folded, 0);
+    CHECK_NEAR(pal_surface_volume(&s), 1, 1e-15);
+    pal_surface_free(&s);
+}
+
+static void flat_triangles_are_mended_without_a_slit(void)
+{
+    /* two more corners on the edge 0-1, joined to it by flat triangles, one upon the other */
+    pal_surface s = cube();
+    grow(&s, 10, 20);
+    add_vertex(&s, 0.5, 0, 0);
+    add_vertex(&s, 0.25, 0, 0);
+    int found = 0;
+    for (int t = 0; t < 12; t++)
+        for (int k = 0; k < 3; k++) found += s.tri[3 * t + k] == 0 && s.tri[3 * t + (k + 1) % 3] == 1;
+    REQUIRE(found == 1);
+    for (int t = 0; t < 12; t++)
+        for (int k = 0; k < 3; k++)
+            if (s.tri[3 * t + k] == 0 && s.tri[3 * t + (k + 1) % 3] == 1) {
+                /* 0-1-d becomes 0-9, 9-8, 8-1 with two flat triangles between that and the other side's edge 1-0 */
+                int d = s.tri[3 * t + (k + 2) % 3];
+                s.tri[3 * t] = 0, s.tri[3 * t + 1] = 9, s.tri[3 * t + 2] = d;
+                add_tri(&s, 9, 8, d);
+                add_tri(&s, 8, 1, d);
+                add_tri(&s, 0, 1, 8);
+                add_tri(&s, 0, 8, 9);
+                t = k = 12;
+            }
+    pal_surface_report report = {0};
+    pal_surface_topology topology;
+    REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
+    REQUIRE(topology.closed && topology.oriented && topology.manifold);
+    REQUIRE(pal_surface_clean(&s, 0, &report, NULL) == PAL_ERR_OK);
+    REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
+    CHECK(topology.closed && topology.oriented && topology.manifold);
+    CHECK_INT(report.n_mended, 2);
+    CHECK_INT(report.n_degenerate, 0);
+    CHECK_INT(s.n_tri, 16);
+    CHECK_NEAR(pal_surface_volume(&s), 1, 1e-14);
+    CHECK_NEAR(pal_surface_area(&s), 6, 1e-14);
+    pal_surface_free(&s);
+}
+
 static void nothing_left_is_refused_with_counts(void)
 {
     pal_surface s = cube();
@@ -208,6 +275,8 @@ int main(void)
     RUN(cleaning_counts_each_kind_of_fault);
     RUN(cleaning_recentres_and_keeps_far_positions);
     RUN(welding_joins_triangle_soup_within_the_tolerance_only);
+    RUN(a_fin_vanishes_but_a_body_drawn_twice_stays);
+    RUN(flat_triangles_are_mended_without_a_slit);
     RUN(nothing_left_is_refused_with_counts);
     return check_report();
 }
