@@ -186,7 +186,8 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
         trainee_fault(t, PAL_FAULT_MALFORMED, "TOOLS: %s", pal_refusal_text(refusal));
         return;
     }
-    if (t->cycle_seen && tools.cycle <= t->cycle)
+    /* a cycle may come again, with the frames of another accuracy */
+    if (t->cycle_seen && tools.cycle < t->cycle)
         trainee_fault(t, PAL_FAULT_CYCLE, "cycle %u after %u", tools.cycle, t->cycle);
     /* a frame may have waited for credit, so its cycle may lie before the one that it came in, never behind */
     if (t->frame_cycle > tools.cycle)

@@ -2,9 +2,9 @@
  *
  * Checked: every FRAME decodes, belongs to a known part and epoch, its seq grows, its positions are finite and within
  * the scene's box grown by its own size, its quantisation keeps the stated error (coarser steps for a client that does
- * not keep up are counted); cycles grow, no frame comes before its cycle; assets have the hash of their name; nothing
- * malformed. A wish broken is counted under its name. Measured: pose to frame = own clock now minus the own stamp
- * echoed in TOOLS, once per new pose. Thread: [net]. */
+ * not keep up are counted); cycles never go back, no frame comes before its cycle; assets have the hash of their name;
+ * nothing malformed. A wish broken is counted under its name. Measured: pose to frame = own clock now minus the own
+ * stamp echoed in TOOLS, once per new pose. Thread: [net]. */
 #ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
 #define PAL_CLIENTS_TRAINEE_TRAINEE_H
 #include "clients/link/asset_store.h"
@@ -18,7 +18,7 @@
     X(PART, "a frame of an unknown part")                                                                              \
     X(EPOCH, "a frame of an older epoch after a newer one")                                                            \
     X(SEQ, "a part's seq does not grow")                                                                               \
-    X(CYCLE, "a cycle number does not grow or a frame comes before its cycle")                                         \
+    X(CYCLE, "a cycle number goes back or a frame comes before its cycle")                                             \
     X(BOUND, "a frame's step is too coarse for the stated error")                                                      \
     X(PLACE, "a vertex lies far outside the scene or is not finite")                                                   \
     X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \

@@ -1,0 +1,359 @@
+#include "clients/haptic_bridge/bridge_net.h"
+#include "clients/link/asset_store.h"
+#include "clients/link/lcm_convert.h"
+#include "clients/link/lcm_link.h"
+#include "palpate_haptic_config_t.h"
+#include "palpate_haptic_event_t.h"
+#include "palpate_haptic_status_t.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/base/vec3.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RESTARTED_NS 1000000000u /* after this pause a server on LCM may count from the start again */
+
+enum { POSE_PERIOD_US = 4000, EVENT_PERIOD_US = 20000, STATUS_PERIOD_US = 100000, EVENT_KEEP = 16, EVENT_REPEATS = 3 };
+
+struct pal_bridge_net {
+    pal_link_loop *loop;
+    pal_servo *servo;
+    pal_servo_thread *thread;
+    pal_bridge_net_options o;
+    pal_link *link;    /* websocket, or NULL */
+    pal_lcm_link *lcm; /* LCM, or NULL       */
+    pal_asset_store *store;
+    const pal_stored_asset *asset;
+    double radius_m;
+    uint32_t generation, pose_seq, echo_seq, model_seq, model_newest, event_seq, status_seq;
+    uint64_t joined_ns, model_ns, model_first_seq, n_status;
+    pal_servo_view view;
+    pal_servo_timing timing;
+    struct {
+        palpate_haptic_event_t event;
+        int left;
+    } pending[EVENT_KEEP];
+    int next_pending;
+    pal_bridge_net_counts count;
+};
+
+static void net_round_trip(pal_bridge_net *n, uint32_t echo_seq, uint64_t echo_us, uint32_t hold_us)
+{
+    const uint64_t now_us = pal_clock_ns() / 1000;
+    if (echo_seq == 0 || echo_seq == n->echo_seq || echo_us + hold_us > now_us) return;
+    n->echo_seq = echo_seq;
+    pal_jitter_add(&n->count.rtt, (now_us - echo_us - hold_us) * 1000);
+}
+
+static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
+{
+    const uint64_t now = pal_clock_ns();
+    n->count.n_model++;
+    n->model_ns = now;
+    n->model_newest = model->seq;
+    net_round_trip(n, model->echo_seq, model->echo_stamp_us, model->hold_us);
+    pal_servo_put_model(n->servo, model, n->generation, now);
+}
+
+/* where the tool's centre is when it touches the organ at rest from above */
+static void net_place(pal_bridge_net *n)
+{
+    double point[3];
+    if (n->o.has_origin || !n->asset || !n->asset->ready) return;
+    if (!pal_asset_furthest(n->asset->asset, n->o.up, point)) return;
+    pal_axpy3(point, n->radius_m, n->o.up);
+    pal_servo_put_origin(n->servo, point);
+}
+
+static void net_asset(void *user, const pal_stored_asset *asset)
+{
+    pal_bridge_net *n = user;
+    if (asset->failed) pal_log(PAL_LOG_WARN, "asset", "%s: %s", asset->path, asset->why);
+    if (asset == n->asset) net_place(n);
+}
+
+static void net_joined(pal_bridge_net *n)
+{
+    n->generation++;
+    n->echo_seq = 0;
+    n->count.joined = true;
+    if (!n->joined_ns) n->joined_ns = pal_clock_ns();
+    pal_servo_put_generation(n->servo, n->generation);
+}
+
+static void ws_control(void *user, pal_link *link, const pal_control *c)
+{
+    pal_bridge_net *n = user;
+    if (c->type == PAL_CONTROL_HELLO) {
+        const pal_wire_hello *hello = &c->hello;
+        n->count.tool = hello->you_tool;
+        n->radius_m = hello->you_tool >= 0 && (uint32_t)hello->you_tool < hello->n_tool
+                          ? hello->tool[hello->you_tool].radius_m
+                          : 0.01;
+        net_joined(n);
+        if (hello->n_part > 0) n->asset = pal_asset_store_want(n->store, hello->part[0].asset);
+        net_place(n);
+        pal_log(PAL_LOG_INFO, "joined", "%s with tool %d", hello->session, hello->you_tool);
+    }
+    if (c->type == PAL_CONTROL_MEMBERS && pal_link_hello(link))
+        for (uint32_t i = 0; i < c->members.n_member; i++)
+            if (c->members.member[i].id == pal_link_hello(link)->you_id) n->count.tool = c->members.member[i].tool;
+    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->problem.text);
+}
+
+static void ws_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+{
+    pal_bridge_net *n = user;
+    if (head->kind == PAL_WIRE_TOOLS) {
+        pal_wire_tools tools;
+        if (pal_wire_get_tools(bytes, n_byte, &tools)) return;
+        pal_link_send_ack(link, &(pal_wire_ack){.cycle = tools.cycle});
+    } else if (head->kind == PAL_WIRE_HAPTIC) {
+        pal_wire_haptic haptic;
+        if (pal_wire_get_haptic(bytes, n_byte, &haptic))
+            n->count.n_refused++;
+        else if (haptic.tool == n->count.tool)
+            net_model(n, &haptic);
+    }
+}
+
+static void ws_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+{
+    (void)link;
+    pal_bridge_net *n = user;
+    if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
+    snprintf(n->count.why, sizeof n->count.why, "%d %.100s", code, why);
+    pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, why);
+}
+
+/* models on LCM; a server that counts from the start again after a pause is another session */
+static void lcm_model(void *user, const char *channel, const void *bytes, size_t n_byte)
+{
+    (void)channel;
+    pal_bridge_net *n = user;
+    pal_wire_haptic haptic;
+    if (pal_lcm_to_haptic(bytes, n_byte, &haptic) || haptic.tool != n->o.tool) {
+        n->count.n_refused++;
+        return;
+    }
+    const bool back = (int32_t)(haptic.seq - n->model_newest) <= 0;
+    if (!n->count.joined || (back && pal_clock_ns() - n->model_ns > RESTARTED_NS)) net_joined(n);
+    net_model(n, &haptic);
+}
+
+static void lcm_refused(void *user, const char *channel, pal_walk why)
+{
+    (void)channel, (void)why;
+    ((pal_bridge_net *)user)->count.n_refused++;
+}
+
+static void net_channel(const pal_bridge_net *n, char channel[PAL_LCM_CHANNEL_MAX + 1], const char *what)
+{
+    pal_lcm_channel(channel, n->o.session, what, n->o.tool);
+}
+
+/* 250 Hz: newest pose and force to the server */
+static void net_send_pose(void *user)
+{
+    pal_bridge_net *n = user;
+    const pal_servo_view *fresh = pal_servo_take_view(n->servo);
+    if (!fresh) return;
+    n->view = *fresh;
+    const pal_servo_view *v = &n->view;
+    const int tool = n->lcm ? n->o.tool : n->count.tool;
+    if (tool < 0) return;
+    pal_wire_pose pose = {.tool = (uint16_t)tool,
+                          .seq = n->pose_seq + 1,
+                          .flags = v->flags,
+                          .stamp_us = pal_clock_ns() / 1000,
+                          .grip = (float)v->grip,
+                          .buttons = v->buttons,
+                          .model_seq = v->model_seq,
+                          .model_age_us = v->model_age_us,
+                          .model_stamp_us = v->model_stamp_us};
+    pal_copy3(pose.position_m, v->position_m);
+    memcpy(pose.quaternion, v->quat, sizeof pose.quaternion);
+    for (int k = 0; k < 3; k++) {
+        pose.velocity_m_s[k] = (float)v->velocity_m_s[k];
+        pose.force_N[k] = (float)v->force_N[k];
+    }
+    pal_err err;
+    if (n->lcm) {
+        palpate_tool_state_t state;
+        char channel[PAL_LCM_CHANNEL_MAX + 1];
+        pal_lcm_from_pose(&pose, &state);
+        net_channel(n, channel, "TOOL");
+        err = pal_lcm_link_publish(n->lcm, channel, palpate_tool_state_t_get_type_info(), &state);
+    } else {
+        err = pal_link_send_pose(n->link, &pose);
+    }
+    if (err) return;
+    n->pose_seq++;
+    n->count.n_pose++;
+}
+
+/* 50 Hz: events to the log and, three times each, to the bus */
+static void net_send_events(void *user)
+{
+    pal_bridge_net *n = user;
+    pal_servo_event event;
+    while (pal_servo_take_event(n->servo, &event)) {
+        pal_log(event.kind == PAL_EVENT_DEVICE_READY || event.kind == PAL_EVENT_RECOVERED ? PAL_LOG_INFO : PAL_LOG_WARN,
+                "device", "%s (%g)", event.text, (double)event.value);
+        n->count.n_event++;
+        snprintf(n->count.last_event, sizeof n->count.last_event, "%s", event.text);
+        const int place = n->next_pending++ % EVENT_KEEP;
+        n->pending[place].left = EVENT_REPEATS;
+        n->pending[place].event = (palpate_haptic_event_t){.utime = (int64_t)(pal_clock_ns() / 1000),
+                                                           .seq = (int32_t)++n->event_seq,
+                                                           .version = PAL_LCM_VERSION,
+                                                           .tool = (int16_t)n->o.tool,
+                                                           .kind = event.kind,
+                                                           .code = event.code,
+                                                           .value = event.value,
+                                                           .text = (char *)(uintptr_t)event.text};
+    }
+    if (!n->lcm) return;
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
+    net_channel(n, channel, "HEVENT");
+    for (int i = 0; i < EVENT_KEEP; i++)
+        if (n->pending[i].left > 0 && n->pending[i].left--)
+            pal_lcm_link_publish(n->lcm, channel, palpate_haptic_event_t_get_type_info(), &n->pending[i].event);
+}
+
+static void net_send_config(pal_bridge_net *n)
+{
+    const pal_servo_options *s = &n->o.servo;
+    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    memcpy(name, s->info.name, sizeof name);
+    palpate_haptic_config_t config = {.utime = (int64_t)(pal_clock_ns() / 1000),
+                                      .seq = (int32_t)n->status_seq,
+                                      .version = PAL_LCM_VERSION,
+                                      .tool = (int16_t)n->o.tool,
+                                      .dof = (int16_t)(s->info.dof_in * 16 + s->info.dof_out),
+                                      .flags = s->pose_only ? 1 : 0,
+                                      .device = name,
+                                      .f_peak = (float)s->info.peak_N,
+                                      .f_cont = (float)s->info.continuous_N,
+                                      .f_user = (float)s->force_cap_N,
+                                      .k_max = (float)s->info.stiffness_max_N_m,
+                                      .b_max = (float)s->info.damping_max_Ns_m,
+                                      .quat = {1, 0, 0, 0},
+                                      .scale = (float)s->scale,
+                                      .fscale = (float)s->force_scale};
+    for (int k = 0; k < 3; k++) {
+        config.ws_min[k] = (float)s->info.low_m[k];
+        config.ws_max[k] = (float)s->info.high_m[k];
+        config.origin[k] = s->origin_m[k];
+    }
+    net_channel(n, channel, "HCONFIG");
+    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_config_t_get_type_info(), &config);
+}
+
+/* 10 Hz: health; 1 Hz: limits */
+static void net_send_status(void *user)
+{
+    pal_bridge_net *n = user;
+    const pal_servo_timing *timing = n->thread ? pal_servo_thread_timing(n->thread) : NULL;
+    if (timing) n->timing = *timing;
+    if (!n->lcm) return;
+    const pal_servo_view *v = &n->view;
+    const pal_jitter *p = &n->timing.period;
+    const double ticks = v->n_tick ? (double)v->n_tick : 1;
+    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    memcpy(name, n->o.servo.info.name, sizeof name);
+    const double seconds = n->joined_ns ? (double)(pal_clock_ns() - n->joined_ns) * 1e-9 : 0;
+    const palpate_haptic_status_t status = {
+        .utime = (int64_t)(pal_clock_ns() / 1000),
+        .seq = (int32_t)++n->status_seq,
+        .version = PAL_LCM_VERSION,
+        .tool = (int16_t)n->o.tool,
+        .state = (int16_t)v->state,
+        .rt_flags = (int16_t)n->timing.rt_flags,
+        .rate_hz = (float)n->o.servo.rate_hz,
+        .period_us = {(float)pal_jitter_at_us(p, 0.5), (float)pal_jitter_at_us(p, 0.99),
+                      (float)pal_jitter_at_us(p, 0.999), (float)((double)p->max_ns * 1e-3)},
+        .late_ticks = (int32_t)n->timing.n_missed,
+        .ticks = (int32_t)v->n_tick,
+        .rtt_ms = {(float)pal_jitter_at_us(&n->count.rtt, 0.5) / 1e3f,
+                   (float)pal_jitter_at_us(&n->count.rtt, 0.99) / 1e3f, (float)((double)n->count.rtt.max_ns * 1e-6)},
+        .model_hz = seconds > 0 ? (float)((double)n->count.n_model / seconds) : 0,
+        .model_age_ms = (float)v->model_age_us * 1e-3f,
+        .jump_max_N = (float)v->jump_max_N,
+        .force_rms_N = (float)v->force_rms_N,
+        .force_max_N = (float)v->force_max_N,
+        .sat_frac = (float)((double)v->n_saturated / ticks),
+        .stiff_clamped = (float)((double)v->n_clamped / ticks),
+        .motor_temp = (float)v->motor_temperature,
+        .device = name};
+    net_channel(n, channel, "HSTATUS");
+    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_status_t_get_type_info(), &status);
+    if (n->n_status++ % 10 == 0) net_send_config(n);
+}
+
+static pal_err net_open_ws(pal_bridge_net *n, pal_note *note)
+{
+    static const pal_link_events events = {ws_state, ws_control, ws_message, NULL};
+    n->store = pal_asset_store_create(n->loop, n->o.server, net_asset, n);
+    if (!n->store) return PAL_ERR_MEMORY;
+    const pal_link_options link = {.url = n->o.server,
+                                   .name = n->o.name,
+                                   .role = PAL_WIRE_ROLE_TRAINEE,
+                                   .tool = n->o.tool,
+                                   .events = &events,
+                                   .user = n};
+    return pal_link_open(n->loop, &link, note, &n->link);
+}
+
+static pal_err net_open_lcm(pal_bridge_net *n, pal_note *note)
+{
+    static const pal_lcm_events events = {lcm_model, lcm_refused};
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
+    PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, note, &n->lcm));
+    net_channel(n, channel, "HMODEL");
+    return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
+}
+
+pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,
+                            const pal_bridge_net_options *options, pal_note *note, pal_bridge_net **out)
+{
+    pal_bridge_net *n = calloc(1, sizeof *n);
+    if (!n) return PAL_ERR_MEMORY;
+    n->loop = loop;
+    n->servo = servo;
+    n->thread = thread;
+    n->o = *options;
+    n->count.tool = PAL_WIRE_TOOL_NONE;
+    const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);
+    if (bus && n->o.tool < 0) n->o.tool = 0;
+    if (bus) n->count.tool = n->o.tool;
+    pal_err err = bus ? net_open_lcm(n, note) : net_open_ws(n, note);
+    if (!err && (!pal_link_every(loop, POSE_PERIOD_US, net_send_pose, n) ||
+                 !pal_link_every(loop, EVENT_PERIOD_US, net_send_events, n) ||
+                 !pal_link_every(loop, STATUS_PERIOD_US, net_send_status, n)))
+        err = PAL_ERR_MEMORY;
+    /* the loop may hold timers and links of a half-open one: it frees them, the rest is freed after it */
+    *out = n;
+    return err;
+}
+
+void pal_bridge_net_close(pal_bridge_net *net)
+{
+    if (!net) return;
+    pal_lcm_link_close(net->lcm);
+    pal_asset_store_destroy(net->store);
+    free(net);
+}
+
+pal_bridge_net_counts pal_bridge_net_count(pal_bridge_net *net)
+{
+    net->count.seconds_joined = net->joined_ns ? (double)(pal_clock_ns() - net->joined_ns) * 1e-9 : 0;
+    return net->count;
+}
+
+const pal_servo_view *pal_bridge_net_view(const pal_bridge_net *net)
+{
+    return &net->view;
+}

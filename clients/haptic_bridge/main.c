@@ -1,0 +1,336 @@
+/* palpate-bridge: a haptic device, real or virtual, in a session: servo thread (servo_thread.h), network thread (this
+ * one), trio between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
+#include "clients/haptic_bridge/bridge_net.h"
+#include "clients/link/client_flags.h"
+#include "server/base/log.h"
+#include "server/base/vec3.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+typedef struct bridge {
+    const char *device, *server, *session, *name, *tool, *hand, *script, *origin, *up, *options;
+    double rate_hz, seconds, cap_N, scale, force_scale;
+    bool json, quiet, list, doctor, pose_only, stdin_stop;
+    const pal_haptic_v1 *backend;
+    void *handle;
+    pal_servo_options servo_options;
+    pal_servo *servo;
+    pal_servo_thread *thread;
+    pal_link_loop *loop;
+    pal_bridge_net *net;
+    char rt_refused[160];
+} bridge;
+
+static volatile sig_atomic_t main_signal;
+static pal_servo *main_servo; /* for the emergency stop */
+
+static void main_on_signal(int number)
+{
+    if (number == SIGUSR1 && main_servo)
+        pal_servo_estop(main_servo);
+    else if (number == SIGUSR2 && main_servo)
+        pal_servo_rearm(main_servo);
+    else
+        main_signal = number;
+}
+
+static void main_watch(void *loop)
+{
+    if (main_signal) pal_link_stop(loop);
+}
+
+/* closed standard input is an emergency stop: whoever held it open is gone */
+static void main_stdin(void *user)
+{
+    char byte[64];
+    bridge *b = user;
+    if (read(STDIN_FILENO, byte, sizeof byte) == 0) pal_servo_estop(b->servo);
+}
+
+static int main_list(void)
+{
+    const pal_haptic_v1 *backend;
+    for (int i = 0; (backend = pal_device_backend(i)); i++) {
+        char why[256] = "";
+        const int n = backend->probe(why, sizeof why);
+        printf("%s: %s%s\n", backend->name, n < 0 ? "not available: " : "", why);
+    }
+    printf("hdapi, dhd, haply, input, plugin: not in this release\n");
+    return 0;
+}
+
+/* "virtual:touch,key=value" and the flags become back end and id */
+static pal_err main_open_device(bridge *b, pal_note *note)
+{
+    const size_t n_name = strcspn(b->device, ":");
+    const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
+    b->backend = pal_device_find(b->device, n_name);
+    if (!b->backend)
+        return pal_note_set(note, PAL_ERR_REFUSED, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
+    char id[256];
+    const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
+                           b->options ? b->options : "");
+    if (n >= (int)sizeof id) return pal_note_set(note, PAL_ERR_REFUSED, "device description is too long");
+    const int error = b->backend->open(&b->handle, id, &b->servo_options.info);
+    if (error < 0) return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", id, b->backend->strerror(NULL, error));
+    return PAL_ERR_OK;
+}
+
+/* axes of the device (x to the user, y right, z up) to the world: z to up */
+static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_note *note)
+{
+    pal_servo_options *o = &b->servo_options;
+    double ex[3], ey[3];
+    if (!pal_client_triple(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "--up wants three numbers, not \"%s\"", b->up);
+    const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
+    pal_cross3(ey, net->up, other);
+    pal_unit3(ey, ey, 1e-9);
+    pal_cross3(ex, ey, net->up);
+    for (int k = 0; k < 3; k++)
+        o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
+    net->has_origin = b->origin != NULL;
+    if (b->origin && !pal_client_triple(b->origin, o->origin_m))
+        return pal_note_set(note, PAL_ERR_REFUSED, "--origin wants three numbers, not \"%s\"", b->origin);
+    return PAL_ERR_OK;
+}
+
+static void main_put_times(cJSON *object, const char *name, const pal_jitter *j)
+{
+    cJSON *o = cJSON_AddObjectToObject(object, name);
+    cJSON_AddNumberToObject(o, "n", (double)j->n);
+    cJSON_AddNumberToObject(o, "p50", pal_jitter_at_us(j, 0.5));
+    cJSON_AddNumberToObject(o, "p99", pal_jitter_at_us(j, 0.99));
+    cJSON_AddNumberToObject(o, "p99_9", pal_jitter_at_us(j, 0.999));
+    cJSON_AddNumberToObject(o, "max", (double)j->max_ns * 1e-3);
+}
+
+static void main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
+                      const pal_bridge_net_counts *c, const char *reason)
+{
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddBoolToObject(o, "ok", reason == NULL);
+    if (reason) cJSON_AddStringToObject(o, "reason", reason);
+    cJSON_AddStringToObject(o, "device", b->servo_options.info.name);
+    cJSON_AddNumberToObject(o, "rate_hz", b->rate_hz);
+    cJSON_AddBoolToObject(o, "fifo", t->rt_flags & PAL_RT_FIFO);
+    cJSON_AddBoolToObject(o, "memory_locked", t->rt_flags & PAL_RT_LOCKED);
+    cJSON_AddStringToObject(o, "real_time_refused", b->rt_refused);
+    cJSON_AddStringToObject(o, "forces",
+                            t->rt_flags & PAL_RT_OFF
+                                ? "off: servo loop is late"
+                                : (t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late" : "full"));
+    cJSON_AddNumberToObject(o, "ticks", (double)t->n_tick);
+    cJSON_AddNumberToObject(o, "missed", (double)t->n_missed);
+    cJSON_AddNumberToObject(o, "watchdog_stops", (double)t->n_watchdog);
+    main_put_times(o, "period_us", &t->period);
+    main_put_times(o, "lateness_us", &t->lateness);
+    main_put_times(o, "rtt_us", &c->rtt);
+    cJSON_AddStringToObject(o, "state", pal_servo_state_name(v->state));
+    cJSON_AddNumberToObject(o, "force_max_N", v->force_max_N);
+    cJSON_AddNumberToObject(o, "force_rms_N", v->force_rms_N);
+    cJSON_AddNumberToObject(o, "jump_max_N", v->jump_max_N);
+    cJSON_AddNumberToObject(o, "felt_N_m", v->felt_N_m);
+    cJSON_AddNumberToObject(o, "models", (double)v->n_model);
+    cJSON_AddNumberToObject(o, "models_old", (double)v->n_model_old);
+    cJSON_AddNumberToObject(o, "stale", (double)v->n_stale);
+    cJSON_AddNumberToObject(o, "faults", (double)v->n_fault);
+    cJSON_AddNumberToObject(o, "not_finite", (double)v->n_not_finite);
+    cJSON_AddNumberToObject(o, "poses", (double)c->n_pose);
+    cJSON_AddNumberToObject(o, "tool", c->tool);
+    cJSON_AddBoolToObject(o, "joined", c->joined);
+    cJSON *place = cJSON_AddArrayToObject(o, "position_m");
+    for (int k = 0; k < 3; k++) cJSON_AddItemToArray(place, cJSON_CreateNumber(v->position_m[k]));
+    char *text = cJSON_PrintUnformatted(o);
+    if (text) puts(text);
+    cJSON_free(text);
+    cJSON_Delete(o);
+}
+
+static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
+                       const pal_bridge_net_counts *c)
+{
+    printf("%s at %g Hz: %llu ticks, %llu missed, watchdog %llu; %s%s\n", b->servo_options.info.name, b->rate_hz,
+           (unsigned long long)t->n_tick, (unsigned long long)t->n_missed, (unsigned long long)t->n_watchdog,
+           t->rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "no real time: ", t->rt_flags & PAL_RT_FIFO ? "" : b->rt_refused);
+    const pal_jitter *row[] = {&t->period, &t->lateness, &c->rtt};
+    const char *name[] = {"period", "lateness", "round trip"};
+    for (int i = 0; i < 3; i++)
+        printf("%-10s us: p50 %.0f  p99 %.0f  p99.9 %.0f  max %.0f\n", name[i], pal_jitter_at_us(row[i], 0.5),
+               pal_jitter_at_us(row[i], 0.99), pal_jitter_at_us(row[i], 0.999), (double)row[i]->max_ns * 1e-3);
+    printf(
+        "force N: max %.2f  rms %.2f  largest step at an update %.3f; felt %.0f N/m; %llu models, %llu times stale\n",
+        v->force_max_N, v->force_rms_N, v->jump_max_N, v->felt_N_m, (unsigned long long)v->n_model,
+        (unsigned long long)v->n_stale);
+}
+
+static pal_err main_start(bridge *b, pal_note *note)
+{
+    pal_bridge_net_options net = {.server = b->server,
+                                  .session = b->session,
+                                  .name = b->name,
+                                  .tool = strcmp(b->tool, "any") ? atoi(b->tool) : PAL_WIRE_TOOL_ANY};
+    pal_servo_options *o = &b->servo_options;
+    PAL_TRY(main_workspace(b, &net, note));
+    PAL_TRY(main_open_device(b, note));
+    o->backend = b->backend;
+    o->device = b->handle;
+    o->rate_hz = b->rate_hz;
+    o->force_cap_N = fmin(b->cap_N, o->info.peak_N);
+    o->scale = b->scale;
+    o->force_scale = b->force_scale;
+    o->pose_only = b->pose_only || o->info.pose_only;
+    o->hand_off = !strcmp(b->hand, "off");
+    PAL_TRY(pal_servo_create(o, &b->servo));
+    main_servo = b->servo;
+    PAL_TRY(pal_link_loop_create(&b->loop));
+    pal_note refused = {""};
+    PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
+    snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
+    if (refused.text[0])
+        pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
+    net.servo = *o;
+    PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, note, &b->net));
+    if (b->stdin_stop) PAL_TRY(pal_link_watch(b->loop, STDIN_FILENO, main_stdin, b));
+    return pal_link_every(b->loop, 50000, main_watch, b->loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static int main_run(bridge *b)
+{
+    pal_note note = {""};
+    pal_err err = main_start(b, &note);
+    if (!err && b->seconds > 0) pal_link_run_for(b->loop, b->seconds);
+    if (!err && b->seconds <= 0) pal_link_run(b->loop);
+    pal_servo_timing timing = {0};
+    pal_servo_view view = {0};
+    pal_bridge_net_counts counts = {0};
+    pal_servo_thread_stop(b->thread, &timing);
+    if (b->net) {
+        view = *pal_bridge_net_view(b->net);
+        counts = pal_bridge_net_count(b->net);
+    }
+    main_servo = NULL;
+    pal_link_loop_destroy(b->loop);
+    pal_bridge_net_close(b->net);
+    pal_servo_destroy(b->servo);
+    if (b->handle) b->backend->close(b->handle);
+    const char *reason = err ? (note.text[0] ? note.text : pal_err_text(err)) : NULL;
+    char lost[192];
+    if (!err && !counts.joined) {
+        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->server, counts.why[0] ? counts.why : "no answer");
+        reason = lost;
+    }
+    if (b->json) main_json(b, &timing, &view, &counts, reason);
+    if (!b->json && !b->quiet && !err) main_table(b, &timing, &view, &counts);
+    if (reason) fprintf(stderr, "palpate-bridge: %s\n", reason);
+    return reason ? 1 : 0;
+}
+
+/* what this machine allows, and one second of the servo with the device */
+static int main_doctor(bridge *b)
+{
+    struct rlimit priority = {0}, locked = {0};
+    getrlimit(RLIMIT_RTPRIO, &priority);
+    getrlimit(RLIMIT_MEMLOCK, &locked);
+    main_list();
+    printf("limits: rtprio %llu%s, memlock %llu kB\n", (unsigned long long)priority.rlim_cur,
+           geteuid() == 0 ? " (root)" : "", (unsigned long long)locked.rlim_cur / 1024);
+    pal_note note = {""};
+    pal_err err = main_open_device(b, &note);
+    pal_dev_state state;
+    if (!err && b->backend->read(b->handle, &state) < 0) err = pal_note_set(&note, PAL_ERR_IO, "no first pose");
+    if (err) {
+        printf("device: %s\n", note.text);
+        return 1;
+    }
+    printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n",
+           b->servo_options.info.name, b->servo_options.info.peak_N, b->servo_options.info.continuous_N,
+           b->servo_options.info.stiffness_max_N_m, state.position_m[0] * 1e3, state.position_m[1] * 1e3,
+           state.position_m[2] * 1e3);
+    pal_servo_options o = b->servo_options;
+    o.backend = b->backend, o.device = b->handle, o.rate_hz = b->rate_hz, o.pose_only = true;
+    o.rotation[0] = o.rotation[4] = o.rotation[8] = 1;
+    pal_servo_timing timing = {0};
+    err = pal_servo_create(&o, &b->servo);
+    if (!err) err = pal_servo_thread_start(b->servo, &o, &note, &b->thread);
+    if (!err) sleep(1);
+    pal_servo_thread_stop(b->thread, &timing);
+    pal_servo_destroy(b->servo);
+    b->backend->close(b->handle);
+    if (err) return 1;
+    printf("real time: %s%s, memory %s; %llu ticks, %llu missed, lateness p50 %.0f p99.9 %.0f max %.0f us\n",
+           timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : note.text,
+           timing.rt_flags & PAL_RT_LOCKED ? "locked" : "not locked", (unsigned long long)timing.n_tick,
+           (unsigned long long)timing.n_missed, pal_jitter_at_us(&timing.lateness, 0.5),
+           pal_jitter_at_us(&timing.lateness, 0.999), (double)timing.lateness.max_ns * 1e-3);
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    bridge b = {.device = "virtual:touch",
+                .server = "ws://127.0.0.1:8090/ws",
+                .session = "main",
+                .name = "haptic bridge",
+                .tool = "any",
+                .hand = "average",
+                .script = "press-hold",
+                .up = "0,0,1",
+                .rate_hz = 1000,
+                .cap_N = 3,
+                .scale = 1,
+                .force_scale = 1};
+    int n_operand;
+    const pal_client_flag flag[] = {
+        {"--device", "BACKEND:ID", PAL_CLIENT_TEXT, &b.device, 0, 0, NULL,
+         "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)"},
+        {"--server", "URL", PAL_CLIENT_TEXT, &b.server, 0, 0, NULL, "ws://host:port/ws or lcm://group:port?ttl=0"},
+        {"--session", "NAME", PAL_CLIENT_TEXT, &b.session, 0, 0, NULL, "LCM: name in the channels (main)"},
+        {"--name", "NAME", PAL_CLIENT_TEXT, &b.name, 0, 0, NULL, "name among the members"},
+        {"--tool", "N", PAL_CLIENT_TEXT, &b.tool, 0, 0, NULL, "tool to take: index or any; LCM: index (any, 0)"},
+        {"--hand", "NAME", PAL_CLIENT_TEXT, &b.hand, 0, 0, NULL, "virtual: average | light | firm | off"},
+        {"--script", "NAME", PAL_CLIENT_TEXT, &b.script, 0, 0, NULL,
+         "virtual: still | press-hold | cycle | ramp | stroke | tap"},
+        {"--options", "K=V,...", PAL_CLIENT_TEXT, &b.options, 0, 0, NULL, "virtual: depth, height mm, wait s, lag ms"},
+        {"--rate", "HZ", PAL_CLIENT_NUMBER, &b.rate_hz, 500, 4000, NULL, "servo rate (1000)"},
+        {"--seconds", "S", PAL_CLIENT_NUMBER, &b.seconds, 0.1, 86400, NULL, "end after this time (never)"},
+        {"--force-cap", "N", PAL_CLIENT_NUMBER, &b.cap_N, 0, 20, NULL, "largest force (3, and the device's peak)"},
+        {"--origin", "X,Y,Z", PAL_CLIENT_TEXT, &b.origin, 0, 0, NULL, "world place of the workspace's centre, m"},
+        {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &b.up, 0, 0, NULL, "world direction of the device's up (0,0,1)"},
+        {"--scale", "S", PAL_CLIENT_NUMBER, &b.scale, 0.01, 100, NULL, "world metres per device metre (1)"},
+        {"--force-scale", "S", PAL_CLIENT_NUMBER, &b.force_scale, 0.01, 100, NULL,
+         "device newtons per world newton (1)"},
+        {"--pose-only", NULL, PAL_CLIENT_SWITCH, &b.pose_only, 0, 0, NULL, "no force"},
+        {"--stdin-stop", NULL, PAL_CLIENT_SWITCH, &b.stdin_stop, 0, 0, NULL,
+         "closed standard input is an emergency stop"},
+        {"--list-devices", NULL, PAL_CLIENT_SWITCH, &b.list, 0, 0, NULL, "which back ends there are, or why not"},
+        {"--doctor", NULL, PAL_CLIENT_SWITCH, &b.doctor, 0, 0, NULL, "check limits, device and one second of servo"},
+        {"--json", NULL, PAL_CLIENT_SWITCH, &b.json, 0, 0, NULL, "one JSON object on stdout at the end"},
+        {"--quiet", NULL, PAL_CLIENT_SWITCH, &b.quiet, 0, 0, NULL, "say nothing unless something fails"},
+    };
+    const pal_client_table table = {"palpate-bridge",
+                                    "[flags]",
+                                    "Renders a session's contact models on a haptic device at 1 kHz. SIGUSR1 is the "
+                                    "emergency stop, SIGUSR2 re-arms.",
+                                    flag,
+                                    sizeof flag / sizeof flag[0],
+                                    0,
+                                    0};
+    const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
+    if (code >= 0) return code;
+    if (b.list) return main_list();
+    pal_log_set_level(b.quiet || b.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
+    if (b.doctor) return main_doctor(&b);
+    signal(SIGINT, main_on_signal);
+    signal(SIGTERM, main_on_signal);
+    signal(SIGUSR1, main_on_signal);
+    signal(SIGUSR2, main_on_signal);
+    return main_run(&b);
+}
