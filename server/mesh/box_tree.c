@@ -19,9 +19,9 @@ enum { LEAF = 4, STACK = 128 };
 
 typedef struct node {
     double low[3], high[3];
-    double centre[3], area_normal[3], radius; /* dipole: area-weighted centroid and normal, farthest corner */
-    int32_t right;                            /* index of the right child; leaf: first item             */
-    int32_t n_item;                           /* 0: inner node                                          */
+    double centre[3], area_normal[3], area, radius; /* dipole: area-weighted centroid and normal, farthest corner */
+    int32_t right;                                  /* index of the right child; leaf: first item             */
+    int32_t n_item;                                 /* 0: inner node                                          */
 } node;
 
 struct pal_box_tree {
@@ -74,21 +74,31 @@ static void select_middle(const builder *b, int low, int high, int middle, int a
     }
 }
 
-/* box and dipole of items first..first+n-1 */
-static void measure(const builder *b, node *to, int first, int n)
+/* farthest corner of the box from the dipole's place */
+static void find_radius(node *n)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double reach = fmax(n->high[k] - n->centre[k], n->centre[k] - n->low[k]);
+        sum += reach * reach;
+    }
+    n->radius = sqrt(sum);
+}
+
+/* box and dipole of a leaf */
+static void measure_leaf(const builder *b, node *to)
 {
     const pal_surface *s = b->tree->surface;
-    double total = 0, middle[3] = {0};
-    memset(to, 0, sizeof *to);
+    double middle[3] = {0};
     for (int k = 0; k < 3; k++) to->low[k] = INFINITY, to->high[k] = -INFINITY;
-    for (int i = first; i < first + n; i++) {
+    for (int i = to->right; i < to->right + to->n_item; i++) {
         const double *c[3], *g = b->centroid + 3 * (size_t)b->tree->item[i];
         double e[3], f[3], normal[3];
         corners_of(s, b->tree->item[i], c);
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++) {
-                to->low[d] = fmin(to->low[d], c[k][d]);
-                to->high[d] = fmax(to->high[d], c[k][d]);
+                to->low[d] = c[k][d] < to->low[d] ? c[k][d] : to->low[d];
+                to->high[d] = c[k][d] > to->high[d] ? c[k][d] : to->high[d];
             }
         pal_sub3(e, c[1], c[0]);
         pal_sub3(f, c[2], c[0]);
@@ -97,38 +107,64 @@ static void measure(const builder *b, node *to, int first, int n)
         pal_axpy3(to->area_normal, 0.5, normal);
         pal_axpy3(to->centre, area, g);
         pal_add3(middle, middle, g);
-        total += area;
+        to->area += area;
     }
-    if (total > 0)
-        pal_scale3(to->centre, 1 / total, to->centre);
+    if (to->area > 0)
+        pal_scale3(to->centre, 1 / to->area, to->centre);
     else
-        pal_scale3(to->centre, 1.0 / n, middle);
-    for (int k = 0; k < 3; k++) {
-        double reach = fmax(to->high[k] - to->centre[k], to->centre[k] - to->low[k]);
-        to->radius += reach * reach;
-    }
-    to->radius = sqrt(to->radius);
+        pal_scale3(to->centre, 1.0 / to->n_item, middle);
+    find_radius(to);
 }
 
-static void build(const builder *b, int first, int n)
+/* box and dipole of an inner node from its children */
+static void measure_inner(const node *left, const node *right, node *to)
+{
+    double area = left->area + right->area, share = area > 0 ? left->area / area : 0.5;
+    for (int k = 0; k < 3; k++) {
+        to->low[k] = left->low[k] < right->low[k] ? left->low[k] : right->low[k];
+        to->high[k] = left->high[k] > right->high[k] ? left->high[k] : right->high[k];
+        to->centre[k] = share * left->centre[k] + (1 - share) * right->centre[k];
+        to->area_normal[k] = left->area_normal[k] + right->area_normal[k];
+    }
+    to->area = area;
+    find_radius(to);
+}
+
+/* the axis along which the centroids spread most */
+static int widest_axis(const builder *b, int first, int n)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int i = first; i < first + n; i++) {
+        const double *g = b->centroid + 3 * (size_t)b->tree->item[i];
+        for (int k = 0; k < 3; k++) {
+            low[k] = g[k] < low[k] ? g[k] : low[k];
+            high[k] = g[k] > high[k] ? g[k] : high[k];
+        }
+    }
+    int axis = 0;
+    for (int k = 1; k < 3; k++)
+        if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+    return axis;
+}
+
+static int build(const builder *b, int first, int n)
 {
     pal_box_tree *tree = b->tree;
     int self = tree->n_node++;
     node *me = &tree->nodes[self];
-    measure(b, me, first, n);
+    memset(me, 0, sizeof *me);
     if (n <= LEAF) {
         me->right = first;
         me->n_item = n;
-        return;
+        measure_leaf(b, me);
+        return self;
     }
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-        if (me->high[k] - me->low[k] > me->high[axis] - me->low[axis]) axis = k;
     int half = n / 2;
-    select_middle(b, first, first + n - 1, first + half, axis);
-    build(b, first, half);
-    me->right = tree->n_node;
-    build(b, first + half, n - half);
+    select_middle(b, first, first + n - 1, first + half, widest_axis(b, first, n));
+    int left = build(b, first, half);
+    me->right = build(b, first + half, n - half);
+    measure_inner(&tree->nodes[left], &tree->nodes[me->right], me);
+    return self;
 }
 
 pal_err pal_box_tree_create(const pal_surface *surface, pal_box_tree **out)

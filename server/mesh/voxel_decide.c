@@ -21,7 +21,7 @@
 #define FEW_DISPUTED 0.05
 /* an open surface must enclose beyond doubt (by two axes or this winding number) at least this share of its inside
  * voxels, and of those that two axes claim */
-#define SURE_SHARE 0.5
+#define SURE_SHARE   0.5
 #define SURE_WINDING 0.75
 /* length of the sum of area normals over the area: 0 closed, 1 flat */
 #define MOST_ONE_SIDED 0.8
@@ -211,19 +211,20 @@ static pal_err count_votes(decision *d, const uint8_t *vote)
 {
     const int *n = d->grid->n;
     size_t n_cell = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    int64_t n_inside = 0, n_disputed = 0;
+    int64_t n_inside = 0, n_disputed = 0, n_tie = 0;
     for (size_t i = 0; i < n_cell; i++) {
         if (!vote[i]) continue;
         verdict v = judge(vote[i]);
         n_inside += v == INSIDE;
         n_disputed += v == DISPUTED;
+        n_tie += v == DISPUTED && 2 * (vote[i] & 15) == 3 - (vote[i] >> 4);
         d->n_claimed += (vote[i] & 15) >= 2;
     }
     bool by_winding = (double)n_disputed > FEW_DISPUTED * (double)n_inside;
     strcpy(d->report->method, by_winding ? "winding" : "vote");
     d->report->n_disagree = n_disputed;
     d->n_sure = n_inside;
-    if (n_disputed) PAL_TRY(plant_tree(d));
+    if (n_tie || (by_winding && n_disputed)) PAL_TRY(plant_tree(d));
     const uint8_t *at = vote;
     for (int z = 0; z < n[2]; z++)
         for (int y = 0; y < n[1]; y++)

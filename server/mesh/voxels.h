@@ -1,10 +1,14 @@
 /* Surface -> voxels -> tetrahedra (paper B 2.2): flood fill of the voxels whose centres lie inside, one layer of border
  * voxels kept outside, five tetrahedra per voxel with mirrored parity.
  *
- * Departures from the paper: seeds in every component, not one; closed input is filled by scanline parity with a
- * half-open edge rule (the same voxels as ray flood fill, found sooner); open, inside-out, self-intersecting, doubled
- * or nested input is decided by a vote of the three axes and, where they disagree too often, by the winding number.
- * Thread: [load]. */
+ * Departures from the paper: seeds in every component, not one; closed input is filled by scanline with exact crossings
+ * (the same voxels as ray flood fill, found sooner); the parts of a surface are told apart, so that inside-out, doubled
+ * and overlapping parts count once and inward shells within others stay empty; open input is decided by a vote of the
+ * three axes and, where they leave too much undecided, by the winding number.
+ *
+ * Refusals for want of a volume carry a number: reason 1, the surface has no extent; reason 2, it is closed but no
+ * voxel centre lies inside (the message says which resolution may do); reason 3, it is open and encloses nothing beyond
+ * doubt. Thread: [load]. */
 #ifndef PAL_MESH_VOXELS_H
 #define PAL_MESH_VOXELS_H
 #include "server/mesh/surface.h"
@@ -30,8 +34,8 @@ typedef struct pal_voxels {
 typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
     int n_component;          /* face-connected components of inside voxels                        */
-    int64_t n_disagree;       /* voxels on which the three axes disagreed                          */
-    double surface_volume_m3; /* by the divergence theorem; 0 when the surface is open             */
+    int64_t n_disagree;       /* voxels that no two axes settle unopposed                          */
+    double surface_volume_m3; /* by the divergence theorem, cavities off; 0: the surface is open    */
     double inside_volume_m3;  /* inside voxels                                                     */
     double tree_s, fill_s;    /* time for the box tree (0: not built) and for the fill             */
 } pal_voxel_report;
