@@ -22,8 +22,12 @@ static void push_from(pal_proxy *proxy, const double p[3], double core)
     pal_axpy3(proxy->x, -along + sqrt(fmax(root, 0)), proxy->normal);
 }
 
-static void push_out(pal_proxy *proxy, const double *p, int n, const double *core)
+/* tissue that came closer than allowed moves the proxy, but no faster than the proxy may move tissue: one stray point
+ * must not throw it off the organ */
+static void push_out(pal_proxy *proxy, const double *p, int n, const double *core, double most_m)
 {
+    double start[3], way[3];
+    pal_copy3(start, proxy->x);
     for (int pass = 0; pass < PUSH_PASSES; pass++) {
         bool moved = false;
         for (int i = 0; i < n; i++) {
@@ -33,8 +37,13 @@ static void push_out(pal_proxy *proxy, const double *p, int n, const double *cor
             push_from(proxy, p + 3 * i, core[i]);
             moved = true;
         }
-        if (!moved) return;
+        if (!moved) break;
     }
+    pal_sub3(way, proxy->x, start);
+    double length = pal_norm3(way);
+    if (length <= most_m) return;
+    pal_copy3(proxy->x, start);
+    pal_axpy3(proxy->x, most_m / length, way);
 }
 
 /* the first point that blocks the way, and how much of the way is free */
@@ -103,7 +112,7 @@ void pal_proxy_move(pal_proxy *proxy, const double target[3], const double *p, i
         double depth = fmax(0, limits->radius_m - pal_dist3(p + 3 * i, proxy->x));
         core[i] = limits->radius_m - fmin(limits->deepest_m, depth + limits->rise_m);
     }
-    push_out(proxy, p, n, core);
+    push_out(proxy, p, n, core, limits->rise_m);
 
     pal_sub3(way, target, proxy->x);
     double wanted2 = pal_dot3(way, way), least2 = 1e-18 * limits->radius_m * limits->radius_m;

@@ -6,10 +6,24 @@
 #include <math.h>
 #include <string.h>
 
-/* |sum of normals| over the root of the sum of squares of a fan: below this its turning has no say */
-#define LEAST_NORMAL 0.2
+/* |sum of normals| over the root of the sum of squares of a fan (2.4 when flat): a frame's turning counts in full above
+ * the second and not at all below the first, where the fan is folded and turning would be a matter of chance */
+#define FOLDED 0.6
+#define OPEN   1.2
 /* tangential part of a frame's edge over its length */
-#define LEAST_TANGENT 0.05
+#define LEAST_TANGENT 0.3
+
+/* a frame's turning: X unit of N (sum of fan normals), Y unit of e - X (X.e) for one edge e, Z = X x Y */
+typedef struct pal_turn {
+    bool turns; /* false: the fan is too flat or folded to say how the frame turns */
+    int end;    /* other end of e                                                  */
+    double X[3], Z[3];
+    double part;                        /* how much of the turning counts */
+    double per_normal, per_reach, rise; /* 1/|N|, 1/|e - X (X.e)|, X.e / |e - X (X.e)| */
+} pal_turn;
+
+/* passing samples of a step, and parts that an edge is cut into for them */
+enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
 
 static double longest_edge(const pal_surface *surface, int tri)
 {
@@ -68,9 +82,13 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
 {
     size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
     size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0;
-    t->corner = PAL_NEW(arena, int32_t, 3 * (size_t)n_sample);
-    t->share = PAL_NEW(arena, float, 3 * (size_t)n_sample);
-    t->area_m2 = PAL_NEW(arena, double, t->n_point);
+    size_t n_tri = (size_t)body->surface->n_tri, room = (size_t)n_sample + PASSING_MAX;
+    t->corner = PAL_NEW(arena, int32_t, 3 * room);
+    t->share = PAL_NEW(arena, float, 3 * room);
+    t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
+    t->fan_start = PAL_NEW(arena, int32_t, n_vertex + 2);
+    t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
+    t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
     t->live = PAL_NEW(arena, int32_t, n_vertex);
     t->frame = PAL_NEW(arena, int32_t, n_frame);
     t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
@@ -82,15 +100,26 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
     t->node = PAL_NEW(arena, int32_t, n_node);
     t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
     t->node_mark = PAL_NEW(arena, uint32_t, n_node);
-    t->row_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->turning = PAL_NEW(arena, pal_turn, n_slot);
+    t->turning_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->seen = PAL_NEW(arena, uint32_t, n_vertex);
     t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
     t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
     t->force = PAL_NEW(arena, double, 3 * n_node);
-    t->row = PAL_NEW(arena, double, n_slot);
-    bool all = t->corner && t->share && t->area_m2 && t->live && t->frame && t->live_mark && t->frame_mark && t->x &&
-               t->v && t->slot && t->node && t->slot_mark && t->node_mark && t->row_mark && t->slot_force &&
-               t->slot_torque && t->force && t->row;
+    bool all = t->corner && t->share && t->area_m2 && t->fan_start && t->fan && t->tri_mark && t->live && t->frame &&
+               t->live_mark && t->frame_mark && t->x && t->v && t->slot && t->node && t->slot_mark && t->node_mark &&
+               t->slot_force && t->slot_torque && t->force && t->turning && t->turning_mark && t->tool_mark && t->seen;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static void make_fans(const pal_surface *surface, pal_touch *t)
+{
+    /* starts are built one place ahead, so that filling leaves them in place */
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) t->fan_start[surface->tri[i] + 2]++;
+    for (int i = 0; i < t->n_vertex; i++) t->fan_start[i + 2] += t->fan_start[i + 1];
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++)
+        t->fan[t->fan_start[surface->tri[i] + 1]++] = (int32_t)(i / 3);
 }
 
 pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, pal_arena *arena, pal_touch *out)
@@ -103,8 +132,11 @@ pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, 
         spacing_m *= 1.25;
         n_sample = count_samples(surface, spacing_m);
     }
-    pal_touch t = {.n_vertex = body->n_shown, .n_point = body->n_shown + (int)n_sample};
+    pal_touch t = {.n_vertex = body->n_shown, .spacing_m = spacing_m};
+    t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
+    t.most_point = t.n_fixed + PASSING_MAX;
     PAL_TRY(allocate(body, arena, (int)n_sample, &t));
+    make_fans(surface, &t);
     int k = 0;
     for (int i = 0; i < surface->n_tri; i++) {
         const int32_t *corner = surface->tri + 3 * (size_t)i;
@@ -126,6 +158,7 @@ void pal_touch_begin(pal_touch *touch)
 {
     touch->mark++;
     touch->n_live = touch->n_frame = 0;
+    touch->n_point = touch->n_fixed;
 }
 
 static void make_live(pal_touch *touch, const pal_body *body, int vertex)
@@ -152,6 +185,33 @@ static inline double distance2(const double p[3], const double a[3], const doubl
     return x * x + y * y + z * z;
 }
 
+/* passing samples for triangles at the listed vertices that were short at rest and are long now */
+static void sample_stretched(pal_touch *touch, const pal_body *body, const int32_t *list, int n)
+{
+    double spacing2 = touch->spacing_m * touch->spacing_m;
+    for (int i = 0; i < n; i++)
+        for (int k = touch->fan_start[list[i]]; k < touch->fan_start[list[i] + 1]; k++) {
+            int32_t tri = touch->fan[k];
+            const int32_t *corner = body->surface->tri + 3 * (size_t)tri;
+            if (touch->tri_mark[tri] == touch->mark) continue;
+            touch->tri_mark[tri] = touch->mark;
+            double longest2 = 0;
+            for (int c = 0; c < 3; c++) {
+                const float *p = body->shown + 3 * (size_t)corner[c],
+                            *q = body->shown + 3 * (size_t)corner[(c + 1) % 3];
+                double x = (double)(p[0] - q[0]), y = (double)(p[1] - q[1]), z = (double)(p[2] - q[2]);
+                longest2 = fmax(longest2, x * x + y * y + z * z);
+            }
+            if (!(longest2 > spacing2) || cuts(body->surface, tri, touch->spacing_m) > 1) continue;
+            int cut = (int)fmin(ceil(sqrt(longest2 / spacing2)), PASSING_CUTS);
+            if (touch->n_point + cut * cut > touch->most_point) return;
+            size_t at = (size_t)(touch->n_point - touch->n_vertex);
+            int made = sample(touch->corner + 3 * at, touch->share + 3 * at, corner, cut);
+            double area = tri_area(body->surface, tri) / made;
+            for (int j = 0; j < made; j++) touch->area_m2[touch->n_point++] = area;
+        }
+}
+
 int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3], const double b[3], double reach_m,
                       int32_t *list, double *nearest_m)
 {
@@ -175,6 +235,7 @@ int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3],
         make_live(touch, body, i);
         list[n++] = i;
     }
+    sample_stretched(touch, body, list, n);
     for (int i = touch->n_vertex; i < touch->n_point; i++) {
         const int32_t *corner = touch->corner + 3 * (size_t)(i - touch->n_vertex);
         const float *share = touch->share + 3 * (size_t)(i - touch->n_vertex);
@@ -211,22 +272,36 @@ int pal_touch_nodes(const pal_body *body, int vertex, int32_t *node, double *wei
     return n;
 }
 
-void pal_touch_update(pal_touch *touch, const pal_body *body)
+void pal_touch_forget(pal_touch *touch)
 {
+    touch->sub_step += 2;
+}
+
+void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s)
+{
+    uint32_t before = touch->sub_step++;
     if (body->skin) pal_skin_frames_of(body->skin, body->d, touch->frame, touch->n_frame, body->skin_axes);
     for (int i = 0; i < touch->n_live; i++) {
         int vertex = touch->live[i];
-        double *x = touch->x + 3 * (size_t)vertex, *v = touch->v + 3 * (size_t)vertex;
+        double *x = touch->x + 3 * (size_t)vertex, *v = touch->v + 3 * (size_t)vertex, was[3];
         int32_t node[PAL_SKIN_NEAR];
         double weight[PAL_SKIN_NEAR];
-        int n = pal_touch_nodes(body, vertex, node, weight);
+        pal_copy3(was, x);
         if (body->skin)
             pal_skin_vertex(body->skin, body->d, body->skin_axes, vertex, x);
         else
-            pal_copy3(x, body->d + 3 * (size_t)node[0]);
+            pal_copy3(x, body->d + 3 * (size_t)body->shown_node[vertex]);
+        bool followed = touch->seen[vertex] == before && before > 0;
+        touch->seen[vertex] = touch->sub_step;
+        if (followed) {
+            for (int c = 0; c < 3; c++) v[c] = (x[c] - was[c]) / touch->dt_s;
+            continue;
+        }
         pal_set3(v, 0, 0, 0);
+        int n = pal_touch_nodes(body, vertex, node, weight);
         for (int k = 0; k < n; k++) pal_axpy3(v, weight[k], body->dv + 3 * (size_t)node[k]);
     }
+    touch->dt_s = dt_s;
 }
 
 /* corners of a point and their shares; returns how many */
@@ -310,52 +385,6 @@ static int slot_node(const pal_body *body, int slot)
     return body->skin ? body->skin->frame[slot] : slot;
 }
 
-void pal_touch_row_begin(pal_touch *touch)
-{
-    touch->row_turn++;
-}
-
-void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double stiffness_N_m)
-{
-    int32_t vertex[3], slot[PAL_SKIN_NEAR];
-    double share[3], weight[PAL_SKIN_NEAR];
-    int n = corners(touch, point, vertex, share);
-    for (int c = 0; c < n; c++) {
-        int m = slots(body, vertex[c], slot, weight);
-        for (int k = 0; k < m; k++) {
-            int32_t i = slot[k];
-            if (touch->row_mark[i] != touch->row_turn) {
-                touch->row_mark[i] = touch->row_turn;
-                touch->row[i] = 0;
-            }
-            touch->row[i] += stiffness_N_m * share[c] * weight[k];
-        }
-    }
-}
-
-double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int point, double alpha_per_dt2)
-{
-    int32_t vertex[3], slot[PAL_SKIN_NEAR];
-    double share[3], weight[PAL_SKIN_NEAR], scale = 1;
-    int n = corners(touch, point, vertex, share);
-    for (int c = 0; c < n; c++) {
-        int m = slots(body, vertex[c], slot, weight);
-        for (int k = 0; k < m; k++) {
-            int node = slot_node(body, slot[k]);
-            if (body->held[node] || share[c] * weight[k] == 0) continue;
-            double most = alpha_per_dt2 * body->mass_kg[node], row = touch->row[slot[k]];
-            if (row * scale > most) scale = most / row;
-        }
-    }
-    return scale;
-}
-
-void pal_touch_force_begin(pal_touch *touch)
-{
-    touch->turn++;
-    touch->n_slot = touch->n_node = 0;
-}
-
 /* R_i w_i o_i, the lever of a skinned vertex in frame k of its five */
 static void lever(const pal_body *body, int vertex, int k, double arm[3])
 {
@@ -365,6 +394,12 @@ static void lever(const pal_body *body, int vertex, int k, double arm[3])
     for (int c = 0; c < 3; c++)
         arm[c] = (double)coef[0] * (double)axes[c] + (double)coef[1] * (double)axes[4 + c] +
                  (double)coef[2] * (double)axes[8 + c];
+}
+
+void pal_touch_force_begin(pal_touch *touch)
+{
+    touch->turn++;
+    touch->n_slot = touch->n_node = 0;
 }
 
 void pal_touch_push(pal_touch *touch, const pal_body *body, int point, const double force_N[3])
@@ -403,33 +438,17 @@ static void add_force(pal_touch *touch, int node, double scale, const double for
     pal_axpy3(f, scale, force_N);
 }
 
-/* the tangential part e - X (X.e) of a frame's first edge, or of its second where the first is too steep; its other
- * end, or -1 */
-static int tangent_edge(const pal_body *body, int slot, const double X[3], double edge[3], double tangent[3])
+/* X, Z and the edge of a frame at the present positions; kept for the sub-step */
+static const pal_turn *turning(pal_touch *touch, const pal_body *body, int slot)
 {
-    const double *o = body->d + 3 * (size_t)body->skin->frame[slot];
-    for (int k = 0; k < 2; k++) {
-        int end = body->skin->frame_edge[2 * (size_t)slot + (size_t)k];
-        if (end < 0) break;
-        pal_sub3(edge, body->d + 3 * (size_t)end, o);
-        pal_copy3(tangent, edge);
-        pal_axpy3(tangent, -pal_dot3(edge, X), X);
-        if (pal_dot3(tangent, tangent) > LEAST_TANGENT * LEAST_TANGENT * pal_dot3(edge, edge)) return end;
-    }
-    return -1;
-}
-
-/* The torque on a frame as forces on the nodes around it: the transpose of how X (unit of N = sum of fan normals) and Y
- * (unit of an edge's part normal to X) turn. With spin w = X x X' + (Y'.Z) X the torque's work is
- * (t x X).X' + (t.X) Y'.Z, where Y'.Z = (Z.e' - (e.X) Z.X') / |e_t| and X' = (1 - X X^T) N' / |N|. */
-static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const double torque[3])
-{
+    pal_turn *t = &touch->turning[slot];
+    if (touch->turning_mark[slot] == touch->sub_step) return t;
+    touch->turning_mark[slot] = touch->sub_step;
     const pal_skin *skin = body->skin;
-    int node = skin->frame[slot];
-    const double *o = body->d + 3 * (size_t)node;
-    double N[3] = {0}, squares = 0, X[3], Y[3], Z[3], edge[3], tangent[3], h[3], f[3];
-    size_t first = (size_t)skin->fan_start[slot], past = (size_t)skin->fan_start[slot + 1];
-    for (size_t i = first; i < past; i++) {
+    const double *o = body->d + 3 * (size_t)skin->frame[slot];
+    double N[3] = {0}, squares = 0;
+    t->turns = false;
+    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
         double a[3], b[3];
         pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
         pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
@@ -438,48 +457,192 @@ static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const d
         squares += pal_dot3(a, a);
     }
     double length = pal_norm3(N);
-    if (!(length * length > LEAST_NORMAL * LEAST_NORMAL * squares) || !pal_unit3(X, N, 0)) return;
-    int end = tangent_edge(body, slot, X, edge, tangent);
-    if (end < 0) return;
-    double reach = pal_norm3(tangent), twist = pal_dot3(torque, X) / reach;
-    pal_scale3(Y, 1 / reach, tangent);
-    pal_cross3(Z, X, Y);
+    t->part = fmin(1, (length / sqrt(squares) - FOLDED) / (OPEN - FOLDED));
+    if (!(t->part > 0) || !pal_unit3(t->X, N, 0)) return t;
+    t->per_normal = 1 / length;
+    for (int k = 0; k < 2 && !t->turns; k++) {
+        double edge[3], tangent[3];
+        t->end = skin->frame_edge[2 * (size_t)slot + (size_t)k];
+        if (t->end < 0) break;
+        pal_sub3(edge, body->d + 3 * (size_t)t->end, o);
+        double up = pal_dot3(edge, t->X);
+        pal_copy3(tangent, edge);
+        pal_axpy3(tangent, -up, t->X);
+        double reach = pal_norm3(tangent);
+        if (!(reach > LEAST_TANGENT * pal_norm3(edge))) continue;
+        pal_cross3(t->Z, t->X, tangent);
+        pal_scale3(t->Z, 1 / reach, t->Z);
+        t->per_reach = 1 / reach;
+        t->rise = up / reach;
+        t->turns = true;
+    }
+    return t;
+}
 
+/* The torque on a frame as forces on the nodes around it: the transpose of its spin. With
+ *     spin = X x X' + (Y'.Z) X,  X' = (1 - X X^T) N' / |N|,  Y'.Z = (Z.e' - (e.X) Z.X') / |e_t|
+ * the torque's work is (t x X).X' + (t.X) Y'.Z. */
+static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const double torque[3])
+{
+    const pal_turn *t = turning(touch, body, slot);
+    if (!t->turns) return;
+    const pal_skin *skin = body->skin;
+    int node = skin->frame[slot];
+    const double *o = body->d + 3 * (size_t)node;
+    double twist = t->part * pal_dot3(torque, t->X), h[3], f[3], sum[3];
     /* the edge's own part of the twist about X */
-    add_force(touch, end, twist, Z);
-    add_force(touch, node, -twist, Z);
+    pal_scale3(sum, -twist * t->per_reach, t->Z);
+    add_force(touch, t->end, twist * t->per_reach, t->Z);
     /* the rest tilts the normal */
-    pal_cross3(h, torque, X);
-    pal_axpy3(h, -twist * pal_dot3(edge, X), Z);
-    pal_axpy3(h, -pal_dot3(h, X), X);
-    pal_scale3(h, 1 / length, h);
-    for (size_t i = first; i < past; i++) {
+    pal_cross3(h, torque, t->X);
+    pal_scale3(h, t->part, h);
+    pal_axpy3(h, -twist * t->rise, t->Z);
+    pal_axpy3(h, -pal_dot3(h, t->X), t->X);
+    pal_scale3(h, t->per_normal, h);
+    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
         double a[3], b[3];
         pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
         pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
         pal_cross3(f, b, h);
         add_force(touch, skin->fan[2 * i], 1, f);
-        add_force(touch, node, -1, f);
+        pal_sub3(sum, sum, f);
         pal_cross3(f, h, a);
         add_force(touch, skin->fan[2 * i + 1], 1, f);
-        add_force(touch, node, -1, f);
+        pal_sub3(sum, sum, f);
+    }
+    add_force(touch, node, 1, sum);
+}
+
+/* spin of a frame when its nodes move with v = force / mass, held nodes not at all */
+static void spin_frame(pal_touch *touch, const pal_body *body, int slot, const double *v, double spin[3])
+{
+    const pal_turn *t = turning(touch, body, slot);
+    pal_set3(spin, 0, 0, 0);
+    if (!t->turns) return;
+    const pal_skin *skin = body->skin;
+    size_t node = (size_t)skin->frame[slot];
+    const double *o = body->d + 3 * node, *ov = v + 3 * node;
+    double N[3] = {0}, e[3];
+    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
+        double a[3], b[3], av[3], bv[3];
+        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
+        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
+        pal_sub3(av, v + 3 * (size_t)skin->fan[2 * i], ov);
+        pal_sub3(bv, v + 3 * (size_t)skin->fan[2 * i + 1], ov);
+        pal_cross3(av, av, b);
+        pal_cross3(bv, a, bv);
+        pal_add3(N, N, av);
+        pal_add3(N, N, bv);
+    }
+    pal_axpy3(N, -pal_dot3(N, t->X), t->X);
+    pal_scale3(N, t->per_normal, N);
+    pal_sub3(e, v + 3 * (size_t)t->end, ov);
+    pal_cross3(spin, t->X, N);
+    pal_axpy3(spin, pal_dot3(t->Z, e) * t->per_reach - t->rise * pal_dot3(t->Z, N), t->X);
+    pal_scale3(spin, t->part, spin);
+}
+
+static void to_nodes(pal_touch *touch, const pal_body *body)
+{
+    for (int i = 0; i < touch->n_slot; i++) {
+        int slot = touch->slot[i];
+        add_force(touch, slot_node(body, slot), 1, touch->slot_force + 3 * (size_t)slot);
+        if (body->skin) turn_frame(touch, body, slot, touch->slot_torque + 3 * (size_t)slot);
     }
 }
 
 double pal_touch_gather(pal_touch *touch, const pal_body *body)
 {
     double largest2 = 0;
-    for (int i = 0; i < touch->n_slot; i++) {
-        int slot = touch->slot[i];
-        add_force(touch, slot_node(body, slot), 1, touch->slot_force + 3 * (size_t)slot);
-        if (body->skin) turn_frame(touch, body, slot, touch->slot_torque + 3 * (size_t)slot);
-    }
+    to_nodes(touch, body);
     for (int i = 0; i < touch->n_node; i++) {
         const double *f = touch->force + 3 * (size_t)touch->node[i];
         largest2 = fmax(largest2, pal_dot3(f, f));
     }
     double cap = body->load_cap_N;
     return cap > 0 && largest2 > cap * cap ? cap / sqrt(largest2) : 1;
+}
+
+/* motion of a point along `away` when the nodes move with v and the frames with the spins in slot_torque */
+static double point_motion(const pal_touch *touch, const pal_body *body, const pal_contact *contact, const double *v)
+{
+    int32_t vertex[3], slot[PAL_SKIN_NEAR];
+    double share[3], weight[PAL_SKIN_NEAR], sum = 0;
+    int n = corners(touch, contact->point, vertex, share);
+    for (int c = 0; c < n; c++) {
+        int m = slots(body, vertex[c], slot, weight);
+        for (int k = 0; k < m; k++) {
+            double arm[3], turned[3];
+            sum += share[c] * weight[k] * pal_dot3(contact->away, v + 3 * (size_t)slot_node(body, slot[k]));
+            if (!body->skin) continue;
+            lever(body, vertex[c], k, arm);
+            pal_cross3(turned, touch->slot_torque + 3 * (size_t)slot[k], arm);
+            sum += share[c] * pal_dot3(contact->away, turned);
+        }
+    }
+    return sum;
+}
+
+double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_contact *contact, int n)
+{
+    enum { PASSES = 2, MOST = 256 };
+    /* a patch of very many points is judged by a part of them, each standing for several */
+    int stride = (n + MOST - 1) / MOST, m = 0;
+    double motion[MOST], rate = 0, k_step = stride;
+    for (int i = 0; i < n; i += stride) motion[m++] = 1;
+    for (int pass = 0; pass < PASSES && m > 0; pass++) {
+        double with = 0, before = 0, f[3];
+        /* forces of the present motion, then accelerations */
+        pal_touch_force_begin(touch);
+        for (int i = 0; i < m; i++) {
+            const pal_contact *c = &contact[i * stride];
+            pal_scale3(f, k_step * c->k_N_m * motion[i], c->away);
+            pal_touch_push(touch, body, c->point, f);
+        }
+        to_nodes(touch, body);
+        for (int i = 0; i < touch->n_node; i++) {
+            int node = touch->node[i];
+            pal_scale3(touch->force + 3 * (size_t)node, body->held[node] ? 0 : 1 / body->mass_kg[node],
+                       touch->force + 3 * (size_t)node);
+        }
+        for (int i = 0; i < touch->n_slot && body->skin; i++) {
+            int slot = touch->slot[i];
+            spin_frame(touch, body, slot, touch->force, touch->slot_torque + 3 * (size_t)slot);
+        }
+        /* what the points do then: a Rayleigh quotient in the norm of k */
+        for (int i = 0; i < m; i++) {
+            const pal_contact *c = &contact[i * stride];
+            double next = point_motion(touch, body, c, touch->force);
+            with += c->k_N_m * next * next;
+            before += c->k_N_m * motion[i] * motion[i];
+            motion[i] = next;
+        }
+        rate = before > 0 ? sqrt(with / before) : 0;
+        double scale = rate > 0 ? 1 / rate : 0;
+        for (int i = 0; i < m; i++) motion[i] *= scale;
+    }
+    return rate;
+}
+
+bool pal_touch_share(pal_touch *touch, const pal_body *body, const pal_contact *a, int n_a, const pal_contact *b,
+                     int n_b)
+{
+    int32_t vertex[3], slot[PAL_SKIN_NEAR];
+    double share[3], weight[PAL_SKIN_NEAR];
+    touch->turn++;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < (pass ? n_b : n_a); i++) {
+            int n = corners(touch, (pass ? b : a)[i].point, vertex, share);
+            for (int c = 0; c < n; c++) {
+                int m = slots(body, vertex[c], slot, weight);
+                for (int k = 0; k < m; k++)
+                    if (pass == 0)
+                        touch->tool_mark[slot[k]] = touch->turn;
+                    else if (touch->tool_mark[slot[k]] == touch->turn)
+                        return true;
+            }
+        }
+    return false;
 }
 
 void pal_touch_apply(const pal_touch *touch, pal_body *body, double scale)

@@ -1,9 +1,10 @@
 /* What a tool can touch: contact points of a body's shown surface, followed in every sub-step.
  *
  * The points are all shown vertices and, where a triangle is longer than `spacing`, samples inside it, so that a sphere
- * never slips through a coarse mesh. A step first collects the vertices near the tools from body->shown (the last
- * OUTPUT); each sub-step then re-evaluates only those from the nodes. A force on a point goes to the nodes by its skin
- * weights, normalised to sum 1 in double precision, so that the nodes bear exactly the force that the tool gives.
+ * never slips through a coarse mesh: fixed ones for triangles that are long at rest, and in each step passing ones for
+ * triangles near a tool that are stretched. A step first collects the vertices near the tools from body->shown (the
+ * last OUTPUT); each sub-step then re-evaluates only those from the nodes. A force on a point goes to the nodes by its
+ * skin weights, normalised to sum 1 in double precision, so that the nodes bear exactly the force that the tool gives.
  *
  * A skinned point p = sum w_i (x_i + R_i o_i) also moves when the frames R_i turn, and they turn with the faces around
  * their nodes. Forces go back by the exact transpose of that: w_i f on the node, and the torque w_i (R_i o_i) x f on
@@ -16,50 +17,70 @@
 #include "server/sim/tools.h"
 
 typedef struct pal_touch {
-    int n_vertex, n_point; /* points [0, n_vertex) are the shown vertices, the rest samples                 */
-    int32_t *corner;       /* shown vertices of each sample          [n_point - n_vertex][3]               */
-    float *share;          /* their shares, sum 1                    [n_point - n_vertex][3]               */
-    double *area_m2;       /* rest area that each point stands for   [n_point]                             */
+    int n_vertex, n_fixed;   /* points [0, n_vertex) are the shown vertices, up to n_fixed fixed samples,     */
+    int n_point, most_point; /* up to n_point passing samples of this step; room for most_point            */
+    double spacing_m;
+    int32_t *corner;          /* shown vertices of each sample          [most_point - n_vertex][3]               */
+    float *share;             /* their shares, sum 1                    [most_point - n_vertex][3]               */
+    double *area_m2;          /* rest area that each point stands for   [most_point]                             */
+    int32_t *fan_start, *fan; /* triangles around shown vertices        [n_vertex+1] [3 n_tri]                   */
+    uint32_t *tri_mark;       /* sampled in this step                   [n_tri]                                  */
 
     /* this step's live part: vertices and frames near some tool */
     int n_live, n_frame;
     int32_t *live, *frame;                  /* [n_live] [n_frame]                                      */
     uint32_t *live_mark, *frame_mark, mark; /* a vertex or frame is live when its mark is `mark`       */
+    uint32_t *seen;                         /* sub-step in which x was last written [n_vertex]         */
     double *x, *v;                          /* of live vertices, by vertex: m, m/s [n_vertex][3] each  */
 
-    /* forces of one tool at a time, on slots (frames of the skin, or nodes without one), then on nodes; row sums of all
-     * tools of a sub-step on slots */
-    int n_slot, n_node, n_row;
+    /* forces of one tool at a time, on slots (frames of the skin, or nodes without one), then on nodes */
+    int n_slot, n_node;
     int32_t *slot, *node; /* in use [n_slot] [n_node] */
-    uint32_t *slot_mark, *node_mark, *row_mark, turn, row_turn;
-    double *slot_force, *slot_torque; /* N, Nm, by slot           [slots][3] each  */
-    double *force;                    /* N, by node               [body n_node][3] */
-    double *row;                      /* sum of stiffness times weight, N/m [slots] */
+    uint32_t *slot_mark, *node_mark, turn;
+    double *slot_force, *slot_torque; /* N, Nm, by slot [slots][3] each  */
+    double *force;                    /* N, by node     [body n_node][3] */
+    /* how a slot's frame turns with its fan, at the present sub-step; by slot */
+    struct pal_turn *turning; /* [slots] */
+    uint32_t *turning_mark, sub_step, *tool_mark;
+    double dt_s; /* of the sub-step before */
 } pal_touch;
+
+/* one point that a tool presses */
+typedef struct pal_contact {
+    int32_t point;
+    double x[3], away[3]; /* its place; unit, from the tool's centre to it */
+    double depth_m, k_N_m;
+    double force[3]; /* on the point */
+} pal_contact;
 
 /* points, at most most_sample samples (spacing grows to keep to it); body must show something; MEMORY, REFUSED */
 pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, pal_arena *arena, pal_touch *out);
 
 /* a new step: nothing is live */
 void pal_touch_begin(pal_touch *touch);
+/* the body jumped (reset): velocities start anew */
+void pal_touch_forget(pal_touch *touch);
 /* adds the points of body->shown within reach_m of the segment a..b (body frame) to the live part and writes them to
- * list [n_point], ascending; returns how many; *nearest_m is the least distance found (reach_m when none) */
+ * list [most_point], ascending; returns how many; *nearest_m is the least distance found (reach_m when none) */
 int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3], const double b[3], double reach_m,
                       int32_t *list, double *nearest_m);
-/* positions and velocities of the live vertices at the body's current state; frames of a skin are brought up to date
- * where live */
-void pal_touch_update(pal_touch *touch, const pal_body *body);
+/* positions and velocities of the live vertices at the body's current state, in a sub-step of dt_s; frames of a skin
+ * are brought up to date where live. A velocity is the way since the sub-step before over its time, which for a
+ * symplectic step is exactly that of the nodes, turning of frames included. */
+void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s);
 void pal_touch_point(const pal_touch *touch, int point, double x[3]);
 void pal_touch_velocity(const pal_touch *touch, int point, double v[3]);
 
 /* the shown vertex nearest to p (all are looked at) and the unit normal of the shown surface there; false: none */
 bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], int *vertex, double normal[3]);
 
-/* explicit stability in a sub-step (numerics.md part 3): rows are summed over every point pressed, and a point's
- * stiffness is scaled by the least over its free nodes of most / row, most = alpha m / dt^2 */
-void pal_touch_row_begin(pal_touch *touch);
-void pal_touch_row_add(pal_touch *touch, const pal_body *body, int point, double stiffness_N_m);
-double pal_touch_row_scale(const pal_touch *touch, const pal_body *body, int point, double alpha_per_dt2);
+/* Explicit stability in a sub-step (numerics.md part 3): the largest eigenvalue of M^-1 sum k J' J over the contacts,
+ * J being a point's motion along `away` with the free nodes, 1/s^2. Two power iterations from a uniform push, which is
+ * nearly the vector looked for, since all points are pushed the same way. */
+double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_contact *contact, int n);
+/* true when two lists of contacts press on some common slot */
+bool pal_touch_share(pal_touch *touch, const pal_body *body, const pal_contact *a, int n_a, const pal_contact *b,
+                     int n_b);
 
 /* forces of one tool: begin, push every point, gather them on nodes, then apply scale times all of it to body->load */
 void pal_touch_force_begin(pal_touch *touch);

@@ -3,11 +3,12 @@
  * The surface that is touched is the one that is seen (skinned), not the staircase of voxels below it (sim/touch.h).
  * A proxy of the tool stays on the side it came from (sim/proxy.h). A contact point within the proxy's sphere, at depth
  * d, is pushed straight away from the proxy's centre with
- *     f = k (d - dt v_away),   k = stiffness_Pa_m * area,
- * v_away being the tissue's own speed away from the proxy: stiffness and damping k dt, as a linearly implicit spring
- * would have them. Row sums at every free node stay below alpha m / dt^2 (alpha 0.5): together with the solver's own
- * limit, dt^2 K <= m, symplectic steps stay stable (a + 2 b < 4 with a <= 1.5, b <= 0.5). The sum of all forces is
- * shortened to the tool's cap, and in its first and last 10 steps by its ramp. The opposite force acts on the tool.
+ *     f = k (d - dt/2 v_away),   k = stiffness_Pa_m * area,
+ * v_away being the tissue's own speed away from the proxy. The largest eigenvalue of contact stiffness over mass is
+ * kept below alpha / dt^2, alpha 1.2, by a common factor on k (touch.h). With a and b the ratios of stiffness and
+ * damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4; the solver's own limit leaves a <= 1 to
+ * the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the tool's cap, and in its
+ * first and last 10 steps by its ramp. The opposite force acts on the tool.
  *
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
@@ -24,17 +25,13 @@
 #include <math.h>
 #include <string.h>
 
-#define ALPHA         0.5
+#define ALPHA         1.2
+#define GAMMA         0.5
+#define SAFETY        1.3
+#define SHARE_RISE    1.01
 #define DEEPEST_RADII 0.5
 #define BLOB_COSINE   0.5
 enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10 };
-
-typedef struct contact {
-    int32_t point;
-    double x[3], away[3]; /* its place; unit, from proxy to point */
-    double depth_m, k_N_m;
-    double force[3]; /* on the point */
-} contact;
 
 /* one tool as this body feels it */
 typedef struct holder {
@@ -42,12 +39,13 @@ typedef struct holder {
     pal_proxy proxy;
     double ease;     /* 0..1: rises after the proxy was seated */
     double behind_s; /* for how long it has been far behind    */
-    int32_t *list;   /* contact points near in this step [n_point] */
+    int32_t *list;   /* contact points near in this step [most_point] */
     int n_list;
     double nearest_m; /* from the tool's way to the nearest point at the start of the step */
     pal_proxy_limits limits;
-    contact *contact; /* [CONTACT_MAX] */
+    pal_contact *contact; /* [CONTACT_MAX] */
     int n_contact;
+    double share;    /* of the stiffness that is stable; falls at once, rises slowly */
     double total[3]; /* on the tool, this sub-step, this body */
     pal_patches patches;
 } holder;
@@ -89,8 +87,10 @@ static void reset(void *self, const pal_body *body)
 {
     tool_push *push = self;
     (void)body;
+    pal_touch_forget(&push->touch);
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].active = false;
+        push->holder[t].share = 1;
         pal_patches_reset(&push->holder[t].patches, push->body_index * 1024);
     }
 }
@@ -128,10 +128,10 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!(least_m > 0 && isfinite(least_m))) least_m = 0.04 * build->body->size_m;
     /* the proxy keeps half a radius away from every point: points half a radius apart leave no hole for it */
     PAL_TRY(pal_touch_make(build->body, DEEPEST_RADII * least_m, SAMPLE_MAX, build->arena, &push->touch));
-    size_t n_point = (size_t)push->touch.n_point;
+    size_t n_point = (size_t)push->touch.most_point;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].list = PAL_NEW(build->arena, int32_t, n_point);
-        push->holder[t].contact = PAL_NEW(build->arena, contact, CONTACT_MAX);
+        push->holder[t].contact = PAL_NEW(build->arena, pal_contact, CONTACT_MAX);
         if (!push->holder[t].list || !push->holder[t].contact) return PAL_ERR_MEMORY;
     }
     /* positions and allowed distances of one tool's points */
@@ -207,7 +207,7 @@ static void find_contacts(const tool_push *push, holder *h, const double *x)
         pal_sub3(w, x + 3 * i, h->proxy.x);
         double d2 = pal_dot3(w, w);
         if (!(d2 < radius * radius) || push->touch.area_m2[h->list[i]] <= 0) continue;
-        contact *c = &h->contact[h->n_contact++];
+        pal_contact *c = &h->contact[h->n_contact++];
         double distance = sqrt(d2);
         c->point = h->list[i];
         pal_copy3(c->x, x + 3 * i);
@@ -238,11 +238,11 @@ static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step 
 }
 
 /* force on one contact point: penalty with damping, and Coulomb friction with a viscous core */
-static void contact_force(const tool_push *push, const holder *h, contact *c, double k, double dt_s)
+static void contact_force(const tool_push *push, const holder *h, pal_contact *c, double k, double dt_s)
 {
     double v[3];
     pal_touch_velocity(&push->touch, c->point, v);
-    double away = pal_dot3(v, c->away), f = k * (c->depth_m - dt_s * away);
+    double away = pal_dot3(v, c->away), f = k * (c->depth_m - GAMMA * dt_s * away);
     pal_set3(c->force, 0, 0, 0);
     if (!(f > 0)) return;
     pal_scale3(c->force, f, c->away);
@@ -251,20 +251,37 @@ static void contact_force(const tool_push *push, const holder *h, contact *c, do
     pal_sub3(slide, v, h->proxy.v);
     pal_axpy3(slide, -pal_dot3(slide, c->away), c->away);
     double speed = pal_norm3(slide);
-    if (speed > 0) pal_axpy3(c->force, -fmin(k * dt_s, push->friction * f / speed), slide);
+    if (speed > 0) pal_axpy3(c->force, -fmin(GAMMA * k * dt_s, push->friction * f / speed), slide);
+}
+
+/* how much of the asked stiffness a tool may have in this sub-step */
+static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
+{
+    holder *h = &push->holder[tool];
+    if (h->n_contact == 0) return;
+    int n_share = 1;
+    for (int t = 0; t < n_tool; t++) {
+        const holder *other = &push->holder[t];
+        if (t == tool || other->n_contact == 0 || pal_dist3(other->proxy.x, h->proxy.x) > 0.5 * step->body->size_m)
+            continue;
+        n_share +=
+            pal_touch_share(&push->touch, step->body, h->contact, h->n_contact, other->contact, other->n_contact);
+    }
+    double rate = SAFETY * n_share * pal_touch_stiffest(&push->touch, step->body, h->contact, h->n_contact);
+    double most = ALPHA / (step->dt_s * step->dt_s), share = rate > most ? most / rate : 1;
+    h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
 }
 
 /* forces of one tool to the nodes and back */
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    double alpha = ALPHA / (step->dt_s * step->dt_s), soft = tool->ramp * h->ease, sum[3] = {0};
+    double soft = tool->ramp * h->ease * h->share, sum[3] = {0};
     if (h->n_contact == 0 || soft <= 0) return;
     pal_touch_force_begin(&push->touch);
     for (int i = 0; i < h->n_contact; i++) {
-        contact *c = &h->contact[i];
-        double k = soft * c->k_N_m * pal_touch_row_scale(&push->touch, body, c->point, alpha);
-        contact_force(push, h, c, k, step->dt_s);
+        pal_contact *c = &h->contact[i];
+        contact_force(push, h, c, soft * c->k_N_m, step->dt_s);
         pal_touch_push(&push->touch, body, c->point, c->force);
         pal_add3(sum, sum, c->force);
     }
@@ -370,15 +387,10 @@ static pal_err run(void *self, pal_step *step)
         pal_touch_begin(&push->touch);
         for (int t = 0; t < n_tool; t++) begin_tool(push, &push->holder[t], &tools->tool[t], step);
     }
-    if (push->touch.n_live > 0) pal_touch_update(&push->touch, step->body);
+    pal_touch_update(&push->touch, step->body, step->dt_s);
     for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
 
-    /* every tool's stiffness counts before any force is given */
-    pal_touch_row_begin(&push->touch);
-    for (int t = 0; t < n_tool; t++)
-        for (int i = 0; i < push->holder[t].n_contact; i++)
-            pal_touch_row_add(&push->touch, step->body, push->holder[t].contact[i].point,
-                              push->holder[t].contact[i].k_N_m);
+    for (int t = 0; t < n_tool; t++) find_share(push, t, n_tool, step);
     for (int t = 0; t < n_tool; t++) press(push, &push->holder[t], &tools->tool[t], step);
     if (step->sub == step->n_sub - 1)
         for (int t = 0; t < n_tool; t++) publish(push, &push->holder[t], &tools->tool[t], step);
