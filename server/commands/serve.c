@@ -138,9 +138,9 @@ static pal_err open_server(serve_run *run, pal_note *note)
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .most_clients = run->config.most_clients};
+    PAL_TRY(pal_server_open(&options, run->session, run->n, note, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");
-    PAL_TRY(pal_server_open(&options, run->session, run->n, note, &run->server));
     pal_server_connect(run->server, run->gate);
     return PAL_ERR_OK;
 }

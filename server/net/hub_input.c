@@ -57,7 +57,7 @@ static void say_hello(pal_hub *hub, pal_client *c)
     hub->control->type = PAL_CONTROL_HELLO;
     pal_stream_hello(c->room->stream, hello);
     hello->credit = (uint32_t)c->credit.most;
-    hello->you_id = (uint16_t)m->id;
+    hello->you_id = pal_stream_wire_id(m->id);
     hello->you_role = (pal_wire_role)m->role;
     hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;
     pal_plain_text(hello->you_name, sizeof hello->you_name, m->name);

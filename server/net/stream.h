@@ -56,6 +56,8 @@ typedef struct pal_stream_tool {
     uint64_t taken_ns; /* pal_clock_ns when the holder took it: older poses are not his to echo     */
 } pal_stream_tool;
 
+/* member ids grow for ever, on the wire they have 16 bits; 0 stays 0 */
+uint16_t pal_stream_wire_id(int member);
 /* takes the session's newest frame, if there is a new one, and makes a cycle of it: encodes the tiers of which used[]
  * is true, tools, contact models. false: nothing new. */
 bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],

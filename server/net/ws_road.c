@@ -326,6 +326,8 @@ static void accept_all(pal_transport *t)
 static int listen_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
 {
     (void)own, (void)in, (void)n_byte;
+    /* a protocol of ours, not a subprotocol to ask for */
+    if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return deny(wsi, 403);
     if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(road_of(wsi));
     return 0;
 }
@@ -420,7 +422,7 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
     info.protocols = protocols;
     info.user = t;
     info.timeout_secs = 5;
-    info.keepalive_timeout = 10;
+    info.keepalive_timeout = 7;
     info.retry_and_idle_policy = &alive;
     t->vhost = lws_create_vhost(pal_loop_context(loop), &info);
     lws_sock_file_fd_type fd = {.filefd = t->listen_fd};

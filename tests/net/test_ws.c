@@ -1,0 +1,417 @@
+/* The websocket road over real sockets: who may upgrade, what HTTP serves, and hostile, slow and silent peers. */
+#include "protocol/asset.h"
+#include "protocol/control.h"
+#include "protocol/frame_codec.h"
+#include "server/net/server.h"
+#include "tests/net/raw_client.h"
+#include "tests/net/small_scene.h"
+
+#include <pthread.h>
+
+#define JOIN    "{\"type\":\"join\",\"name\":\"Ada\",\"role\":\"trainee\",\"tool\":-1}"
+#define WATCH   "{\"type\":\"join\",\"name\":\"Vera\",\"role\":\"viewer\",\"tool\":null}"
+#define PALPATE "Sec-WebSocket-Protocol: palpate.v1\r\n"
+
+static small_scene organ;
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pthread_t net;
+static int port;
+static char folder[] = "/tmp/palpate_ws_XXXXXX";
+static char head[8192];
+
+static void *net_main(void *user)
+{
+    pal_err *err = user;
+    *err = pal_server_run(server);
+    return NULL;
+}
+
+static pal_err net_err;
+
+static void begin(void)
+{
+    pal_note note = {""};
+    gate = pal_server_gate_create();
+    pal_session_options options = {.wake = pal_server_gate_wake, .user = gate};
+    pal_server_options net_options = {.port = 0, .viewer_folder = folder};
+    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_server_open(&net_options, &session, 1, &note, &server)) {
+        CHECK_FAIL("no server: %s", note.text);
+        exit(1);
+    }
+    pal_server_connect(server, gate);
+    port = pal_server_port(server);
+    pthread_create(&net, NULL, net_main, &net_err);
+}
+
+static void end(void)
+{
+    pal_server_stop(server);
+    pthread_join(net, NULL);
+    CHECK_INT(net_err, PAL_ERR_OK);
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+}
+
+static int get(const char *path, const char *extra, char *body, size_t cap, size_t *n)
+{
+    char request[1024];
+    snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n%s\r\n", path, port, extra);
+    return raw_request(port, request, head, sizeof head, body, cap, n);
+}
+
+static int joined(const char *join)
+{
+    int status, fd = raw_upgrade(port, "/ws", PALPATE, head, sizeof head, &status);
+    CHECK_INT(status, 101);
+    raw_text(fd, join);
+    return fd;
+}
+
+static bool still_serves(void)
+{
+    return get("/healthz", "", NULL, 0, NULL) == 200;
+}
+
+static void upgrade_needs_the_subprotocol_the_path_and_the_own_origin(void)
+{
+    char own[128];
+    snprintf(own, sizeof own, PALPATE "Origin: http://127.0.0.1:%d\r\n", port);
+    const struct {
+        const char *path, *extra;
+        int status; /* 0: closed without an answer, which is how the library refuses an unknown name */
+    } kind[] = {{"/ws", PALPATE, 101},
+                {"/ws?session=small", PALPATE, 101},
+                {"/ws", own, 101},
+                {"/ws", "Sec-WebSocket-Protocol: chat, palpate.v1\r\n", 101},
+                {"/ws", "", 403},
+                {"/ws", "Sec-WebSocket-Protocol: palpate.v2\r\n", 0},
+                {"/ws", "Sec-WebSocket-Protocol: http\r\n", 403},
+                {"/ws", "Sec-WebSocket-Protocol: palpate-listen\r\n", 403},
+                {"/", PALPATE, 403},
+                {"/wss", PALPATE, 403},
+                {"/ws", PALPATE "Origin: http://evil.example\r\n", 403},
+                {"/ws", PALPATE "Origin: null\r\n", 403},
+                {"/ws", PALPATE "Origin: http://127.0.0.1\r\n", 403}};
+    for (size_t i = 0; i < sizeof kind / sizeof *kind; i++) {
+        int status, fd = raw_upgrade(port, kind[i].path, kind[i].extra, head, sizeof head, &status);
+        check_count++;
+        if (status != kind[i].status)
+            CHECK_FAIL("%s with \"%.60s\": status %d, wanted %d", kind[i].path, kind[i].extra, status, kind[i].status);
+        if (status == 101) CHECK(strstr(head, "palpate.v1") && !strstr(head, "permessage-deflate"));
+        if (status != 101) CHECK(raw_ended(fd));
+        close(fd);
+    }
+    /* a foreign name that resolves to this machine */
+    int fd = raw_connect(port);
+    raw_say(fd,
+            "GET /ws HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\nConnection: Upgrade\r\n"
+            "Upgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" PALPATE
+            "\r\n");
+    CHECK_INT(raw_head(fd, head, sizeof head), 403);
+    close(fd);
+    CHECK(still_serves());
+}
+
+static void deflate_is_never_agreed_on(void)
+{
+    int status, fd = raw_upgrade(port, "/ws", PALPATE "Sec-WebSocket-Extensions: permessage-deflate\r\n", head,
+                                 sizeof head, &status);
+    CHECK_INT(status, 101);
+    CHECK(strcasestr(head, "extensions") == NULL);
+    close(fd);
+}
+
+static void other_upgrades_leave_the_server_well(void)
+{
+    static const char *const wanted[] = {"h2c", "TLS/1.0", "websocket, h2c", "", "nonsense"};
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        char request[512];
+        snprintf(request, sizeof request,
+                 "GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: %s\r\n"
+                 "HTTP2-Settings: AAMAAABkAAQCAAAAAAIAAAAA\r\n\r\n",
+                 port, wanted[i]);
+        int fd = raw_connect(port);
+        raw_say(fd, request);
+        raw_head(fd, head, sizeof head);
+        raw_say(fd, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n");
+        CHECK(still_serves());
+        close(fd);
+    }
+}
+
+static void files_have_type_tag_and_policy(void)
+{
+    char body[4096], tag[64] = "", extra[128];
+    size_t n = 0;
+    CHECK_INT(get("/", "", body, sizeof body, &n), 200);
+    CHECK(n == 9 && !memcmp(body, "<p>hello\n", 9));
+    CHECK(strstr(head, "content-type: text/html; charset=utf-8\r\n"));
+    CHECK(strstr(head, "x-content-type-options: nosniff\r\n") && strstr(head, "referrer-policy: no-referrer\r\n"));
+    CHECK(strstr(head, "content-security-policy: default-src 'self'; connect-src 'self' ws://127.0.0.1:"));
+    CHECK(!strstr(head, "unsafe-inline") && strstr(head, "worker-src 'self'") && strstr(head, "img-src 'self' data:"));
+    char *at = strstr(head, "etag: ");
+    REQUIRE(at);
+    sscanf(at, "etag: %63s", tag);
+    snprintf(extra, sizeof extra, "If-None-Match: %s\r\n", tag);
+    CHECK_INT(get("/index.html", extra, body, sizeof body, &n), 304);
+    CHECK(strstr(head, tag));
+    CHECK_INT(get("/code.mjs", "If-None-Match: \"other\"\r\n", body, sizeof body, &n), 200);
+    CHECK(strstr(head, "content-type: text/javascript; charset=utf-8\r\n"));
+    CHECK_INT(get("/module.wasm", "", NULL, 0, NULL), 200);
+    CHECK(strstr(head, "content-type: application/wasm\r\n"));
+    CHECK_INT(get("/no-such.js", "", NULL, 0, NULL), 404);
+    CHECK_INT(get("/../../../../etc/passwd", "", NULL, 0, NULL), 404);
+    CHECK_INT(get("/%2e%2e/%2e%2e/etc/passwd", "", NULL, 0, NULL), 404);
+    CHECK_INT(get("/.secret.html", "", NULL, 0, NULL), 404);
+    CHECK_INT(raw_request(port, "GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", head, sizeof head, NULL, 0, NULL), 403);
+    CHECK_INT(
+        raw_request(port, "GET / HTTP/1.1\r\nHost: 127.0.0.1\"><script>\r\n\r\n", head, sizeof head, NULL, 0, NULL),
+        403);
+    CHECK_INT(raw_request(port, "DELETE / HTTP/1.1\r\nHost: localhost\r\n\r\n", head, sizeof head, NULL, 0, NULL), 405);
+    CHECK_INT(raw_request(port, "HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n", head, sizeof head, NULL, 0, NULL), 200);
+    CHECK(strstr(head, "content-length: 9\r\n"));
+}
+
+static void one_connection_serves_many_requests(void)
+{
+    char request[256], body[16];
+    int fd = raw_connect(port);
+    snprintf(request, sizeof request, "GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", port);
+    for (int i = 0; i < 20; i++) {
+        raw_say(fd, request);
+        CHECK_INT(raw_head(fd, head, sizeof head), 200);
+        CHECK_INT(raw_get(fd, body, 9), 9);
+    }
+    close(fd);
+}
+
+static void pages_tell_health_sessions_and_figures(void)
+{
+    static char body[32768];
+    size_t n = 0;
+    CHECK_INT(get("/healthz", "", body, sizeof body, &n), 200);
+    CHECK_INT(get("/readyz", "", body, sizeof body, &n), 200);
+    CHECK_INT(get("/sessions", "", body, sizeof body - 1, &n), 200);
+    body[n] = 0;
+    CHECK(strstr(body, "\"name\":\"small\",\"title\":\"Small \\\"organ\\\"\""));
+    CHECK_INT(get("/metrics", "", body, sizeof body - 1, &n), 200);
+    body[n] = 0;
+    CHECK(strstr(body, "\npalpate_sessions 1\n") && strstr(body, "# TYPE palpate_inputs_total counter\n"));
+    CHECK(n > 0 && body[n - 1] == '\n');
+}
+
+static void a_client_sees_the_asset_and_frames_of_it(void)
+{
+    static pal_control hello;
+    static char body[1 << 22];
+    pal_asset *asset = NULL;
+    pal_frame_decoder *decoder = NULL;
+    pal_frame_head frame;
+    pal_wire_tools tools;
+    size_t n = 0;
+    char hash[PAL_ASSET_HASH_CHARS], path[80];
+    int fd = joined(JOIN), n_cycle = 0;
+    raw_frame *f = raw_receive(fd);
+    REQUIRE(f->opcode == 1 && pal_control_get((char *)f->bytes, f->n, true, &hello) == 0);
+    REQUIRE(hello.type == PAL_CONTROL_HELLO);
+    CHECK_INT(get(hello.hello.part[0].asset, "", body, sizeof body, &n), 200);
+    CHECK(strstr(head, "cache-control: public, max-age=31536000, immutable\r\n"));
+    pal_asset_hash((uint8_t *)body, n, hash);
+    snprintf(path, sizeof path, "/asset/%s", hash);
+    CHECK_TEXT(hello.hello.part[0].asset, path);
+    REQUIRE(pal_asset_decode((uint8_t *)body, n, &asset) == 0);
+    REQUIRE(pal_frame_decoder_create(asset, &decoder) == 0);
+    while (n_cycle < 20) {
+        pal_wire_head h;
+        f = raw_receive(fd);
+        REQUIRE(f->opcode == 1 || f->opcode == 2);
+        if (f->opcode == 1) continue;
+        REQUIRE(pal_wire_get_head(f->bytes, f->n, &h) == 0);
+        if (h.kind == PAL_WIRE_FRAME) CHECK_INT(pal_frame_get(decoder, f->bytes, f->n, &frame, NULL), 0);
+        if (h.kind != PAL_WIRE_TOOLS) continue;
+        REQUIRE(pal_wire_get_tools(f->bytes, f->n, &tools) == 0);
+        uint8_t ack[PAL_WIRE_ACK_BYTES];
+        pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = tools.cycle});
+        raw_send(fd, 0x82, ack, sizeof ack, true);
+        n_cycle++;
+    }
+    /* a pose comes back as an echo */
+    pal_wire_pose pose = {.tool = (uint16_t)hello.hello.you_tool, .seq = 5, .stamp_us = 77, .quaternion = {1, 0, 0, 0}};
+    uint8_t bytes[PAL_WIRE_POSE_BYTES];
+    pose.position_m[2] = 0.4;
+    pal_wire_put_pose(bytes, sizeof bytes, &pose);
+    raw_send(fd, 0x82, bytes, sizeof bytes, true);
+    bool echoed = false;
+    for (int i = 0; i < 400 && !echoed; i++) {
+        f = raw_until(fd, 2);
+        if (pal_wire_get_tools(f->bytes, f->n, &tools)) continue;
+        uint8_t ack[PAL_WIRE_ACK_BYTES];
+        pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = tools.cycle});
+        raw_send(fd, 0x82, ack, sizeof ack, true);
+        echoed = tools.tool[pose.tool].echo_stamp_us == 77;
+    }
+    CHECK(echoed);
+    close(fd);
+    pal_frame_decoder_destroy(decoder);
+    pal_asset_destroy(asset);
+}
+
+static void bad_messages_are_closed_with_a_code(void)
+{
+    static char long_one[5000];
+    uint8_t noise[300];
+    int fd = joined(JOIN);
+    memset(long_one, ' ', sizeof long_one);
+    raw_send(fd, 0x81, long_one, sizeof long_one, true);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_TOO_BIG);
+    close(fd);
+    /* the same in fragments, each of them short */
+    fd = joined(WATCH);
+    raw_send(fd, 0x01, long_one, 2000, true);
+    raw_send(fd, 0x00, long_one, 2000, true);
+    raw_send(fd, 0x80, long_one, 1000, true);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_TOO_BIG);
+    close(fd);
+    for (size_t i = 0; i < sizeof noise; i++) noise[i] = (uint8_t)(i * 37 + 11);
+    fd = joined(WATCH);
+    raw_send(fd, 0x82, noise, sizeof noise, true);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_PROTOCOL);
+    close(fd);
+    /* the library takes unmasked frames; what they say is still checked */
+    fd = joined(WATCH);
+    raw_send(fd, 0x82, noise, sizeof noise, false);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_PROTOCOL);
+    close(fd);
+    /* reserved bits and opcodes, and bytes that are no frames at all */
+    for (int kind = 0; kind < 4; kind++) {
+        static const uint8_t first[] = {0xF2, 0x83, 0x8B, 0xC1};
+        fd = joined(WATCH);
+        raw_send(fd, first[kind], noise, 120, true);
+        CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_PROTOCOL);
+        close(fd);
+    }
+    fd = joined(WATCH);
+    raw_put(fd, noise, sizeof noise);
+    close(fd);
+    int status;
+    fd = raw_upgrade(port, "/ws?session=nobody", PALPATE, head, sizeof head, &status);
+    CHECK_INT(status, 101);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_NO_SESSION);
+    close(fd);
+    CHECK(still_serves());
+}
+
+static void flood_closes_the_flooder_alone(void)
+{
+    static char body[32768];
+    size_t n = 0;
+    int good = joined(WATCH), fd = joined(JOIN);
+    for (int i = 0; i < 2000; i++) raw_text(fd, "{\"type\":\"leave\"}");
+    /* the code may be lost when the kernel resets a connection whose input nobody reads */
+    int code = raw_close_code(fd);
+    CHECK(code == PAL_WIRE_CLOSE_RATE || code == 0);
+    close(fd);
+    CHECK_INT(get("/metrics", "", body, sizeof body - 1, &n), 200);
+    body[n] = 0;
+    CHECK(strstr(body, "palpate_inputs_rejected_total{reason=\"rate\"} 1\n"));
+    raw_text(good, "{\"type\":\"ping\",\"stamp_ms\":3}");
+    bool answered = false;
+    for (int i = 0; i < 200 && !answered; i++) {
+        raw_frame *f = raw_receive(good);
+        answered = f->opcode == 1 && strstr((char *)f->bytes, "\"pong\"");
+    }
+    CHECK(answered);
+    close(good);
+}
+
+enum { CROWD = 60 };
+static int crowd[CROWD];
+
+static void half_open_connections_keep_nobody_out(void)
+{
+    for (int i = 0; i < CROWD; i++) {
+        crowd[i] = raw_connect(port);
+        if (i % 3 == 1) raw_say(crowd[i], "GET / HTTP/1.1\r\nHost: 127.");
+        if (i % 3 == 2) raw_say(crowd[i], "\x16\x03\x01\x02\x00\x01garbage\r\n\r\n");
+    }
+    CHECK(still_serves());
+    int client = joined(WATCH);
+    CHECK_INT(raw_until(client, 2)->opcode, 2);
+    close(client);
+}
+
+static void half_open_connections_are_closed_by_the_server(void)
+{
+    CHECK(raw_ended(crowd[0]));
+    CHECK(raw_ended(crowd[1]));
+    for (int i = 0; i < CROWD; i++) close(crowd[i]);
+}
+
+static void address_and_port_are_refused_with_a_sentence(void)
+{
+    pal_note note = {""};
+    pal_server *second = NULL;
+    pal_server_options options = {.port = port};
+    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "in use") && strstr(note.text, "--port"));
+    options = (pal_server_options){.listen = "0.0.0.0"};
+    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "--allow-remote"));
+    options = (pal_server_options){.listen = "not an address", .allow_remote = true};
+    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+    options = (pal_server_options){.viewer_folder = "/no/such/folder"};
+    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_IO);
+    CHECK(second == NULL);
+}
+
+static void goodbye_is_said_to_everybody(void)
+{
+    int fd = joined(WATCH);
+    CHECK_INT(raw_until(fd, 2)->opcode, 2);
+    pal_server_stop(server);
+    CHECK_INT(raw_close_code(fd), PAL_WIRE_CLOSE_GOING_AWAY);
+    close(fd);
+}
+
+static void put(const char *name, const char *text)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "w");
+    if (f) fputs(text, f), fclose(f);
+}
+
+int main(void)
+{
+    static const char *const file[][2] = {
+        {"index.html", "<p>hello\n"}, {"code.mjs", "export {}"}, {"module.wasm", "x"}, {".secret.html", "no"}};
+    if (!mkdtemp(folder) || !small_scene_make(&organ, "small")) return 1;
+    for (size_t i = 0; i < 4; i++) put(file[i][0], file[i][1]);
+    begin();
+    RUN(half_open_connections_keep_nobody_out);
+    RUN(upgrade_needs_the_subprotocol_the_path_and_the_own_origin);
+    RUN(deflate_is_never_agreed_on);
+    RUN(other_upgrades_leave_the_server_well);
+    RUN(files_have_type_tag_and_policy);
+    RUN(one_connection_serves_many_requests);
+    RUN(pages_tell_health_sessions_and_figures);
+    RUN(a_client_sees_the_asset_and_frames_of_it);
+    RUN(bad_messages_are_closed_with_a_code);
+    RUN(flood_closes_the_flooder_alone);
+    RUN(address_and_port_are_refused_with_a_sentence);
+    RUN(half_open_connections_are_closed_by_the_server);
+    RUN(goodbye_is_said_to_everybody);
+    end();
+    for (size_t i = 0; i < 4; i++) {
+        char path[300];
+        snprintf(path, sizeof path, "%s/%s", folder, file[i][0]);
+        unlink(path);
+    }
+    rmdir(folder);
+    pal_prepared_free(&organ.mesh);
+    return check_report();
+}
