@@ -24,6 +24,8 @@ static const double surplus = 3, per_spacing2 = 9;
 /* how far smoothing may move a vertex along its normal, as part of a voxel: half a voxel that the scan leaves open, and
  * what the blur has moved */
 static const double voxel_reach = 0.75;
+/* the blur's margin may not cost more than 16 times the label's box and this many voxels */
+static const size_t spare_voxel = (size_t)1 << 24;
 
 typedef struct crop {
     int low[3], n[3]; /* voxels of the volume [low, low + n), one layer of others around the label */
@@ -297,6 +299,10 @@ static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, b
         b->n[a] = c->n[a] + 2 * radius[a];
         n *= (size_t)b->n[a];
     }
+    if (n > 16 * c->n_voxel + spare_voxel)
+        return pal_note_set(note, PAL_ERR_BUDGET, "voxels of %.3g x %.3g x %.3g mm are too unequal to blur by %.3g mm",
+                            1e3 * axis_length(to_m, 0), 1e3 * axis_length(to_m, 1), 1e3 * axis_length(to_m, 2),
+                            1e3 * sigma_m);
     float *other = malloc(n * sizeof *other);
     b->value = calloc(n, sizeof *b->value);
     if (!other || !b->value) {

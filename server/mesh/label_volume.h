@@ -39,7 +39,8 @@ typedef struct pal_label_surface_options {
 
 /* closed, manifold, outward-oriented surface of one label: crop, blur the 0/1 field, contour at the level that keeps
  * the label's voxel volume, smooth, decimate, set the volume. The volume error against the voxel count is within 2 %
- * for any body of more than 1000 voxels. REFUSED with the labels that exist when this one does not; MEMORY. */
+ * for any body of more than 1000 voxels. REFUSED with the labels that exist when this one does not, BUDGET when the
+ * voxels' sides are so unequal that the blur would cost far more than the label's box; MEMORY. */
 pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
                                  const pal_label_surface_options *options, pal_surface *out, pal_note *note);
 #endif

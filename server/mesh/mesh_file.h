@@ -14,8 +14,9 @@ typedef struct pal_mesh_file_options {
 
 /* Reads path (its name appears in every message), cleans it, scales it to metres. OBJ: n-gons as fans, negative
  * indices, v/vt/vn forms, any line ending, continuation lines. STL: binary, ASCII, binary beginning with "solid". PLY:
- * ascii and both binary orders, any scalar types, list properties, elements in any order. OFF: OFF, COFF, NOFF headers,
- * comments. unit_name out ("m", "mm", "cm", "given") and unit_m out may be NULL. IO, REFUSED, MEMORY. */
+ * ascii and both binary orders, any scalar types, list properties, triangle strips, elements in any order. OFF: OFF,
+ * COFF, NOFF headers, comments. unit_name out ("m", "mm", "scaled", or "given" for options' own) and unit_m out may be
+ * NULL. IO, REFUSED, MEMORY. */
 pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
                            pal_surface_report *report, double *unit_m, const char **unit_name, pal_note *note);
 /* the same from memory: name is used in messages only */

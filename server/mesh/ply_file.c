@@ -135,7 +135,14 @@ static pal_err read_header(ply *p)
         }
     }
     if (!format) return refuse_header(p, "the header has no format line");
-    pal_text_next_line(&p->scan);
+    /* where lines end with CR alone, a LF after the last one is the body's first byte */
+    while (p->scan.at < p->scan.end && *p->scan.at != '\n' && *p->scan.at != '\r') p->scan.at++;
+    bool lone =
+        p->scan.at < p->scan.end && *p->scan.at == '\r' && p->build->bytes[3] == '\r' && p->build->bytes[4] != '\n';
+    if (lone)
+        p->scan.at++;
+    else
+        pal_text_next_line(&p->scan);
     p->at = p->scan.at;
     return PAL_ERR_OK;
 }

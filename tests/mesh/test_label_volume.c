@@ -416,6 +416,19 @@ static void a_gzip_bomb_costs_no_more_than_its_header_asks_for(void)
     free(b.at);
 }
 
+static void voxels_like_needles_are_refused_before_they_cost_memory(void)
+{
+    enum { N = 1000 };
+    int32_t label[N];
+    for (int i = 0; i < N; i++) label[i] = 1;
+    /* 1 x 1 x 1000 voxels of 1 um x 1 um x 1 m */
+    pal_label_volume v = {.n = {1, 1, N}, .to_m = {1e-6, 0, 0, 0, 0, 1e-6, 0, 0, 0, 0, 1, 0}, .label = label};
+    pal_surface s = {0};
+    pal_note note = {{0}};
+    CHECK_INT(pal_label_volume_surface(&v, 1, NULL, &s, &note), PAL_ERR_BUDGET);
+    CHECK(s.x == NULL && note.text[0] != 0);
+}
+
 static void files_are_told_apart_by_name_or_content(void)
 {
     bytes b = make_inr("unsigned fixed", 2, false), packed = pack(&b);
@@ -447,6 +460,7 @@ int main(void)
     RUN(hostile_nifti_is_refused_with_its_byte);
     RUN(hostile_inrimage_is_refused_with_its_line);
     RUN(a_gzip_bomb_costs_no_more_than_its_header_asks_for);
+    RUN(voxels_like_needles_are_refused_before_they_cost_memory);
     RUN(files_are_told_apart_by_name_or_content);
     return check_report();
 }

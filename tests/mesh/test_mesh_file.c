@@ -130,7 +130,8 @@ static size_t put(uint8_t *to, const char *type, double value, bool big)
     }
     PUT("char", int8_t)
     PUT("uint8", uint8_t)
-    PUT("short", int16_t) PUT("uint16", uint16_t) PUT("int", int32_t) PUT("uint32", uint32_t) PUT("float", float)
+    PUT("short", int16_t)
+    PUT("uint16", uint16_t) PUT("int", int32_t) PUT("uint32", uint32_t) PUT("float", float)
         PUT("float64", double) for (size_t k = 0; k < n; k++) to[k] = raw[big ? n - 1 - k : k];
     return n;
 }
@@ -174,6 +175,20 @@ static void reads_every_scalar_type_of_ply_in_both_orders(void)
                "property double z\nproperty uchar red\nelement face 4\nproperty list uchar int vertex_index\n"
                "end_header\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2",
                "ply");
+    /* lines that end with CR alone, and a body that begins with the byte of LF */
+    uint8_t bytes[500];
+    size_t n = (size_t)snprintf((char *)bytes, sizeof bytes,
+                                "ply\rformat binary_little_endian 1.0\relement first 1\rproperty uchar ten\r"
+                                "element vertex 4\rproperty char x\rproperty char y\rproperty char z\relement face 4\r"
+                                "property list uchar uchar vertex_index\rend_header\r");
+    bytes[n++] = 10;
+    for (int v = 0; v < 4; v++)
+        for (int a = 0; a < 3; a++) bytes[n++] = (uint8_t)corner[v][a];
+    for (int t = 0; t < 4; t++) {
+        bytes[n++] = 3;
+        for (int k = 0; k < 3; k++) bytes[n++] = (uint8_t)face[t][k];
+    }
+    check_tetrahedron("cr.ply", bytes, n, "ply");
     check_text("c.ply",
                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
                "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
