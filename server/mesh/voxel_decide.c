@@ -342,7 +342,8 @@ static pal_err run_method(decision *d, const char *method, bool *open)
 {
     bool any = !method;
     pal_crossings rows;
-    d->report->surface_volume_m3 = d->scan->closed ? fabs(pal_surface_volume(d->surface)) : 0;
+    double volume = fabs(pal_surface_volume(d->surface));
+    d->report->surface_volume_m3 = d->scan->closed && isfinite(volume) ? volume : 0;
     if (!any && !strcmp(method, "flood")) return by_flood(d);
     if (d->scan->closed && (any || !strcmp(method, "scanline"))) {
         PAL_TRY(pal_scan_axis(d->scan, d->grid->n, 0, &rows));
@@ -386,6 +387,10 @@ pal_err pal_voxels_decide(const pal_surface *surface, const pal_voxel_options *o
     decision d = {.surface = surface, .grid = grid, .scan = &scan, .inside = inside, .report = report, .note = note};
     bool open = false;
     pal_err err = run_method(&d, options->method, &open);
+    if (err == PAL_ERR_BUDGET)
+        pal_note_set(note, err,
+                     "the surface of %d triangles crosses the rows of the %d x %d x %d grid too often: noise?",
+                     scan.n_tri, grid->n[0], grid->n[1], grid->n[2]);
     if (!err) err = check_meant(&d, open, options->resolution);
     pal_box_tree_destroy(d.tree);
     free(d.facing.tri);

@@ -11,6 +11,12 @@
 
 __extension__ typedef __int128 wide;
 
+/* a surface that means a body crosses a row a few times; noise whose triangles span the box would cross without bound
+ */
+enum { CROSSINGS_PER_ROW = 64, CROSSINGS_PER_TRI = 16 };
+/* rows of at least this many centres are narrowed to the triangle by division before they are walked */
+enum { WIDE_ROW = 8 };
+
 /* the axes across a row, in ascending order: the first is shifted more by the symbolic shift */
 static const int ACROSS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
@@ -156,7 +162,7 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 /* crossings in the order they are found, with their rows */
 typedef struct scanner {
     int n_p, n_q, axis;
-    int64_t n, cap;
+    int64_t n, cap, most; /* crossings, room, budget */
     pal_crossing *item;
     int32_t *row;
 } scanner;
@@ -164,6 +170,8 @@ typedef struct scanner {
 static bool scanner_grow(scanner *s)
 {
     int64_t cap = s->cap ? 2 * s->cap : 4096;
+    if (cap > s->most) cap = s->most;
+    if (cap <= s->n) return false;
     pal_crossing *item = realloc(s->item, (size_t)cap * sizeof *item);
     if (!item) return false;
     s->item = item;
@@ -172,6 +180,14 @@ static bool scanner_grow(scanner *s)
     s->row = row;
     s->cap = cap;
     return true;
+}
+
+/* room for one more crossing, in the given row; NULL: out of memory or beyond the budget */
+static inline pal_crossing *scanner_next(scanner *s, int32_t row)
+{
+    if (s->n == s->cap && !scanner_grow(s)) return NULL;
+    s->row[s->n] = row;
+    return &s->item[s->n++];
 }
 
 /* does the shifted centre lie behind a crossing exactly at the centre? The surface near there moves along the axis by
@@ -221,6 +237,21 @@ static edge_rule edge_make(const int32_t *u, const int32_t *v, int p, int q, int
     return e;
 }
 
+/* narrows from..to, counted from the edge's place, to the centres of a row on the edge's inner side */
+static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
+{
+    int64_t value = e->at + e->bias, step = e->dq * PAL_SCAN_ONE;
+    if (step == 0) {
+        if (value < 0) *to = *from - 1;
+    } else if (step > 0) {
+        int64_t last = value < 0 ? -1 : value / step;
+        if (last < *to) *to = last;
+    } else if (value < 0) {
+        int64_t first = (-value - step - 1) / -step;
+        if (first > *from) *from = first;
+    }
+}
+
 static int32_t least3(int32_t a, int32_t b, int32_t c)
 {
     int32_t m = a < b ? a : b;
@@ -263,15 +294,21 @@ static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const 
     edge_rule ab = edge_make(a, b, p, q, at_p, at_q), bc = edge_make(b, c, p, q, at_p, at_q),
               ca = edge_make(c, a, p, q, at_p, at_q);
     for (int j = q0; j <= q1; j++) {
-        int64_t value_ab = ab.at, value_bc = bc.at, value_ca = ca.at;
-        for (int i = p0; i <= p1; i++) {
+        int64_t from = 0, to = p1 - p0;
+        if (to >= WIDE_ROW) {
+            narrow(&ab, &from, &to);
+            narrow(&bc, &from, &to);
+            narrow(&ca, &from, &to);
+        }
+        int64_t value_ab = ab.at - from * ab.dq * PAL_SCAN_ONE, value_bc = bc.at - from * bc.dq * PAL_SCAN_ONE,
+                value_ca = ca.at - from * ca.dq * PAL_SCAN_ONE;
+        for (int64_t i = p0 + from; i <= p0 + to; i++) {
             if (((value_ab + ab.bias) | (value_bc + bc.bias) | (value_ca + ca.bias)) >= 0) {
-                if (s->n == s->cap && !scanner_grow(s)) return false;
-                pal_crossing *to = &s->item[s->n];
-                to->place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &to->depth);
-                to->part = part;
-                to->sign = sign;
-                s->row[s->n++] = (int32_t)(j * s->n_p + i);
+                pal_crossing *c_out = scanner_next(s, (int32_t)(j * (int64_t)s->n_p + i));
+                if (!c_out) return false;
+                c_out->place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
+                c_out->part = part;
+                c_out->sign = sign;
             }
             value_ab -= ab.dq * PAL_SCAN_ONE;
             value_bc -= bc.dq * PAL_SCAN_ONE;
@@ -333,13 +370,14 @@ static pal_err deal_rows(const scanner *s, pal_crossings *out)
 pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out)
 {
     scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .axis = axis};
+    s.most = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
     bool ok = true;
     for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++) {
         const int32_t *c = scan->tri + 3 * t;
         ok = scan_triangle(&s, scan->point + 3 * (size_t)c[0], scan->point + 3 * (size_t)c[1],
                            scan->point + 3 * (size_t)c[2], scan->part ? scan->part[t] : 0);
     }
-    pal_err err = ok ? deal_rows(&s, out) : PAL_ERR_MEMORY;
+    pal_err err = ok ? deal_rows(&s, out) : s.n == s.most ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
     free(s.item);
     free(s.row);
     return err;

@@ -65,7 +65,7 @@ typedef struct pal_crossings {
 
 /* Which triangles a row of voxel centres crosses, as if the centre (x, y, z) were (x + e, y + e^2, z + e^3): a row that
  * meets an edge or a vertex crosses exactly one of the triangles there, and the three axes agree about every voxel of
- * a closed surface. MEMORY */
+ * a closed surface. BUDGET when there are more than 64 crossings a row and 16 a triangle, MEMORY */
 pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out);
 void pal_crossings_free(pal_crossings *crossings);
 

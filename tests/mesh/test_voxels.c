@@ -431,6 +431,66 @@ static void options_out_of_range_are_refused(void)
     pal_surface_free(&s);
 }
 
+static void noise_is_refused_within_a_budget(void)
+{
+    enum { N = 20000 };
+    uint64_t state = 9;
+    pal_surface s = shape_room(3 * N, N);
+    for (int i = 0; i < 9 * N; i++) s.x[i] = shape_uniform(&state);
+    for (int i = 0; i < 3 * N; i++) s.tri[i] = i;
+    pal_voxels v;
+    pal_err err = fill(&s, 100, NULL, &v);
+    CHECK(err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED);
+    if (!err) pal_voxels_free(&v);
+    /* few triangles of noise are judged like any open surface, whatever comes out */
+    s.n_tri = 300;
+    if (!fill(&s, 20, NULL, &v)) {
+        CHECK_LE((double)v.n_inside, 20 * 20 * 20);
+        pal_voxels_free(&v);
+    }
+    pal_surface_free(&s);
+}
+
+static void large_and_sliver_triangles_are_scanned_like_small_ones(void)
+{
+    /* a rotated box whose sides are cut into fans of slivers has the same voxels as with two triangles a side */
+    uint64_t state = 12;
+    for (int k = 0; k < 20; k++) {
+        double low[3] = {-0.5, -0.3, -0.2}, high[3] = {0.5, 0.3, 0.2};
+        enum { N = 50 };
+        pal_surface plain = shape_box(low, high), fan = shape_room(8 + N, 12 + 2 * N);
+        memcpy(fan.x, plain.x, 24 * sizeof *fan.x);
+        memcpy(fan.tri, plain.tri, 36 * sizeof *fan.tri);
+        /* triangles 0 and 1 share the diagonal from corner 0 to 3: points along it, closer and closer */
+        int32_t *to = fan.tri, edge[2][2] = {{2, 0}, {1, 0}};
+        for (int i = 0; i < N; i++)
+            for (int d = 0; d < 3; d++) {
+                double t = (double)(i + 1) * (i + 1) / ((N + 1) * (N + 1));
+                fan.x[3 * (8 + i) + d] = fan.x[d] + t * (fan.x[9 + d] - fan.x[d]);
+            }
+        for (int side = 0; side < 2; side++)
+            for (int i = 0; i <= N; i++, to += 3) {
+                int32_t a = i == 0 ? 0 : 7 + i, b = i == N ? 3 : 8 + i;
+                to[0] = a, to[1] = side == 0 ? edge[0][0] : b, to[2] = side == 0 ? b : edge[1][0];
+            }
+        memcpy(to, plain.tri + 6, 30 * sizeof *to);
+        fan.n_tri = 2 * (N + 1) + 10;
+        uint64_t same = state;
+        shape_rotate(&plain, &state);
+        shape_rotate(&fan, &same);
+        pal_voxels a, b;
+        REQUIRE(!fill(&plain, 100, NULL, &a));
+        CHECK_TEXT(report.method, "scanline");
+        REQUIRE(!fill(&fan, 100, NULL, &b));
+        CHECK_TEXT(report.method, "scanline");
+        CHECK_LE((double)count_different(&a, &b), 3);
+        pal_voxels_free(&a);
+        pal_voxels_free(&b);
+        pal_surface_free(&plain);
+        pal_surface_free(&fan);
+    }
+}
+
 static void split_gives_sound_tetrahedra(void)
 {
     for (int shape = 0; shape < 3; shape++) {
@@ -508,6 +568,8 @@ int main(void)
     RUN(centres_on_vertices_edges_and_faces_belong_to_one_side_on_every_axis);
     RUN(surfaces_without_a_volume_are_refused_with_numbers);
     RUN(options_out_of_range_are_refused);
+    RUN(noise_is_refused_within_a_budget);
+    RUN(large_and_sliver_triangles_are_scanned_like_small_ones);
     RUN(split_gives_sound_tetrahedra);
     RUN(split_takes_at_most_120_bytes_a_tetrahedron);
     return check_report();
