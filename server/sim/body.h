@@ -5,6 +5,7 @@
 #include "server/mesh/skin.h"
 #include "server/mesh/surface.h"
 #include "server/mesh/tets.h"
+#include "server/sim/strips.h"
 
 typedef struct pal_body {
     const char *name;
@@ -31,6 +32,7 @@ typedef struct pal_body {
 
     /* geometry at rest, borrowed from the scene's prepared mesh by the model; NULL when the model has none */
     const pal_tets *tets;
+    pal_slots *slots;           /* memory order of the nodes for kernels; NULL: none made       */
     const pal_surface *surface; /* shown surface at rest                                       */
     const pal_skin *skin;       /* surface on nodes; NULL: shown vertices are the surface nodes */
     /* what is shown: all of these are set by the OUTPUT row's make; none: n_shown 0 */

@@ -1,21 +1,37 @@
-/* Spring constants from E, nu and h. */
+/* Spring constants from E, nu and the mesh. */
 #include "server/sim/spring_law.h"
 
-double pal_spring_constant_J(pal_spring_kind kind, const pal_material *material, double h_m)
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void pal_spring_factors(double poisson, double factor[3])
 {
-    static const double factor[] = {0.2, 0.4, 1.0};
+    double nu = poisson < 0.26 ? 0.26 : poisson;
+    double shear = 1 / (2 * (1 + nu)), bulk = 1 / (3 * (1 - 2 * nu));
+    double share = fmin(0.5, (bulk / shear - 5.0 / 3) / 10);
+    factor[PAL_SPRING_DISTANCE] = (1 - share) * shear * 3 / 2;
+    factor[PAL_SPRING_AREA] = share * shear * 9 / 4;
+    factor[PAL_SPRING_VOLUME] = bulk - (5.0 / 3 + 5 * share) * shear;
+}
+
+static double derived_J(pal_spring_kind kind, const pal_material *material, double h_m)
+{
+    double factor[3];
+    pal_spring_factors(material->poisson, factor);
     return factor[kind] * material->young_Pa * h_m * h_m * h_m;
 }
 
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out)
 {
     *out = (pal_spring){.kind = kind,
-                        .k_J = pal_spring_constant_J(kind, &build->def->material, build->body->h_m),
+                        .k_J = derived_J(kind, &build->def->material, build->body->h_m),
                         .given = pal_item_has(item, "k_J")};
     PAL_TRY(pal_item_number(item, "k_J", 0, 1e60, &out->k_J, build->note));
     PAL_TRY(pal_item_number(item, "c_Js", 0, 1e60, &out->c_Js, build->note));
     PAL_TRY(pal_item_done(item, build->note));
-    if (!build->body->tets)
+    if (!build->body->tets || !build->body->slots)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", item->path,
                             item->name);
     return PAL_ERR_OK;
@@ -23,10 +39,87 @@ pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *b
 
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material)
 {
-    if (!spring->given) spring->k_J = pal_spring_constant_J(spring->kind, material, body->h_m);
+    if (!spring->given) spring->k_J = derived_J(spring->kind, material, body->h_m);
 }
 
-size_t pal_spring_padded(int n)
+static double tet_volume(const pal_tets *tets, int t)
 {
-    return ((size_t)n + PAL_SPRING_CHUNK - 1) / PAL_SPRING_CHUNK * PAL_SPRING_CHUNK;
+    const int32_t *c = tets->tet + 4 * t;
+    double e[3][3], n[3];
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
+    pal_cross3(n, e[1], e[2]);
+    return fabs(pal_dot3(e[0], n)) / 6;
+}
+
+/* a spring by its nodes in ascending order, to find it from the tetrahedra around it */
+typedef struct known {
+    int32_t node[4], item;
+} known;
+
+static int compare_known(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof((known *)0)->node);
+}
+
+static void set_known(known *k, const int32_t *node, int n)
+{
+    memset(k, 0, sizeof *k);
+    for (int i = 0; i < n; i++) {
+        int j = i;
+        for (; j > 0 && k->node[j - 1] > node[i]; j--) k->node[j] = k->node[j - 1];
+        k->node[j] = node[i];
+    }
+}
+
+/* adds every tetrahedron's volume to its sides with n_corner corners */
+static void add_volumes(const pal_tets *tets, const known *table, size_t n_item, int n_corner, double *out)
+{
+    for (int t = 0; t < tets->n_tet; t++) {
+        double volume = tet_volume(tets, t);
+        for (unsigned set = 1; set < 16; set++) {
+            if (__builtin_popcount(set) != n_corner) continue;
+            int32_t node[4];
+            int n = 0;
+            for (int c = 0; c < 4; c++)
+                if (set >> c & 1) node[n++] = tets->tet[4 * t + c];
+            known key;
+            set_known(&key, node, n_corner);
+            const known *found = bsearch(&key, table, n_item, sizeof key, compare_known);
+            if (found) out[found->item] += volume;
+        }
+    }
+}
+
+static double mean_square_edge(const double *x, const int32_t *node, int n)
+{
+    double sum = 0;
+    for (int a = 0; a < n; a++)
+        for (int b = a + 1; b < n; b++) {
+            double d = pal_dist3(x + 3 * node[a], x + 3 * node[b]);
+            sum += d * d;
+        }
+    return 2 * sum / (n * (n - 1));
+}
+
+pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const int32_t *item, int n_item,
+                           int n_corner, double *out)
+{
+    for (int i = 0; i < n_item; i++) out[i] = 1;
+    if (spring->given) return PAL_ERR_OK;
+    known *table = calloc((size_t)n_item + 1, sizeof *table);
+    if (!table) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_item; i++) {
+        set_known(&table[i], item + n_corner * i, n_corner);
+        table[i].item = i;
+        out[i] = 0;
+    }
+    qsort(table, (size_t)n_item, sizeof *table, compare_known);
+    add_volumes(body->tets, table, (size_t)n_item, n_corner, out);
+    free(table);
+    double h = body->h_m;
+    for (int i = 0; i < n_item; i++) {
+        double l2 = n_corner == 4 ? h * h : mean_square_edge(body->x_rest, item + n_corner * i, n_corner);
+        out[i] *= l2 / (h * h * h * h * h);
+    }
+    return PAL_ERR_OK;
 }

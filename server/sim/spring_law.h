@@ -1,26 +1,34 @@
-/* Constants of paper B's springs from an isotropic material: k = factor(nu) E h^3, joules, h the voxel edge; and the
- * part that the three spring rows share. Thread: [load], pal_spring_material [sim]. */
+/* Constants of paper B's springs from an isotropic material, and the part that the three spring rows share.
+ *
+ * A scene that gives k_J gives every spring of the row that constant, as the paper does. Otherwise spring i gets
+ * k_i = factor E V_i l_i^2/h^2: V_i the volume of the tetrahedra around it, l_i^2 the mean square of its edges' lengths
+ * (volume springs: V_i alone). With these weights the five-tetrahedra lattice is exactly isotropic, which equal
+ * constants cannot make it (their shear modulus along the grid is 0.4 of that across), and springs on the boundary
+ * count for the volume they have, so that thin bodies are not too stiff. Moduli of the lattice, per E, derived by
+ * summing the springs of a periodic cell: shear  G = 2/3 f_d + 4/9 f_a        bulk  K = 10/9 f_d + 80/27 f_a + f_v f_a
+ * takes half of the bulk modulus that edges alone lack (they have K = 5/3 G, nu = 0.25), at most half of the shear
+ * modulus; f_v the rest. A Poisson ratio below 0.26 is simulated as 0.26.
+ * Thread: [load], pal_spring_material [sim]. */
 #ifndef PAL_SIM_SPRING_LAW_H
 #define PAL_SIM_SPRING_LAW_H
 #include "server/sim/effect.h"
 
 typedef enum pal_spring_kind { PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME } pal_spring_kind;
 
-/* constants of one row of springs: E = k/2 C^2, f = -(k C + c dC/dt) grad C with the dimensionless constraint C */
+/* constants of one row of springs: E_i = q_i k/2 C^2, f = -q_i (k C + c dC/dt) grad C with the dimensionless
+ * constraint C; q_i = 1 when k_J is given, else V_i l_i^2/h^5 */
 typedef struct pal_spring {
     pal_spring_kind kind;
     double k_J, c_Js;
     bool given; /* k_J stands in the scene: a material edit leaves it */
 } pal_spring;
 
-/* constraints a kernel computes at once; rows pad their arrays to a multiple of it */
-enum { PAL_SPRING_CHUNK = 64 };
-
-/* k of one kind of spring, J; positive for a material that pal_material_check passes */
-double pal_spring_constant_J(pal_spring_kind kind, const pal_material *material, double h_m);
+/* the factors f_d, f_a, f_v above for a Poisson ratio; all positive */
+void pal_spring_factors(double poisson, double factor[3]);
 /* keys k_J (absent: derived), c_Js (0); no other key is allowed */
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out);
+/* the weights q_i of springs between the corners item [n_item][n_corner] -> out [n_item]; MEMORY */
+pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const int32_t *item, int n_item,
+                           int n_corner, double *out);
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material);
-/* n rounded up to whole chunks */
-size_t pal_spring_padded(int n);
 #endif

@@ -542,6 +542,13 @@ pal_body *pal_world_body(pal_world *world, int body)
     return &world->plan.body[body];
 }
 
+void pal_world_moved(pal_world *world, int body)
+{
+    const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    if (solve->effect->reset) solve->effect->reset(solve->self, &world->plan.body[body]);
+    find_limit(world, 0);
+}
+
 const pal_tools *pal_world_tools(const pal_world *world)
 {
     return &world->tools;

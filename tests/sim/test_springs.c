@@ -201,6 +201,7 @@ static void chooses_half_the_stable_substep_or_less(void)
         pal_step step = {.body = b.body,
                          .force = b.plan.row + b.plan.first[PAL_STAGE_FORCE][0],
                          .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
+        solve->effect->reset(solve->self, b.body);
         double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(power_iteration(&b));
         printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
         CHECK_LE(chosen, 0.5 * stable * 1.001);
@@ -288,11 +289,12 @@ static pal_world *open_free(pal_prepared *box, pal_scene **scene)
     if (box_make(3, 3, 3, 0.01, box)) return NULL;
     *scene = box_scene(box, false, false);
     (*scene)->body[0].material.damping_1_s = 0;
+    (*scene)->body[0].n_effect = 0;
     pal_world *world;
     if (pal_world_create(*scene, &note, &world)) return NULL;
     pal_body *body = pal_world_body(world, 0);
     seed = 3;
-    for (int i = 0; i < 3 * body->n_dof; i++) body->v[i] = 0.2 * uniform() + (i % 3 == 0 ? 0.1 : 0);
+    for (int i = 0; i < 3 * body->n_dof; i++) body->v[i] = 0.05 * uniform() + (i % 3 == 0 ? 0.1 : 0);
     return world;
 }
 
@@ -458,7 +460,7 @@ static void drag_fades_a_free_motion_at_the_stated_rate(void)
     pal_body *body = pal_world_body(world, 0);
     for (int i = 0; i < body->n_dof; i++) body->v[3 * i] = 0.1;
     for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(world, scene->step_s));
-    CHECK_NEAR(body->v[0], 0.1 * exp(-3), 0.1 * exp(-3) * 2e-3);
+    CHECK_NEAR(body->v[0], 0.1 * exp(-3), 0.1 * exp(-3) * 5e-3);
     pal_world_destroy(world);
     free(scene);
     box_free(&box);

@@ -61,7 +61,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     body->surface = &mesh->surface;
     body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->h_m = mesh->tets.h_m;
-    return PAL_ERR_OK;
+    return pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots);
 }
 
 const pal_model pal_model_tet_springs = {.name = "tet_springs", .build = build};

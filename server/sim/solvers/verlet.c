@@ -2,10 +2,10 @@
  *
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks. The
  * sub-step is 0.5 of the stability limit that Gershgorin's bound gives: with K and C the row sums of stiffness and
- * explicit damping, 0.5 * 2/w is the largest dt with dt^2 K + dt C <= m at every free node. The bound is taken at the
- * current state once a step, and again whenever a node may have moved a fifth of an element since. A node moves at most
- * 0.2 S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same
- * inequality is met by adding mass to the nodes that break it. */
+ * explicit damping, 0.5 * 2/w is the largest dt with dt^2 K + dt C <= m at every free node. The bound is taken again at
+ * the current state whenever a node may have moved a fifth of an element since the last time. A node moves at most 0.2
+ * S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality
+ * is met by adding mass to the nodes that break it. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 
@@ -41,12 +41,21 @@ static void add_bounds(verlet *row, const pal_row *rows, int n, const pal_body *
     }
 }
 
+/* contact comes and goes between steps without any node moving */
+static bool has_bounds(const pal_row *rows, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
+    return false;
+}
+
 /* the smallest over free nodes of the positive root of dt^2 K + dt C = m */
 static double limit(void *self, pal_step *step)
 {
     verlet *row = self;
     const pal_body *body = step->body;
-    if (row->known && step->sub > 0 && row->way_m <= most_way_h * body->h_m) return row->limit_s;
+    bool contact = step->sub == 0 && has_bounds(step->contact, step->n_contact);
+    if (row->known && !contact && row->way_m <= most_way_h * body->h_m) return row->limit_s;
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(row->stiff, 0, n_byte);
     memset(row->damp, 0, n_byte);

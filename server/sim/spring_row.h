@@ -1,0 +1,125 @@
+/* What the three spring rows have in common: constraints between 2, 3 or 4 nodes, each with a rest measure w and a
+ * weight q, E = q k/2 C^2 (spring_law.h). An effect gives two forms of its constraint: `shape`, plain, one at a time,
+ * and `kernel`, 8 lanes at a time. The loops below are inlined with them. Thread: [load] to make, then [sim]. */
+#ifndef PAL_SIM_SPRING_ROW_H
+#define PAL_SIM_SPRING_ROW_H
+#include "server/base/vec3.h"
+#include "server/sim/spring_law.h"
+#include "server/sim/strips.h"
+
+/* C, its gradient at each corner and the row sums of its second derivative where that stiffens, for nodes at x */
+typedef struct pal_shape {
+    double c, g[PAL_CORNERS][3], bend[PAL_CORNERS];
+} pal_shape;
+typedef void (*pal_shape_of)(const double *const x[PAL_CORNERS], double w, pal_shape *out);
+
+/* 8 springs with constants k q: p [n_corner][3] where the corners' coordinates stand, 8 lanes each; f [n_corner - 1][3]
+ * forces on corners 1, 2, 3, the first gets minus their sum; least may be lowered to anything the effect wants to know
+ * the least of */
+typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least);
+
+typedef struct pal_spring_row {
+    pal_spring spring;
+    int n_item, n_corner;
+    int32_t *item; /* nodes                      [n_item][n_corner] */
+    pal_strips strips;
+    double *w, *q; /* by lane; 0: no constraint  [strips.n_lane]    */
+} pal_spring_row;
+
+/* reads the row's keys (pal_spring_read), takes what is useful of item [n_item][n_corner] (kept: measure > least; its
+ * corners reordered), with w = 1 / measure */
+pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
+                            int n_corner, double (*measure)(const double *const x[PAL_CORNERS]), double least,
+                            pal_spring_row *out);
+pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note);
+
+PAL_INLINE void pal_spring_corners(const pal_spring_row *row, const double *x, int i, const double *to[PAL_CORNERS])
+{
+    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * row->item[row->n_corner * i + (c < row->n_corner ? c : 0)];
+}
+
+PAL_INLINE double pal_spring_energy(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of)
+{
+    double sum = 0;
+    for (int i = 0; i < row->n_item; i++) {
+        const double *x[PAL_CORNERS];
+        pal_shape s;
+        int lane = row->strips.place[i];
+        pal_spring_corners(row, body->d, i, x);
+        shape_of(x, row->w[lane], &s);
+        sum += 0.5 * row->q[lane] * row->spring.k_J * s.c * s.c;
+    }
+    return sum;
+}
+
+/* Gershgorin row sums: k |g_a| sum |g_b|, and with `bend` what the second derivative adds */
+PAL_INLINE void pal_spring_bound(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of, int n_corner,
+                                 double k, bool bend, double *bound)
+{
+    for (int i = 0; i < row->n_item; i++) {
+        const double *x[PAL_CORNERS];
+        pal_shape s;
+        int lane = row->strips.place[i];
+        pal_spring_corners(row, body->d, i, x);
+        shape_of(x, row->w[lane], &s);
+        double size[PAL_CORNERS], sum = 0, kq = k * row->q[lane];
+        for (int c = 0; c < n_corner; c++) sum += size[c] = pal_norm3(s.g[c]);
+        for (int c = 0; c < n_corner; c++)
+            bound[row->item[n_corner * i + c]] += kq * (size[c] * sum + (bend ? s.bend[c] : 0));
+    }
+}
+
+/* f -= c q (sum of g.v) g */
+PAL_INLINE void pal_spring_damp(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of, int n_corner)
+{
+    for (int i = 0; i < row->n_item; i++) {
+        const double *x[PAL_CORNERS];
+        pal_shape s;
+        int lane = row->strips.place[i];
+        const int32_t *node = row->item + n_corner * i;
+        pal_spring_corners(row, body->d, i, x);
+        shape_of(x, row->w[lane], &s);
+        double rate = 0;
+        for (int c = 0; c < n_corner; c++) rate += pal_dot3(s.g[c], body->dv + 3 * node[c]);
+        for (int c = 0; c < n_corner; c++)
+            pal_axpy3(body->f + 3 * node[c], -row->spring.c_Js * row->q[lane] * rate, s.g[c]);
+    }
+}
+
+/* all springs, strips first; returns the least value the kernel told of, at most 1 */
+PAL_INLINE double pal_spring_run(const pal_spring_row *row, pal_slots *slots, pal_spring_kernel kernel, int n_corner)
+{
+    const int n_strip = row->strips.n_strip;
+    const double k = row->spring.k_J;
+    double *const fx = slots->f, *const fy = fx + slots->n_slot, *const fz = fy + slots->n_slot;
+    const double *const x = slots->x, *const y = x + slots->n_slot, *const z = y + slots->n_slot;
+    pal_v8 f[PAL_CORNERS - 1][3], least = {1, 1, 1, 1, 1, 1, 1, 1};
+    const double *p[PAL_CORNERS][3];
+    for (int b = 0; b < n_strip; b++) {
+        const int32_t *base = row->strips.base + n_corner * b;
+        for (int c = 0; c < n_corner; c++) p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
+        kernel(p, pal_load8(row->w + PAL_LANES * b), k * pal_load8(row->q + PAL_LANES * b), f, &least);
+        pal_v8 sum[3] = {f[0][0], f[0][1], f[0][2]};
+        for (int c = 2; c < n_corner; c++)
+            for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
+        pal_add8(fx + base[0], -sum[0]), pal_add8(fy + base[0], -sum[1]), pal_add8(fz + base[0], -sum[2]);
+        for (int c = 1; c < n_corner; c++) {
+            pal_add8(fx + base[c], f[c - 1][0]);
+            pal_add8(fy + base[c], f[c - 1][1]);
+            pal_add8(fz + base[c], f[c - 1][2]);
+        }
+    }
+    for (int b = 0; b < row->strips.n_loose; b++) {
+        const int32_t *node = row->strips.node + n_corner * PAL_LANES * b;
+        double at[PAL_CORNERS][3][PAL_LANES];
+        pal_loose_load(slots, node, n_corner, at);
+        for (int c = 0; c < n_corner; c++)
+            for (int d = 0; d < 3; d++) p[c][d] = at[c][d];
+        int lane = PAL_LANES * (n_strip + b);
+        kernel(p, pal_load8(row->w + lane), k * pal_load8(row->q + lane), f, &least);
+        pal_loose_add(slots, node, n_corner, f);
+    }
+    for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
+    return least[0];
+}
+#endif
