@@ -1,19 +1,20 @@
 #include "clients/haptic_bridge/jitter.h"
 
-/* exponent, then the three bits below the leading one */
+/* exponent, then the bits below the leading one */
 static int jitter_bin(uint64_t ns)
 {
     if (ns < PAL_JITTER_STEPS) return (int)ns;
     const int top = 63 - __builtin_clzll(ns);
-    const int bin = (top - 2) * PAL_JITTER_STEPS + (int)(ns >> (top - 3) & (PAL_JITTER_STEPS - 1));
+    const int bin =
+        (top - PAL_JITTER_BITS + 1) * PAL_JITTER_STEPS + (int)(ns >> (top - PAL_JITTER_BITS) & (PAL_JITTER_STEPS - 1));
     return bin < PAL_JITTER_BINS ? bin : PAL_JITTER_BINS - 1;
 }
 
 static double jitter_upper_ns(int bin)
 {
     if (bin < PAL_JITTER_STEPS) return bin + 1;
-    const int top = bin / PAL_JITTER_STEPS + 2;
-    return (double)(PAL_JITTER_STEPS + bin % PAL_JITTER_STEPS + 1) * (double)(1ull << (top - 3));
+    const int top = bin / PAL_JITTER_STEPS + PAL_JITTER_BITS - 1;
+    return (double)(PAL_JITTER_STEPS + bin % PAL_JITTER_STEPS + 1) * (double)(1ull << (top - PAL_JITTER_BITS));
 }
 
 void pal_jitter_add(pal_jitter *j, uint64_t ns)

@@ -1,0 +1,1 @@
+pal_fuzz(lcm_walk LINK pal_lcm_link)
