@@ -40,7 +40,7 @@ bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
         for (int64_t i = 0; i < n; i += 2) {
             if (item[i].sign != first || item[i + 1].sign == first) return false;
             pal_bits_set_run(word, item[i].place, item[i + 1].place);
-            n_flat += item[i].depth == item[i + 1].depth;
+            n_flat += item[i + 1].depth - item[i].depth < PAL_SCAN_ONE / 16;
             n_pair++;
         }
     }
@@ -363,7 +363,8 @@ static pal_err run_method(decision *d, const char *method, bool *open)
         err = by_winding(d);
     else
         err = by_vote(d);
-    *open = !even;
+    /* a scanline that was asked for is taken at its word */
+    *open = !even && strcmp(d->report->method, "scanline") != 0;
     if (even) d->report->surface_volume_m3 = parts_volume(d);
     return err;
 }
