@@ -255,17 +255,22 @@ static int make_kernel(double sigma, float kernel[2 * MOST_RADIUS + 1])
     return radius;
 }
 
-/* the value that as many voxels exceed as the label has */
+/* the value that as many voxels exceed as the label has; for a speck of a few voxels at most half the largest value */
 static double level_of(const float *value, size_t n, int64_t n_label)
 {
     int64_t *bin = calloc(N_BIN + 1, sizeof *bin), above = 0;
     if (!bin) return 0.5;
-    for (size_t i = 0; i < n; i++) bin[(int)(fminf(fmaxf(value[i], 0), 1) * N_BIN)]++;
+    float most = 0;
+    for (size_t i = 0; i < n; i++) {
+        bin[(int)(fminf(fmaxf(value[i], 0), 1) * N_BIN)]++;
+        most = fmaxf(most, value[i]);
+    }
     int k = N_BIN;
     while (k > 1 && above + bin[k] < n_label) above += bin[k--];
     double part = bin[k] ? (double)(n_label - above) / (double)bin[k] : 0;
     free(bin);
-    return (k + 1 - part) / N_BIN;
+    double level = (k + 1 - part) / N_BIN;
+    return fmin(level, (double)most / 2);
 }
 
 /* metres -> voxel index, the inverse of to_m with index zero at voxel `low` */
@@ -419,8 +424,9 @@ static pal_err set_volume(pal_surface *s, double wanted_m3)
     double *normal = malloc((3 * (size_t)s->n_vertex + 3) * sizeof *normal);
     if (!normal) return PAL_ERR_MEMORY;
     pal_surface_normals(s, normal);
-    for (int round = 0; round < 2; round++) {
-        double move = (wanted_m3 - pal_surface_volume(s)) / pal_surface_area(s);
+    for (int round = 0; round < 10; round++) {
+        double missing = wanted_m3 - pal_surface_volume(s), move = missing / pal_surface_area(s);
+        if (fabs(missing) < 1e-4 * wanted_m3) break;
         for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] += move * normal[i];
     }
     free(normal);
@@ -455,6 +461,11 @@ pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
     if (!err) {
         pal_contour_box box = box_of(&c, m, o->target_tri);
         err = pal_contour(field_at, &b, &box, &s, note);
+        /* a speck may fall between the lattice points */
+        for (int k = 0; k < 4 && err == PAL_ERR_REFUSED; k++) {
+            box.spacing_m /= 2;
+            err = pal_contour(field_at, &b, &box, &s, note);
+        }
     }
     free(b.value);
     free(c.mask);

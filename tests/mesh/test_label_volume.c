@@ -416,6 +416,30 @@ static void a_gzip_bomb_costs_no_more_than_its_header_asks_for(void)
     free(b.at);
 }
 
+static void plates_rods_and_specks_keep_their_volume(void)
+{
+    /* boxes of voxels: size of each, and the surface must be one closed piece */
+    static const int box[][3] = {{40, 40, 1}, {40, 2, 40}, {4, 4, 100}, {2, 60, 30}, {10, 10, 10}, {1, 1, 1}};
+    for (size_t k = 0; k < sizeof box / sizeof *box; k++) {
+        const int *n = box[k], m[3] = {n[0] + 4, n[1] + 4, n[2] + 4};
+        pal_label_volume v = {.n = {m[0], m[1], m[2]}, .to_m = {7e-4, 0, 0, 0, 0, 7e-4, 0, 0, 0, 0, 1.5e-3, 0}};
+        v.label = calloc((size_t)m[0] * (size_t)m[1] * (size_t)m[2], sizeof *v.label);
+        REQUIRE(v.label != NULL);
+        for (int z = 0; z < n[2]; z++)
+            for (int y = 0; y < n[1]; y++)
+                for (int x = 0; x < n[0]; x++) v.label[((z + 2) * m[1] + y + 2) * m[0] + x + 2] = 1;
+        pal_surface s = {0};
+        pal_surface_topology t;
+        REQUIRE(pal_label_volume_surface(&v, 1, NULL, &s, NULL) == PAL_ERR_OK);
+        REQUIRE(pal_surface_check(&s, &t) == PAL_ERR_OK);
+        CHECK(t.closed && t.manifold && t.oriented);
+        CHECK_INT(s.n_vertex - s.n_tri / 2, 2);
+        CHECK_NEAR(pal_surface_volume(&s) / (n[0] * n[1] * n[2] * 7e-4 * 7e-4 * 1.5e-3), 1, 0.02);
+        pal_surface_free(&s);
+        pal_label_volume_free(&v);
+    }
+}
+
 static void voxels_like_needles_are_refused_before_they_cost_memory(void)
 {
     enum { N = 1000 };
@@ -460,6 +484,7 @@ int main(void)
     RUN(hostile_nifti_is_refused_with_its_byte);
     RUN(hostile_inrimage_is_refused_with_its_line);
     RUN(a_gzip_bomb_costs_no_more_than_its_header_asks_for);
+    RUN(plates_rods_and_specks_keep_their_volume);
     RUN(voxels_like_needles_are_refused_before_they_cost_memory);
     RUN(files_are_told_apart_by_name_or_content);
     return check_report();
