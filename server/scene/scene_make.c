@@ -13,10 +13,12 @@
 #include "server/mesh/organ.h"
 
 #include <ctype.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { WANTED_VOXELS = 2600, WANTED_TRI = 50000, LABELS = 64 };
 static const double weld = 1e-6;         /* relative tolerance of surface files   */
@@ -154,8 +156,12 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
                         pal_surface_scene_report *report, pal_note *note)
 {
     double start = pal_clock_s();
+    struct stat facts;
     say(options, "read", 0);
     report->label = -1;
+    /* a pipe or device would be waited for */
+    if (stat(path, &facts)) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    if (!S_ISREG(facts.st_mode)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a file", path);
     pal_err err;
     if (pal_label_volume_is(path)) {
         if (options->unit_m > 0 && options->unit_m != 1e-3)

@@ -1,0 +1,320 @@
+#!/bin/sh
+# The commands as a person runs them: exit codes, one line for a refusal, one JSON object, nothing half written, and
+# hostile files. Prints "N passed, N failed"; exit 1 when a check failed.
+# usage: test_commands.sh PALPATE [MOST_KB]     MOST_KB: address space a command may take (0: no limit, for sanitizers)
+set -u
+palpate=$(realpath "$1")
+most_kb=${2:-0}
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+passed=0 failed=0 bad=0
+
+check() { # check SENTENCE CONDITION...: the condition is a command
+    what=$1
+    shift
+    if "$@"; then return 0; fi
+    echo "  $name: $what"
+    bad=1
+}
+run() { # run ARGS...: into out, err, code
+    (
+        [ "$most_kb" -gt 0 ] && ulimit -v "$most_kb"
+        exec timeout 60 "$palpate" "$@"
+    ) >out 2>err </dev/null
+    code=$?
+}
+begin() { name=$1 bad=0; }
+end() {
+    if [ "$bad" -eq 0 ]; then
+        passed=$((passed + 1))
+        echo "ok   $name"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $name"
+        sed 's/^/    err: /' err
+    fi
+}
+lines() { wc -l <"$1" | tr -d ' '; }
+code_is() { [ "$code" -eq "$1" ]; }
+lines_are() { [ "$(lines "$1")" -eq "$2" ]; }
+is_empty() { [ ! -s "$1" ]; }
+has() { grep -q -- "$2" "$1"; }
+no_such() { [ ! -e "$1" ]; }
+is_json() { # one object, nothing else; with node when it is there
+    [ "$(lines "$1")" -eq 1 ] || return 1
+    if command -v node >/dev/null 2>&1; then
+        node -e 'const o = JSON.parse(require("fs").readFileSync(process.argv[1], "utf8"));
+                 if (typeof o !== "object" || Array.isArray(o)) process.exit(1);' "$1"
+    else
+        grep -q '^{.*}$' "$1"
+    fi
+}
+refused() { # refused CODE TEXT: exit code, one line on stderr that has the text, nothing on stdout
+    check "exit code $code, wanted $1" code_is "$1"
+    check "$(lines err) lines on stderr, wanted 1" lines_are err 1
+    check "stderr does not say \"$2\"" has err "$2"
+    check "something is on stdout" is_empty out
+}
+
+# ---- good input ----
+cat >box.obj <<'END'
+v 0 0 0
+v 100 0 0
+v 0 80 0
+v 100 80 0
+v 0 0 60
+v 100 0 60
+v 0 80 60
+v 100 80 60
+f 1 3 4 2
+f 5 6 8 7
+f 1 2 6 5
+f 3 7 8 4
+f 1 5 7 3
+f 2 4 8 6
+END
+
+begin "prepare writes a scene, says so on stdout and nothing on stderr"
+run prepare box.obj -o scene
+check "exit code $code" code_is 0
+check "stderr is not empty" is_empty err
+check "no tetrahedra on stdout" has out "tetrahedra"
+for file in scene.json box.palmesh box.node box.ele box.face; do check "$file is missing" test -s "scene/$file"; done
+check "something else is in the folder" test "$(ls -A scene | wc -l)" -eq 5
+end
+
+begin "prepare --json has every figure and is one object"
+run prepare box.obj -o scene2 --json --resolution 12 --units mm
+check "exit code $code" code_is 0
+check "stderr is not empty" is_empty err
+check "not one JSON object" is_json out
+for key in triangles voxels tets nodes components method volume_m3 volume_error degenerate duplicate nonfinite \
+    read tree fill split skin write total; do
+    check "no $key" has out "\"$key\":"
+done
+check "12 triangles" has out '"triangles":12,'
+check "one component" has out '"components":1,'
+check "units given, not guessed" has out '"units":{"name":"mm","m":0.001,"guessed":false}'
+end
+
+begin "tetgen finds the mesh consistent"
+if command -v tetgen >/dev/null 2>&1; then
+    # as a mesh: read back and checked; as a boundary: no facet cuts another
+    (cd scene2 && tetgen -rC box.node) >tetgen.out 2>&1
+    check "tetgen -rC does not read it as it is" has tetgen.out "Mesh tetrahedra: $(head -1 scene2/box.ele | cut -d' ' -f1)\$"
+    {
+        cat scene2/box.node
+        awk 'NR == 1 { print $1, 1 } NR > 1 { print 3, $2, $3, $4, 1 } END { print "0\n0" }' scene2/box.face
+    } >box.smesh
+    tetgen -d box.smesh >tetgen.out 2>&1
+    check "tetgen -d finds intersections" has tetgen.out "No faces are intersecting"
+else
+    echo "  left out: tetgen is not there"
+fi
+end
+
+begin "--quiet says nothing"
+run prepare box.obj -o scene3 --quiet
+check "exit code $code" code_is 0
+check "stdout is not empty" is_empty out
+check "stderr is not empty" is_empty err
+end
+
+begin "--procedural needs no file"
+run prepare --procedural -o organ --triangles 4000 --no-tetgen --name my-organ --title "My organ" --source me --json
+check "exit code $code" code_is 0
+check "no title in the scene" has organ/scene.json "My organ"
+check "TetGen files in spite of --no-tetgen" test "$(ls -A organ | wc -l)" -eq 2
+end
+
+begin "the same input gives the same files"
+run prepare box.obj -o again
+for file in scene.json box.palmesh box.node box.ele box.face; do check "$file differs" cmp -s "scene/$file" "again/$file"; done
+end
+
+begin "plan shows rows and JSON, for a scene, a folder and a surface"
+run plan scene/scene.json
+check "exit code $code" code_is 0
+check "no gravity row" has out "gravity"
+run plan scene --json
+check "exit code $code for a folder" code_is 0
+check "not one JSON object" is_json out
+check "no rows" has out '"rows":\[{'
+check "no sub-steps" has out '"substeps":'
+run plan box.obj --json
+check "exit code $code for a surface" code_is 0
+end
+
+begin "every command has --help, --version works, no command is usage"
+for command in serve prepare plan replay bench; do
+    run $command --help
+    check "$command --help: exit code $code" code_is 0
+    check "$command --help: no usage" has out "usage: palpate $command"
+    check "$command --help: stderr" is_empty err
+done
+run --version
+check "version: exit code $code" code_is 0
+check "no version" has out "^palpate [0-9]"
+run
+check "exit code $code without a command" code_is 2
+check "stdout without a command" is_empty out
+run dance
+refused 2 'no command "dance"'
+end
+
+# ---- wrong usage ----
+begin "wrong flags are refused by name with exit code 2"
+run prepare box.obj -o x --resolutoin 3
+refused 2 "unknown flag --resolutoin"
+run prepare box.obj -o x --resolution
+refused 2 "--resolution needs a value"
+run prepare box.obj -o x --resolution many
+refused 2 '--resolution: "many" is not a number'
+run prepare box.obj -o x --resolution 5000
+refused 2 "--resolution: 5000 is outside 1 .. 1024"
+run prepare box.obj -o x --resolution 2.5
+refused 2 "2.5 is not a whole number"
+run prepare box.obj -o x --young-Pa nan
+refused 2 "--young-Pa"
+run prepare box.obj -o x --units furlong
+refused 2 "--units"
+run prepare box.obj -o x --label 3 --label 4
+refused 2 "--label is there twice"
+run prepare box.obj -o x --json=yes
+refused 2 "--json takes no value"
+run prepare box.obj
+refused 2 "needs -o DIR"
+run prepare -o x
+refused 2 "either a file or --procedural"
+run prepare box.obj --procedural -o x
+refused 2 "either a file or --procedural"
+run prepare box.obj other.obj -o x
+refused 2 "one word too many"
+run plan
+refused 2 "nothing to work on"
+run replay one
+refused 2 "a word is missing"
+run bench nothing
+refused 2 'no bench "nothing"'
+run serve box.obj --port 70000
+refused 2 "--port: 70000 is outside 0 .. 65535"
+check "a folder was made" no_such x
+end
+
+begin "configuration: file and environment are refused by name"
+echo '{"port": 1, "prot": 2}' >bad.json
+run serve box.obj --config bad.json
+refused 1 "bad.json: prot: unknown key"
+echo '{"port": "x"}' >bad.json
+run serve box.obj --config bad.json
+refused 1 "bad.json: port: is not a number"
+echo '{"port": 1,' >bad.json
+run serve box.obj --config bad.json
+refused 1 "bad.json: line"
+PALPATE_MOST_CLIENTS=none run serve box.obj
+refused 1 "PALPATE_MOST_CLIENTS"
+PALPATE_NOTHING=1 run serve box.obj
+refused 1 "PALPATE_NOTHING: unknown key"
+PALPATE_CONFIG=gone.json run serve box.obj
+refused 1 "gone.json"
+end
+
+# ---- refused input ----
+begin "files that are not there or not files"
+run prepare gone.stl -o x
+refused 1 "gone.stl"
+run prepare . -o x
+refused 1 "\.: "
+run plan gone.json
+refused 1 "gone.json"
+run replay gone.log scene
+refused 1 "gone.log"
+run replay box.obj scene
+refused 1 "not an input log"
+check "a folder was made" no_such x
+end
+
+begin "a refusal with --json is an object on stdout and one line on stderr"
+run prepare gone.stl -o x --json
+check "exit code $code" code_is 1
+check "$(lines err) lines on stderr" lines_are err 1
+check "not one JSON object" is_json out
+check "no error in it" has out '"ok":false,"error":{"code":"IO"'
+end
+
+begin "a folder that cannot be written leaves nothing"
+echo file >blocked
+run prepare box.obj -o blocked
+refused 1 "blocked"
+run prepare box.obj -o blocked/deeper
+refused 1 "blocked"
+mkdir -p taken/scene.json
+run prepare box.obj -o taken
+check "exit code $code" code_is 1
+check "something was left in the folder" test -z "$(ls -A taken | grep '^\.')"
+end
+
+begin "a bad scene is refused with file and entry"
+sed 's/"young_Pa"/"youngPa"/' scene/scene.json >scene/bad.json
+run plan scene/bad.json
+refused 1 "scene/bad.json: bodies\[0\].material.youngPa: unknown key"
+sed 's/"gravity"/"gravitas"/' scene/scene.json >scene/bad.json
+run plan scene/bad.json
+refused 1 "gravitas"
+sed 's/5000/1e12/' scene/scene.json >scene/bad.json
+run plan scene/bad.json
+refused 1 "sub-steps"
+head -c 3000 scene/box.palmesh >scene/cut.palmesh
+sed 's/box.palmesh/cut.palmesh/' scene/scene.json >scene/bad.json
+run plan scene/bad.json
+refused 1 "cut.palmesh"
+end
+
+# ---- hostile files: every one is refused with exit code 1, one line that names the file, and no folder ----
+noise() { # noise N: bytes that are the same every time
+    awk -v n="$1" 'BEGIN { s = 42; for (k = 0; k < n; k++) { s = (s * 1103515245 + 12345) % 2147483648; printf "%c", 1 + s % 127 } }'
+}
+zeros() { head -c "$1" /dev/zero; }
+: >h_empty.stl
+noise 4000 >h_noise.bin
+{ zeros 80; printf '\377\377\377\377'; zeros 50; } >h_count.stl
+{ printf 'solid x'; zeros 73; printf '\144\000\000\000'; zeros 1000; } >h_cut.stl
+printf 'ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n' >h_count.ply
+printf 'ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n' >h_list.ply
+{ zeros 36; printf '\377\377\377\177'; } >>h_list.ply
+printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n' >h_cut.ply
+printf 'v nan nan nan\nv inf 0 0\nv 0 1e999 0\nf 1 2 3\n' >h_nan.obj
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999\n' >h_index.obj
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -9\n' >h_negative.obj
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\n' >h_nofaces.obj
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n' >h_flat.obj
+printf 'OFF\n2000000000 2000000000 0\n0 0 0\n' >h_count.off
+printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2000000000 0 1 2\n' >h_polygon.off
+{ printf '\134\001\000\000'; zeros 36; printf '\003\000\377\177\377\177\377\177\001\000\001\000\001\000\001\000'; zeros 14
+    printf '\002\000\010\000'; zeros 270; printf 'n+1\000'; zeros 8; } >h_dims.nii
+printf '#INRIMAGE-4#{\nXDIM=100000\nYDIM=100000\nZDIM=100000\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 bits\n' >h_dims.inr
+{ head -c 256 h_dims.inr; zeros 300; } >h_dims2.inr
+head -c 100000 /dev/zero | gzip -c >h_zeros.nii.gz
+head -c 60 h_zeros.nii.gz >h_cut.nii.gz
+printf '\037\213\010\000garbage' >h_broken.inr.gz
+mkfifo h_pipe.stl
+for file in h_*; do
+    begin "hostile $file"
+    run prepare "$file" -o hostile
+    refused 1 "$file"
+    check "a folder was made" no_such hostile
+    end
+done
+
+# a file that grows a thousandfold when unpacked costs no more than its header says
+begin "a bomb of zeros is refused"
+{ printf '#INRIMAGE-4#{\nXDIM=16\nYDIM=16\nZDIM=16\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 bits\nCPU=decm\n'; zeros 300; } |
+    head -c 256 >head.inr
+{ cat head.inr; zeros 200000000; } | gzip -1 -c >bomb.inr.gz
+run prepare bomb.inr.gz -o hostile
+refused 1 "bomb.inr.gz"
+end
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]

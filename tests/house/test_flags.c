@@ -1,0 +1,194 @@
+/* Flags and configuration: what each source may say, which one wins, and what is refused with which words. */
+#include "server/commands/flags.h"
+#include "server/config.h"
+#include "tests/check.h"
+
+#include <fcntl.h>
+
+static double number;
+static int count;
+static bool on;
+static const char *text;
+static pal_config config;
+static pal_flag_common common;
+static const char *operand[2];
+static int n_operand;
+static char said[4096]; /* what went to stderr */
+
+/* parses words (ended by NULL) with stderr caught; the result is the parser's */
+static int parse(bool with_config, char **word)
+{
+    const pal_flag flag[] = {{"--number", "X", PAL_FLAG_NUMBER, &number, -2, 5, "a number"},
+                             {"--count", "N", PAL_FLAG_COUNT, &count, 1, 9, "a count"},
+                             {"--on", NULL, PAL_FLAG_SWITCH, &on, 0, 0, "a switch"},
+                             {"-o", "TEXT", PAL_FLAG_TEXT, &text, 0, 0, "a text"}};
+    const pal_flag_table table = {.usage = "try",
+                                  .about = "",
+                                  .flag = flag,
+                                  .n_flag = 4,
+                                  .most_operand = 2,
+                                  .config = with_config ? &config : NULL};
+    int argc = 0;
+    while (word[argc]) argc++;
+    number = 1, count = 2, on = false, text = NULL, n_operand = 0;
+    FILE *file = tmpfile();
+    int old = dup(STDERR_FILENO);
+    if (!file || old < 0) return -100;
+    fflush(stderr);
+    dup2(fileno(file), STDERR_FILENO);
+    int code = pal_flags_parse(&table, argc, word, &common, operand, &n_operand);
+    fflush(stderr);
+    dup2(old, STDERR_FILENO);
+    close(old);
+    rewind(file);
+    size_t n = fread(said, 1, sizeof said - 1, file);
+    said[n] = 0;
+    fclose(file);
+    return code;
+}
+#define PARSE(...)     parse(false, (char *[]){"try", __VA_ARGS__, NULL})
+#define CONFIGURE(...) parse(true, (char *[]){"try", __VA_ARGS__, NULL})
+#define WRONG(call, part)                                                                                              \
+    do {                                                                                                               \
+        CHECK_INT(call, 2);                                                                                            \
+        CHECK(strchr(said, '\n') == said + strlen(said) - 1);                                                          \
+        if (!strstr(said, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", said, part);                                 \
+    } while (0)
+
+static void values_may_stand_apart_or_behind_an_equal_sign(void)
+{
+    CHECK_INT(PARSE("a", "--number", "-1.5", "--count=7", "b", "--on", "-o", "-dash", "--json"), -1);
+    CHECK_NEAR(number, -1.5, 0);
+    CHECK_INT(count, 7);
+    CHECK(on && common.json && !common.quiet);
+    CHECK_TEXT(text, "-dash");
+    CHECK_INT(n_operand, 2);
+    CHECK_TEXT(operand[1], "b");
+    CHECK_TEXT(common.command, "try");
+    CHECK_TEXT(said, "");
+    CHECK_INT(PARSE("--quiet", "--", "--on", "-"), -1);
+    CHECK(!on && common.quiet);
+    CHECK_TEXT(operand[0], "--on");
+    CHECK_INT(PARSE("-"), -1);
+    CHECK_INT(n_operand, 1);
+    CHECK_INT(PARSE("-o="), -1);
+    CHECK_TEXT(text, "");
+}
+
+static void what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range(void)
+{
+    WRONG(PARSE("--nmber", "3"), "unknown flag --nmber");
+    WRONG(PARSE("--number=6"), "--number: 6 is outside -2 .. 5");
+    WRONG(PARSE("--number", "3x"), "--number: \"3x\" is not a number");
+    WRONG(PARSE("--number", ""), "is not a number");
+    WRONG(PARSE("--number", " 3"), "is not a number");
+    WRONG(PARSE("--number", "inf"), "is not a number");
+    WRONG(PARSE("--number", "1e999"), "is not a number");
+    WRONG(PARSE("--count", "1.5"), "1.5 is not a whole number");
+    WRONG(PARSE("--count", "99999999999"), "--count: 1e+11 is outside 1 .. 9");
+    WRONG(PARSE("--count"), "--count needs a value");
+    WRONG(PARSE("--on=1"), "--on takes no value");
+    WRONG(PARSE("--on", "--on"), "--on is there twice");
+    WRONG(PARSE("a", "b", "c"), "\"c\" is one word too many");
+    WRONG(PARSE("--port", "80"), "unknown flag --port");
+    WRONG(PARSE("--x\ny"), "unknown flag --x y");
+}
+
+static void flags_win_over_environment_over_file_over_defaults(void)
+{
+    char path[] = "/tmp/palpate_config_XXXXXX";
+    int file = mkstemp(path);
+    static const char json[] = "{\"port\": 1111, \"most_clients\": 7, \"log\": \"debug\", \"allow_remote\": true}";
+    REQUIRE(file >= 0);
+    REQUIRE(write(file, json, sizeof json - 1) == (ssize_t)(sizeof json - 1));
+    close(file);
+    CHECK_INT(CONFIGURE("a"), -1);
+    CHECK_INT(config.port, 8090);
+    CHECK_TEXT(config.listen, "127.0.0.1");
+    CHECK(!config.allow_remote);
+    CHECK_INT(config.most_clients, 200);
+    CHECK_INT(pal_config_log_level(&config), PAL_LOG_INFO);
+    setenv("PALPATE_PORT", "2222", 1);
+    setenv("PALPATE_ALLOW_REMOTE", "false", 1);
+    CHECK_INT(CONFIGURE("a", "--config", path), -1);
+    CHECK_INT(config.port, 2222);
+    CHECK_INT(config.most_clients, 7);
+    CHECK(!config.allow_remote);
+    CHECK_INT(pal_config_log_level(&config), PAL_LOG_DEBUG);
+    CHECK_INT(CONFIGURE("a", "--port", "3333", "--config", path, "--allow-remote"), -1);
+    CHECK_INT(config.port, 3333);
+    CHECK(config.allow_remote);
+    setenv("PALPATE_CONFIG", path, 1);
+    CHECK_INT(CONFIGURE("a"), -1);
+    CHECK_INT(config.most_clients, 7);
+    unsetenv("PALPATE_CONFIG");
+    setenv("PALPATE_PORT", "x", 1);
+    CHECK_INT(CONFIGURE("a"), 1);
+    CHECK(strstr(said, "PALPATE_PORT: \"x\" is not a number") != NULL);
+    unsetenv("PALPATE_PORT");
+    unsetenv("PALPATE_ALLOW_REMOTE");
+    WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is there twice");
+    WRONG(CONFIGURE("--most-clients", "0"), "--most-clients: 0 is outside 1 .. 10000");
+    WRONG(CONFIGURE("--log", "loud"), "--log: \"loud\" is not error, warn, info or debug");
+    WRONG(CONFIGURE("--listen", ""), "--listen: is empty");
+    CHECK_INT(CONFIGURE("--config", "/no/such.json"), 1);
+    CHECK(strstr(said, "/no/such.json") != NULL);
+    unlink(path);
+}
+
+static void a_bad_file_changes_nothing_and_names_file_and_key(void)
+{
+    static const struct {
+        const char *json, *sentence;
+    } bad[] = {{"", "c.json: line 1: not JSON"},
+               {"{\n\"port\": 1,\n}", "c.json: line 3: not JSON"},
+               {"[]", "c.json: not a JSON object"},
+               {"{} x", "c.json: line 1: not JSON"},
+               {"{\"prot\": 1}", "c.json: prot: unknown key"},
+               {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is there twice"},
+               {"{\"most_clients\": 3, \"port\": -1}", "c.json: port: -1 is outside 0 .. 65535"},
+               {"{\"port\": 80.5}", "c.json: port: 80.5 is not a whole number"},
+               {"{\"port\": \"80\"}", "c.json: port: is not a number"},
+               {"{\"allow_remote\": 1}", "c.json: allow_remote: is not true or false"},
+               {"{\"listen\": 1}", "c.json: listen: is not a text"},
+               {"{\"viewer\": \"a\\u0001\"}", "c.json: viewer: has a control character"},
+               {"{\"error_m\": 1}", "c.json: error_m: 1 is outside 0 .. 0.01"}};
+    pal_config_default(&config);
+    pal_config before = config;
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        pal_note note = {""};
+        CHECK_INT(pal_config_parse(&config, "c.json", bad[k].json, strlen(bad[k].json), &note), PAL_ERR_REFUSED);
+        CHECK_TEXT(note.text, bad[k].sentence);
+        CHECK(!memcmp(&before, &config, sizeof config));
+    }
+    char *variable[] = {"HOME=/", "PALPATE_MOST_CLIENTS=5", "PALPATE_PORT=70000", NULL};
+    pal_note note = {""};
+    CHECK_INT(pal_config_environment(&config, variable, &note), PAL_ERR_REFUSED);
+    CHECK_TEXT(note.text, "PALPATE_PORT: 70000 is outside 0 .. 65535");
+    CHECK_INT(config.most_clients, 200);
+}
+
+static void long_texts_are_refused(void)
+{
+    char long_text[400];
+    pal_note note = {""};
+    memset(long_text, 'a', sizeof long_text - 1);
+    long_text[sizeof long_text - 1] = 0;
+    pal_config_default(&config);
+    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &note), PAL_ERR_REFUSED);
+    CHECK_TEXT(note.text, "--viewer: 399 bytes of text, more than 255");
+    CHECK_INT(pal_config_set(&config, "log", long_text, "--log", &note), PAL_ERR_REFUSED);
+    long_text[255] = 0;
+    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &note), 0);
+    CHECK_INT(strlen(config.viewer), 255);
+}
+
+int main(void)
+{
+    RUN(values_may_stand_apart_or_behind_an_equal_sign);
+    RUN(what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range);
+    RUN(flags_win_over_environment_over_file_over_defaults);
+    RUN(a_bad_file_changes_nothing_and_names_file_and_key);
+    RUN(long_texts_are_refused);
+    return check_report();
+}
