@@ -60,18 +60,23 @@ static bool spread(flood *f)
     return true;
 }
 
-/* a point a thousandth of a voxel behind the triangle; false for triangles without area */
-static bool seed_point(const pal_surface *s, int t, double side, double h, double out[3])
+/* a point a thousandth of a voxel behind the triangle, or half way to the next wall when that is nearer; false for
+ * triangles without area */
+static bool seed_point(const flood *f, const pal_surface *s, int t, double side, double out[3])
 {
     const int32_t *c = s->tri + 3 * (size_t)t;
     const double *a = s->x + 3 * (size_t)c[0], *b = s->x + 3 * (size_t)c[1], *e = s->x + 3 * (size_t)c[2];
-    double u[3], v[3], normal[3];
+    double u[3], v[3], inward[3], start[3], h = f->grid->h_m;
     pal_sub3(u, b, a);
     pal_sub3(v, e, a);
-    pal_cross3(normal, u, v);
-    if (!pal_unit3(normal, normal, 0)) return false;
-    for (int k = 0; k < 3; k++) out[k] = (a[k] + b[k] + e[k]) / 3 - side * 1e-3 * h * normal[k];
-    return pal_finite3(out);
+    pal_cross3(inward, u, v);
+    if (!pal_unit3(inward, inward, 0)) return false;
+    pal_scale3(inward, -side, inward);
+    for (int k = 0; k < 3; k++) start[k] = (a[k] + b[k] + e[k]) / 3 + 1e-7 * h * inward[k];
+    if (!pal_finite3(start)) return false;
+    double wall = pal_box_tree_ray(f->tree, start, inward, 2e-3 * h, NULL);
+    for (int k = 0; k < 3; k++) out[k] = start[k] + (wall >= 0 ? wall / 2 : 1e-3 * h) * inward[k];
+    return true;
 }
 
 pal_err pal_voxels_flood(const pal_surface *surface, const pal_box_tree *tree, const pal_voxels *grid, pal_bits *inside,
@@ -83,7 +88,7 @@ pal_err pal_voxels_flood(const pal_surface *surface, const pal_box_tree *tree, c
     for (int t = 0; ok && !f.leaked && t < surface->n_tri; t++) {
         double seed[3], centre[3];
         int32_t at[3];
-        if (!seed_point(surface, t, side, grid->h_m, seed)) continue;
+        if (!seed_point(&f, surface, t, side, seed)) continue;
         bool within = true;
         for (int k = 0; k < 3; k++) {
             at[k] = (int32_t)((seed[k] - grid->low_m[k]) / grid->h_m);
