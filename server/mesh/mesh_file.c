@@ -84,7 +84,7 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
                             pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
                             pal_note *note)
 {
-    static const pal_mesh_file_options plain = {0, 0};
+    static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
     char shown[128];
     show_name(shown, name);
     pal_mesh_build build = {

@@ -7,6 +7,10 @@
 #include "server/mesh/surface.h"
 #include "server/mesh/tets.h"
 
+/* the weld to use when nobody says otherwise: joins what single precision in a file has torn apart */
+#define PAL_MESH_WELD 1e-6
+
+/* NULL stands for {0, PAL_MESH_WELD} */
 typedef struct pal_mesh_file_options {
     double unit_m; /* metres per file unit; 0: guess with pal_mesh_unit_guess */
     double weld;   /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
