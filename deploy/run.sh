@@ -44,9 +44,12 @@ find_scan() {
     [ -e "$scan" ]
 }
 
+# a scene is prepared again (a second) when the program that reads it is newer
+stale() { [ ! -e "$1" ] || [ "$palpate" -nt "$1" ]; }
+
 if [ -z "$input" ]; then
     input=$build/scene/liver/scene.json
-    if [ ! -e "$input" ]; then
+    if stale "$input"; then
         if find_scan; then
             say "preparing the liver of an abdominal CT"
             "$palpate" prepare "$scan" --label 255 --name liver --title "Liver, from an abdominal CT" \
@@ -54,7 +57,7 @@ if [ -z "$input" ]; then
                 --quiet || fail "the scene could not be prepared"
         else
             input=$build/scene/organ/scene.json
-            if [ ! -e "$input" ]; then
+            if stale "$input"; then
                 say "the scan cannot be had here, preparing our own organ"
                 "$palpate" prepare --procedural -o "$build/scene/organ" --quiet || fail "the scene could not be prepared"
             fi
