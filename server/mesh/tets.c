@@ -12,6 +12,7 @@
 
 /* face opposite to each corner, counter-clockwise from outside of a tet of positive volume */
 static const uint8_t OPPOSITE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+enum { SHORT = 96 };
 static const uint8_t EDGE[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 /* one face in the bucket of its smallest node */
@@ -62,6 +63,35 @@ static int compare_nodes(const void *a, const void *b)
 {
     int32_t s = *(const int32_t *)a, t = *(const int32_t *)b;
     return s < t ? -1 : s > t;
+}
+
+/* buckets are short: insertion, and the library's sort for the odd long one */
+static void sort_nodes(int32_t *node, int64_t n)
+{
+    if (n > SHORT) {
+        qsort(node, (size_t)n, sizeof *node, compare_nodes);
+        return;
+    }
+    for (int64_t a = 1; a < n; a++) {
+        int32_t moved = node[a];
+        int64_t b = a;
+        for (; b > 0 && moved < node[b - 1]; b--) node[b] = node[b - 1];
+        node[b] = moved;
+    }
+}
+
+static void sort_sides(side *s, int64_t n)
+{
+    if (n > SHORT) {
+        qsort(s, (size_t)n, sizeof *s, compare_sides);
+        return;
+    }
+    for (int64_t a = 1; a < n; a++) {
+        side moved = s[a];
+        int64_t b = a;
+        for (; b > 0 && compare_sides(&moved, &s[b - 1]) < 0; b--) s[b] = s[b - 1];
+        s[b] = moved;
+    }
 }
 
 /* smallest, middle, largest node of a face */
@@ -117,21 +147,7 @@ static pal_err sides_make(const pal_tets *tets, sides *out)
         }
     step_back(start, tets->n_node);
 
-    /* buckets are short: insertion, and the library's sort for the odd long one */
-    for (size_t i = 0; i < n_node; i++) {
-        side *s = item + start[i];
-        int64_t n = start[i + 1] - start[i];
-        if (n > 96) {
-            qsort(s, (size_t)n, sizeof *s, compare_sides);
-            continue;
-        }
-        for (int64_t a = 1; a < n; a++) {
-            side moved = s[a];
-            int64_t b = a;
-            for (; b > 0 && compare_sides(&moved, &s[b - 1]) < 0; b--) s[b] = s[b - 1];
-            s[b] = moved;
-        }
-    }
+    for (size_t i = 0; i < n_node; i++) sort_sides(item + start[i], start[i + 1] - start[i]);
     *out = (sides){start, item};
     return PAL_ERR_OK;
 }
@@ -214,7 +230,7 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
     int64_t n_kept = 0;
     for (size_t i = 0; i < n_node; i++) {
         int64_t a = start[i], b = start[i + 1];
-        qsort(end + a, (size_t)(b - a), sizeof *end, compare_nodes);
+        sort_nodes(end + a, b - a);
         start[i] = n_kept;
         for (int64_t k = a; k < b; k++)
             if (k == a || end[k] != end[k - 1]) end[n_kept++] = end[k];
