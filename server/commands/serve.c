@@ -110,7 +110,7 @@ static void make_unique(serve_run *run, int index)
     memcpy(base, name, PAL_NAME);
     for (int number = 2, i = 0; i < index; i++)
         if (!strcmp(run->scene[i]->scene.name, name)) {
-            snprintf(name, PAL_NAME, "%.*s-%d", PAL_NAME - 6, base, number++ % 10000);
+            snprintf(name, PAL_NAME, "%.*s-%d", PAL_NAME - 8, base, number++ % 10000);
             i = -1;
         }
 }

@@ -1,10 +1,11 @@
 /* Packets are one heap block each: head, room for a road's header, bytes. */
 #include "server/net/packet.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
-static size_t total;
+static _Atomic size_t total; /* of all servers of the process */
 
 pal_packet *pal_packet_create(const void *bytes, size_t n_byte, bool text)
 {
