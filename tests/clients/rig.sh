@@ -1,0 +1,100 @@
+# Shared by the shell tests of the clients: a small scene, a server on it, numbers out of JSON, conditions waited for.
+# Sourced with $bin (folder of the programs) set; needs nothing but the programs and POSIX tools.
+set -u
+work=$(mktemp -d)
+pids=""
+passed=0 failed=0
+
+cleanup() {
+    for pid in $pids; do kill "$pid" 2>/dev/null; done
+    for pid in $pids; do wait "$pid" 2>/dev/null; done
+    rm -rf "$work"
+}
+trap cleanup EXIT
+trap 'exit 1' INT TERM
+
+# runs the test again in a network namespace of its own with multicast on lo; exit 77 (left out) where that is refused
+own_network() {
+    if [ "${PAL_NAMESPACE:-}" != yes ]; then
+        for how in -n -rn; do
+            if unshare $how true 2>/dev/null; then
+                rm -rf "$work"
+                PAL_NAMESPACE=yes exec unshare $how sh "$0" "$@"
+            fi
+        done
+        echo "left out: no network namespace (needs root or user namespaces)"
+        exit 77
+    fi
+    ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo || {
+        echo "left out: no multicast on lo"
+        exit 77
+    }
+}
+
+# a ball of 40 mm radius, held at its lower third, no gravity: quick to step, the same every time
+make_scene() {
+    awk 'BEGIN { R = 12; S = 20; r = 0.04; pi = 3.14159265358979
+        print "v 0 0 " r
+        for (i = 1; i < R; i++) for (j = 0; j < S; j++) {
+            t = pi * i / R; p = 2 * pi * j / S
+            printf "v %.6f %.6f %.6f\n", r * sin(t) * cos(p), r * sin(t) * sin(p), r * cos(t) }
+        print "v 0 0 " (-r); n = 2 + (R - 1) * S
+        for (j = 0; j < S; j++) {
+            k = (j + 1) % S; print "f 1 " 2 + j " " 2 + k; print "f " n " " 2 + (R - 2) * S + k " " 2 + (R - 2) * S + j
+            for (i = 0; i < R - 2; i++) { a = 2 + i * S + j; b = 2 + i * S + k
+                print "f " a " " a + S " " b + S; print "f " a " " b + S " " b } } }' >"$work/ball.obj"
+    cat >"$work/ball.json" <<'SCENE'
+{"name": "ball", "title": "Ball", "gravity_m_s2": 0,
+ "bodies": [{"name": "ball", "surface": "ball.obj", "units": "m", "resolution": 6, "supports": [{"lowest": 0.3}],
+             "effects": [{"name": "tool_push"}, {"name": "tool_grab"}, {"name": "finite_guard"}]}],
+ "tools": [{"name": "probe 1", "radius_m": 0.008}, {"name": "probe 2", "radius_m": 0.008},
+           {"name": "probe 3", "radius_m": 0.008}]}
+SCENE
+}
+
+# await SECONDS COMMAND...: until the command succeeds; fails after the time
+await() {
+    n=$(($1 * 20))
+    shift
+    while ! "$@" >/dev/null 2>&1; do
+        n=$((n - 1))
+        [ $n -gt 0 ] || return 1
+        sleep 0.05
+    done
+}
+
+# start_server [flags]: serves the ball; sets $server_pid, $port, $url
+start_server() {
+    : >"$work/serve.out"
+    timeout 120 "$bin/palpate" serve "$work/ball.json" --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
+    pids="$pids $!"
+    server_job=$!
+    if ! await 60 grep -q '"port"' "$work/serve.out"; then
+        echo "the server does not start:"
+        cat "$work/serve.err"
+        exit 1
+    fi
+    port=$(json port "$work/serve.out")
+    server_pid=$(json pid "$work/serve.out")
+    url="ws://127.0.0.1:$port/ws"
+}
+
+# json KEY FILE: first number (or word) of that key
+json() { tr ',{}' '\n\n\n' <"$2" | sed -n "s/^\"$1\":\"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p" | head -1; }
+
+# check SENTENCE ACTUAL OPERATOR WANTED: compares numbers
+check() {
+    if [ -n "$2" ] && awk -v a="$2" -v b="$4" "BEGIN { exit !(a $3 b) }"; then
+        passed=$((passed + 1))
+        echo "ok   $1 ($2 $3 $4)"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $1 (${2:-nothing} $3 $4)"
+    fi
+}
+
+finish() {
+    echo "$passed passed, $failed failed"
+    [ "$failed" -eq 0 ]
+    exit
+}

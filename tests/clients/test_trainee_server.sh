@@ -1,0 +1,69 @@
+#!/bin/sh
+# palpate-trainee against a real server: presses, pulls, many at once, slow and stalled readers, a server that goes and
+# comes back, nobody at the address. usage: test_trainee_server.sh FOLDER_OF_PROGRAMS
+bin=$1
+. "$(dirname "$0")/rig.sh"
+make_scene
+start_server --port 0
+run() { # NAME flags: report in $work/NAME, exit code in $code
+    name=$1
+    shift
+    timeout 60 "$bin/palpate-trainee" "$url" --json "$@" >"$work/$name" 2>"$work/$name.err"
+    code=$?
+    [ $code -eq 0 ] || cat "$work/$name.err"
+}
+
+run press --script press --seconds 4
+check "a press passes every check of every frame" $code == 0
+check "its poses come back in frames" "$(tr ',{}' '\n\n\n' <"$work/press" | sed -n '/latency_ms/,/mean/s/"n"://p' | head -1)" '>' 20
+check "the organ gives way by more than 2 mm" "$(json moved_mm "$work/press")" '>' 2
+check "the tool feels it" "$(json force_max_N "$work/press")" '>' 0.05
+
+run pull --script pull --seconds 4
+check "a pull passes every check" $code == 0
+check "it moves the organ by more than 5 mm" "$(json moved_mm "$work/pull")" '>' 5
+
+printf '# t x y z buttons\n0 0 0 0.02 0\n1 0 0 0.004 0\n2 0 0 0.02 0\n' >"$work/script"
+run file --script "$work/script" --seconds 3
+check "a script from a file runs" $code == 0
+check "and touches" "$(json force_max_N "$work/file")" '>' 0.01
+
+run crowd --clients 8 --script circle --seconds 3
+check "eight at once pass every check" $code == 0
+check "all of them have joined" "$(json joined "$work/crowd")" == 8
+check "each tool has one holder" "$(json with_tool "$work/crowd")" == 3
+
+# a slow reader beside a fast one: the fast one is served as if alone
+timeout 60 "$bin/palpate-trainee" "$url" --json --script idle --slow 3000 --seconds 6 --name slow >"$work/slow" 2>/dev/null &
+slow=$!
+run fast --script press --seconds 4
+wait $slow
+check "a slow reader passes every check" $? == 0
+check "and takes fewer cycles" "$(json cycles_per_s "$work/slow")" '<' "$(json cycles_per_s "$work/fast")"
+check "a fast one beside it passes" $code == 0
+
+run stall --stall 2 --script press --seconds 5
+check "a reader that stalls for 2 s passes every check" $code == 0
+check "and is current again within the credit of 12 cycles" "$(json old_cycles_after_stall "$work/stall")" '<=' 12
+
+# the server goes away and comes back on the same port
+timeout 60 "$bin/palpate-trainee" "$url" --json --seconds 9 >"$work/again" 2>/dev/null &
+again=$!
+sleep 2
+kill "$server_job"
+wait "$server_job" 2>/dev/null
+start_server --port "$port"
+wait $again
+check "a trainee outlives its server" $? == 0
+check "and joins again by itself" "$(json reconnects "$work/again")" '>=' 1
+
+kill "$server_job"
+wait "$server_job" 2>/dev/null
+run nobody --seconds 1 2>/dev/null
+check "nobody at the address is a failure" $code == 1
+check "said in one line" "$(wc -l <"$work/nobody.err")" == 1
+timeout 5 "$bin/palpate-trainee" ftp://x >/dev/null 2>&1
+check "an address of another kind is refused" $? == 1
+timeout 5 "$bin/palpate-trainee" "$url" --nonsense >/dev/null 2>&1
+check "an unknown flag is wrong usage" $? == 2
+finish
