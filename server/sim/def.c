@@ -53,7 +53,7 @@ pal_err pal_material_check(pal_material *material, pal_note *note)
         double value, low, high;
     } range[] = {{"young_Pa", material->young_Pa, 1e-6, 1e15},
                  {"poisson", material->poisson, -0.9999, 0.5},
-                 {"density_kg_m3", material->density_kg_m3, 1e-12, 1e18},
+                 {"density_kg_m3", material->density_kg_m3, 1e-24, 1e24},
                  {"damping_1_s", material->damping_1_s, 0, 1e9}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))

@@ -5,7 +5,48 @@
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
 
+#include <pthread.h>
+
 static pal_note note;
+
+/* heap calls of this process, counted while `counting` */
+static bool counting;
+static int n_heap_call;
+void *__real_malloc(size_t n_byte);
+void *__real_calloc(size_t n, size_t n_byte);
+void *__real_realloc(void *old, size_t n_byte);
+void *__real_aligned_alloc(size_t align, size_t n_byte);
+void __real_free(void *old);
+void *__wrap_malloc(size_t n_byte);
+void *__wrap_calloc(size_t n, size_t n_byte);
+void *__wrap_realloc(void *old, size_t n_byte);
+void *__wrap_aligned_alloc(size_t align, size_t n_byte);
+void __wrap_free(void *old);
+void *__wrap_malloc(size_t n_byte)
+{
+    n_heap_call += counting;
+    return __real_malloc(n_byte);
+}
+void *__wrap_calloc(size_t n, size_t n_byte)
+{
+    n_heap_call += counting;
+    return __real_calloc(n, n_byte);
+}
+void *__wrap_realloc(void *old, size_t n_byte)
+{
+    n_heap_call += counting;
+    return __real_realloc(old, n_byte);
+}
+void *__wrap_aligned_alloc(size_t align, size_t n_byte)
+{
+    n_heap_call += counting;
+    return __real_aligned_alloc(align, n_byte);
+}
+void __wrap_free(void *old)
+{
+    n_heap_call += counting;
+    __real_free(old);
+}
 
 static bool has_row(const pal_world *world, const char *name)
 {
@@ -57,8 +98,264 @@ static void has_rows_only_for_what_the_scene_calls_for(void)
     box_free(&box);
 }
 
+/* a held box with every default effect and two tools: one presses, one grabs and pulls */
+static pal_world *open_touched(pal_prepared *box, pal_scene **scene)
+{
+    if (box_make(6, 4, 4, 0.01, box)) return NULL;
+    *scene = box_scene(box, true, true);
+    pal_body_def *def = &(*scene)->body[0];
+    pal_item_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
+    pal_item_init(&def->effect[def->n_effect++], "effects[3]", "tool_grab");
+    pal_tools_default(*scene, 2);
+    (*scene)->tool[0].radius_m = (*scene)->tool[1].radius_m = 0.008;
+    pal_world *world;
+    pal_note why;
+    if (!pal_world_create(*scene, &why, &world)) return world;
+    printf("  %s\n", why.text);
+    return NULL;
+}
+
+static void move_tools(pal_world *world, int tick)
+{
+    double t = tick / 60.0;
+    pal_pose press = {.position_m = {0.02, 0.02, 0.06 - 0.04 * t}, .quat = {1, 0, 0, 0}};
+    pal_pose pull = {.position_m = {0.05, 0.02 + 0.01 * t, 0.044 + 0.01 * t}, .quat = {1, 0, 0, 0}, .buttons = 1};
+    pal_world_pose(world, 0, &press);
+    pal_world_pose(world, 1, &pull);
+}
+
+static void touches_no_heap_in_a_step_with_tools_pressing(void)
+{
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world = open_touched(&box, &scene);
+    REQUIRE(world);
+    pal_frame *frame = pal_frame_create(world);
+    REQUIRE(frame);
+    bool touched = false, held = false;
+    n_heap_call = 0;
+    for (int i = 0; i < 100; i++) {
+        move_tools(world, i);
+        counting = true;
+        pal_err err = pal_world_step(world, scene->step_s);
+        pal_world_frame(world, frame);
+        uint64_t hash = pal_world_hash(world);
+        counting = false;
+        CHECK_INT(err, 0);
+        CHECK(hash != 0);
+        touched = touched || frame->tool[0].touching;
+        held = held || frame->tool[1].holding;
+    }
+    CHECK(touched);
+    CHECK(held);
+    CHECK_INT(n_heap_call, 0);
+    pal_frame_destroy(frame);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
+static void *run_alone(void *out)
+{
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world = open_touched(&box, &scene);
+    if (!world) return NULL;
+    for (int i = 0; i < 60; i++) {
+        move_tools(world, i);
+        pal_world_step(world, scene->step_s);
+    }
+    *(uint64_t *)out = pal_world_hash(world);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+    return NULL;
+}
+
+static void gives_the_same_hash_whatever_runs_beside_it(void)
+{
+    uint64_t alone = 0;
+    run_alone(&alone);
+    CHECK(alone != 0);
+    for (int n = 2; n <= 4; n += 2) {
+        pthread_t thread[4];
+        uint64_t hash[4] = {0};
+        for (int i = 0; i < n; i++) REQUIRE(!pthread_create(&thread[i], NULL, run_alone, &hash[i]));
+        for (int i = 0; i < n; i++) pthread_join(thread[i], NULL);
+        for (int i = 0; i < n; i++) CHECK(hash[i] == alone);
+    }
+}
+
+static void starts_again_after_a_reset_as_if_new(void)
+{
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world = open_touched(&box, &scene);
+    REQUIRE(world);
+    uint64_t hash[2];
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < 40; i++) {
+            move_tools(world, i);
+            REQUIRE(!pal_world_step(world, scene->step_s));
+        }
+        hash[turn] = pal_world_hash(world);
+        pal_world_reset(world);
+    }
+    CHECK(hash[0] == hash[1]);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
+static void derives_constants_again_after_a_material_edit(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(3, 3, 3, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    double sag[2];
+    pal_world *world;
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < 300; i++) REQUIRE(!pal_world_step(world, scene->step_s));
+        const pal_body *body = pal_world_body(world, 0);
+        sag[turn] = body->x_rest[3 * body->n_dof - 1] - body->x[3 * body->n_dof - 1];
+        pal_material stiff = scene->body[0].material;
+        stiff.young_Pa *= 10;
+        REQUIRE(!pal_world_material(world, 0, &stiff, &note));
+    }
+    CHECK_NEAR(sag[0] / sag[1], 10, 0.5);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
+static void refuses_poses_that_are_no_poses(void)
+{
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world = open_touched(&box, &scene);
+    REQUIRE(world);
+    uint64_t before = pal_world_hash(world);
+    pal_pose good = {.position_m = {0.02, 0.02, 0.2}, .quat = {1, 0, 0, 0}}, bad = good;
+    CHECK_INT(pal_world_pose(world, 0, &good), 0);
+    bad.position_m[1] = NAN;
+    CHECK_INT(pal_world_pose(world, 0, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.position_m[0] = 1e300;
+    CHECK_INT(pal_world_pose(world, 0, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.velocity_m_s[2] = INFINITY;
+    CHECK_INT(pal_world_pose(world, 0, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.quat[0] = 0;
+    CHECK_INT(pal_world_pose(world, 0, &bad), PAL_ERR_REFUSED);
+    CHECK_INT(pal_world_pose(world, 2, &good), PAL_ERR_REFUSED);
+    CHECK_INT(pal_world_pose(world, -1, NULL), PAL_ERR_REFUSED);
+    CHECK(before == pal_world_hash(world));
+    CHECK_INT(pal_world_step(world, scene->step_s), 0);
+    CHECK(pal_body_finite(pal_world_body(world, 0)));
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
+static void refuses_scenes_by_the_name_of_the_entry(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(2, 2, 2, 0.01, &box));
+    pal_world *world = NULL;
+    for (int kind = 0; kind < 8; kind++) {
+        static const char *const expect[] = {"there is no effect \"gravitation\"",
+                                             "unknown key \"stronger\"",
+                                             "a second row of \"gravity\"",
+                                             "is not of stage output",
+                                             "there is no model \"jelly\"",
+                                             "young_Pa: -1 is outside",
+                                             "step_s: 0 is outside",
+                                             "bodies: 0, wanted 1 to 8"};
+        pal_scene *scene = box_scene(&box, true, true);
+        pal_body_def *def = &scene->body[0];
+        if (kind == 0) pal_item_init(&def->effect[0], "effects[0]", "gravitation");
+        if (kind == 1) pal_item_put_number(&def->effect[0], "stronger", 1, NULL);
+        if (kind == 2) def->effect[def->n_effect++] = def->effect[0];
+        if (kind == 3) pal_item_init(&def->output, "output", "viscous");
+        if (kind == 4) pal_item_init(&def->model, "model", "jelly");
+        if (kind == 5) def->material.young_Pa = -1;
+        if (kind == 6) scene->step_s = 0;
+        if (kind == 7) scene->n_body = 0;
+        CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
+        if (!strstr(note.text, expect[kind])) CHECK_TEXT(note.text, expect[kind]);
+        free(scene);
+    }
+    CHECK(!world);
+    box_free(&box);
+}
+
+static void prints_its_plan_in_the_order_of_a_step(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(2, 2, 2, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    pal_arena *arena = pal_arena_create(1 << 16, true);
+    pal_plan plan;
+    char text[2048], cut[10];
+    REQUIRE(!pal_plan_build(scene, arena, &note, &plan));
+    size_t wanted = pal_plan_print(&plan, text, sizeof text);
+    CHECK_INT(wanted, strlen(text));
+    CHECK_INT(pal_plan_print(&plan, cut, sizeof cut), wanted);
+    CHECK_INT(strlen(cut), sizeof cut - 1);
+    const char *order[] = {"edge_distance", "face_area", "tet_volume",   "viscous",
+                           "gravity",       "verlet",    "finite_guard", "surface_out"};
+    const char *at = text;
+    for (int i = 0; i < 8 && at; i++) {
+        at = strstr(at, order[i]);
+        CHECK(at);
+    }
+    pal_arena_destroy(arena);
+    free(scene);
+    box_free(&box);
+}
+
+static void shows_two_bodies_in_the_frame_of_the_first(void)
+{
+    pal_prepared one, two;
+    REQUIRE(!box_make(2, 2, 2, 0.01, &one));
+    REQUIRE(!box_make(2, 2, 2, 0.01, &two));
+    two.tets.origin_m[0] = 0.5;
+    pal_scene *scene = box_scene(&one, true, false);
+    scene->n_body = 2;
+    scene->body[1] = scene->body[0];
+    scene->body[1].mesh = &two;
+    pal_world *world;
+    CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
+    snprintf(scene->body[1].name, PAL_NAME, "other");
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_step(world, scene->step_s));
+    pal_frame *frame = pal_frame_create(world);
+    pal_world_frame(world, frame);
+    CHECK_INT(frame->n_part, 2);
+    CHECK_INT(frame->tick, 1);
+    for (int i = 0; i < frame->part[0].n_vertex; i++)
+        CHECK_NEAR(frame->part[1].position_m[3 * i] - frame->part[0].position_m[3 * i], 0.5, 1e-6);
+    pal_shown shown;
+    pal_world_shown(world, 1, &shown);
+    CHECK_TEXT(shown.name, "other");
+    CHECK_INT(shown.n_tri, two.tets.n_face);
+    CHECK_NEAR(shown.rest_m[0], 0.5, 1e-6);
+    pal_frame_destroy(frame);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&one);
+    box_free(&two);
+}
+
 int main(void)
 {
+    RUN(touches_no_heap_in_a_step_with_tools_pressing);
+    RUN(gives_the_same_hash_whatever_runs_beside_it);
+    RUN(starts_again_after_a_reset_as_if_new);
+    RUN(derives_constants_again_after_a_material_edit);
+    RUN(refuses_poses_that_are_no_poses);
+    RUN(refuses_scenes_by_the_name_of_the_entry);
+    RUN(prints_its_plan_in_the_order_of_a_step);
+    RUN(shows_two_bodies_in_the_frame_of_the_first);
     RUN(sags_and_comes_to_rest_under_its_weight);
     RUN(has_rows_only_for_what_the_scene_calls_for);
     return check_report();

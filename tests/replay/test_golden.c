@@ -1,0 +1,79 @@
+/* Golden hashes of two scenes: the same bits from every compiler, optimization level and thread count on IEEE doubles.
+ * A change of a hash means that the answer of a step has changed: say why in the commit that changes it. */
+#include "server/sim/world.h"
+#include "tests/check.h"
+#include "tests/sim/boxes.h"
+
+static pal_note note;
+
+static uint64_t run(pal_prepared *box, pal_scene *scene, void (*drive)(pal_world *, int), int n_step)
+{
+    pal_world *world;
+    if (pal_world_create(scene, &note, &world)) {
+        printf("  %s\n", note.text);
+        return 0;
+    }
+    for (int i = 0; i < n_step; i++) {
+        drive(world, i);
+        if (pal_world_step(world, scene->step_s)) return 0;
+    }
+    uint64_t hash = pal_world_hash(world);
+    printf("  hash %016llx after %d steps of %d sub-steps\n", (unsigned long long)hash, n_step,
+           pal_world_substeps(world));
+    pal_world_destroy(world);
+    free(scene);
+    box_free(box);
+    return hash;
+}
+
+/* a block that sags, is pulled at an edge for half a second and stiffened while it swings back */
+static void pull_and_stiffen(pal_world *world, int tick)
+{
+    for (int j = 0; j <= 4; j++)
+        if (tick == 10 || tick == 40)
+            pal_world_load(world, 0, box_node((const int[]){6, 4, 4}, 6, j, 4),
+                           (const double[3]){tick == 10 ? 0.08 : 0, 0, tick == 10 ? 0.03 : 0});
+    if (tick == 60) {
+        pal_material stiff = {.young_Pa = 9000, .poisson = 0.4, .density_kg_m3 = 1100, .damping_1_s = 2};
+        pal_world_material(world, 0, &stiff, &note);
+    }
+}
+
+static void a_pulled_and_stiffened_block_has_its_golden_hash(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(6, 4, 4, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xe9e4502e912143ceu);
+}
+
+/* a block with damped springs, turned inside out at one corner by a grabbed tool, pressed by another */
+static void press_and_grab(pal_world *world, int tick)
+{
+    double t = tick / 60.0;
+    pal_pose press = {.position_m = {0.012, 0.012, 0.05 - 0.02 * t}, .quat = {1, 0, 0, 0}};
+    pal_pose pull = {.position_m = {0.04, 0.03 - 0.03 * t, 0.03}, .quat = {1, 0, 0, 0}, .buttons = 1};
+    pal_world_pose(world, 0, &press);
+    pal_world_pose(world, 1, tick < 70 ? &pull : NULL);
+}
+
+static void a_pressed_and_grabbed_block_has_its_golden_hash(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(4, 3, 3, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    pal_body_def *def = &scene->body[0];
+    pal_item_put_number(&def->model, "c_distance_Js", 2e-7, NULL);
+    pal_item_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
+    pal_item_init(&def->effect[def->n_effect++], "effects[3]", "tool_grab");
+    pal_tools_default(scene, 2);
+    scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
+    CHECK(run(&box, scene, press_and_grab, 100) == 0x2f6f2e8c95a1d502u);
+}
+
+int main(void)
+{
+    RUN(a_pulled_and_stiffened_block_has_its_golden_hash);
+    RUN(a_pressed_and_grabbed_block_has_its_golden_hash);
+    return check_report();
+}

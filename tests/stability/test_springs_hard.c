@@ -1,0 +1,334 @@
+/* Hard cases of numerics.md part 3 for the explicit springs: whatever happens to a body or is asked of it, its state
+ * stays finite, its energy does not rise, and it comes back where the springs determine the way. */
+#include "server/base/vec3.h"
+#include "server/sim/world.h"
+#include "tests/check.h"
+#include "tests/sim/boxes.h"
+
+static pal_note note;
+static uint64_t seed;
+
+static double uniform(void) /* in [0, 1) */
+{
+    seed = seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(seed >> 11) * 0x1p-53;
+}
+
+typedef struct bench {
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world;
+    pal_body *body;
+} bench;
+
+static bool bench_make(bench *b, bool held)
+{
+    seed = 11;
+    if (box_make(4, 3, 3, 0.01, &b->box)) return false;
+    b->scene = box_scene(&b->box, held, false);
+    b->scene->body[0].n_effect = 0;
+    return true;
+}
+
+static bool bench_start(bench *b)
+{
+    if (pal_world_create(b->scene, &note, &b->world)) {
+        printf("  %s\n", note.text);
+        return false;
+    }
+    b->body = pal_world_body(b->world, 0);
+    return true;
+}
+
+static void bench_close(bench *b)
+{
+    pal_world_destroy(b->world);
+    free(b->scene);
+    box_free(&b->box);
+}
+
+static int count_inverted(const pal_body *body)
+{
+    int n = 0;
+    for (int t = 0; t < body->tets->n_tet; t++) {
+        const int32_t *c = body->tets->tet + 4 * t;
+        double e[3][3], g[3];
+        for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x + 3 * c[k + 1], body->x + 3 * c[0]);
+        pal_cross3(g, e[1], e[2]);
+        n += !(pal_dot3(e[0], g) > 0);
+    }
+    return n;
+}
+
+static double rms_from_rest(const pal_body *body)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) sum += pow(body->x[i] - body->x_rest[i], 2);
+    return sqrt(sum / body->n_dof);
+}
+
+static double extent(const pal_body *body)
+{
+    double most = 0;
+    for (int i = 0; i < body->n_dof; i++)
+        for (int j = 0; j < i; j++) most = fmax(most, pal_dist3(body->x + 3 * i, body->x + 3 * j));
+    return most;
+}
+
+/* runs and checks after every step that state is finite and energy no more than at the start */
+static void run_bounded(bench *b, double seconds)
+{
+    double start = pal_world_energy_J(b->world), most = 0;
+    for (int i = 0; i < (int)(seconds * 60); i++) {
+        REQUIRE(!pal_world_step(b->world, 1.0 / 60));
+        REQUIRE(pal_body_finite(b->body));
+        most = fmax(most, pal_world_energy_J(b->world));
+    }
+    if (!(most <= 1.01 * start)) printf("  energy rose from %.4g to %.4g J\n", start, most);
+    CHECK_LE(most, 1.01 * start);
+}
+
+static void an_inverted_corner_turns_back(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    REQUIRE(bench_start(&b));
+    /* the top corner goes through its tetrahedron */
+    double *x = b.body->x + 3 * box_node((const int[]){4, 3, 3}, 4, 3, 3);
+    pal_add3(x, x, (const double[3]){-0.012, -0.012, -0.012});
+    pal_world_moved(b.world, 0);
+    CHECK(count_inverted(b.body) > 0);
+    run_bounded(&b, 2);
+    CHECK_INT(count_inverted(b.body), 0);
+    CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
+    bench_close(&b);
+}
+
+static void insult(bench *b, int kind)
+{
+    double *x = b->body->x;
+    for (int i = 0; i < b->body->n_dof; i++, x += 3) {
+        if (b->body->held[i]) continue;
+        switch (kind) {
+        case 0:
+            x[2] = 0;
+            break;
+        case 1:
+            x[0] = x[1] = x[2] = 0.01;
+            break;
+        case 2:
+            x[0] = 0.04 - x[0];
+            break;
+        case 3:
+            for (int c = 0; c < 3; c++) x[c] = uniform() * (c == 0 ? 0.04 : 0.03);
+            break;
+        default:
+            pal_scale3(x, 100, x);
+        }
+    }
+    pal_world_moved(b->world, 0);
+}
+
+static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bounded(void)
+{
+    static const char *const names[] = {"plane", "point", "mirror", "shuffle", "x 100"};
+    for (int held = 0; held < 2; held++)
+        for (int kind = 0; kind < 5; kind++) {
+            bench b;
+            REQUIRE(bench_make(&b, held));
+            REQUIRE(bench_start(&b));
+            insult(&b, kind);
+            double before = extent(b.body);
+            run_bounded(&b, 5);
+            printf("  %s%s: %d of %d inverted, RMS %.2g of S, %d sub-steps, %llu heavy, %llu clamped\n",
+                   held ? "held, " : "free, ", names[kind], count_inverted(b.body), b.body->tets->n_tet,
+                   rms_from_rest(b.body) / b.body->size_m, pal_world_substeps(b.world),
+                   (unsigned long long)b.body->n_heavy, (unsigned long long)b.body->n_clamped);
+            CHECK_LE(extent(b.body), 1.5 * fmax(before, b.body->size_m));
+            /* what can only go one way goes back; a mirrored or shuffled body may rest tangled */
+            if (held && (kind <= 1 || kind == 4)) CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
+            bench_close(&b);
+        }
+}
+
+static void a_meganewton_on_a_vertex_is_shortened_and_forgotten(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    b.scene->body[0].material.damping_1_s = 10;
+    REQUIRE(bench_start(&b));
+    int node = box_node((const int[]){4, 3, 3}, 2, 1, 3);
+    for (int axis = 0; axis < 3; axis++) {
+        pal_world_reset(b.world);
+        double force[3] = {0, 0, 0};
+        force[axis] = axis == 2 ? -1e6 : 1e6;
+        REQUIRE(!pal_world_load(b.world, 0, node, force));
+        for (int i = 0; i < 60; i++) {
+            REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+            REQUIRE(pal_body_finite(b.body));
+        }
+        CHECK(b.body->n_capped > 0);
+        CHECK_LE(extent(b.body), 10 * b.body->size_m);
+        REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 0}));
+        run_bounded(&b, 2);
+        CHECK_INT(count_inverted(b.body), 0);
+        run_bounded(&b, 3);
+        CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
+    }
+    bench_close(&b);
+}
+
+static void a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused(void)
+{
+    bench b, c;
+    REQUIRE(bench_make(&b, true));
+    REQUIRE(bench_start(&b));
+    REQUIRE(bench_make(&c, true));
+    REQUIRE(bench_start(&c));
+    b.body->v[3 * 40] = c.body->v[3 * 40] = 0.2;
+    REQUIRE(!pal_world_step(b.world, 10.0 / 60));
+    for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(c.world, 1.0 / 60));
+    CHECK_LE(pal_world_energy_J(b.world), 1.01 * 0.5 * b.body->mass_kg[40] * 0.04);
+    double apart = 0, most = 0;
+    for (int i = 0; i < 3 * b.body->n_dof; i++) {
+        apart = fmax(apart, fabs(b.body->x[i] - c.body->x[i]));
+        most = fmax(most, fabs(c.body->x[i] - c.body->x_rest[i]));
+    }
+    CHECK_LE(apart, 0.2 * most);
+    uint64_t hash = pal_world_hash(b.world);
+    CHECK_INT(pal_world_step(b.world, 1000), PAL_ERR_BUDGET);
+    CHECK_INT(pal_world_step(b.world, NAN), PAL_ERR_REFUSED);
+    CHECK_INT(pal_world_step(b.world, -1), PAL_ERR_REFUSED);
+    CHECK(hash == pal_world_hash(b.world));
+    bench_close(&b);
+    bench_close(&c);
+}
+
+static void a_material_beyond_the_budget_is_refused_and_changes_nothing(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    REQUIRE(bench_start(&b));
+    pal_material soft = b.scene->body[0].material, hard = soft;
+    double limit = pal_world_limit_s(b.world);
+    hard.young_Pa = 1e12;
+    CHECK_INT(pal_world_material(b.world, 0, &hard, &note), PAL_ERR_BUDGET);
+    CHECK(strstr(note.text, "most_substep allows 2000"));
+    CHECK_NEAR(pal_world_limit_s(b.world), limit, 0);
+    hard.young_Pa = NAN;
+    CHECK_INT(pal_world_material(b.world, 0, &hard, &note), PAL_ERR_REFUSED);
+    hard.young_Pa = 4 * soft.young_Pa;
+    CHECK_INT(pal_world_material(b.world, 0, &hard, &note), 0);
+    CHECK_NEAR(pal_world_limit_s(b.world) / limit, 0.5, 1e-9);
+    b.scene->body[0].material.young_Pa = 1e12;
+    pal_world *none = NULL;
+    CHECK_INT(pal_world_create(b.scene, &note, &none), PAL_ERR_BUDGET);
+    CHECK(!none);
+    bench_close(&b);
+}
+
+/* a box in its own units of length h, stress E and mass: the scaled answer after a number of scaled steps */
+static bool scaled(double h, double young, double x[3])
+{
+    bench b;
+    seed = 5;
+    if (box_make(3, 2, 2, h, &b.box)) return false;
+    b.scene = box_scene(&b.box, true, false);
+    b.scene->body[0].n_effect = 0;
+    /* wave time h / c is 2.2 ms for all */
+    b.scene->body[0].material =
+        (pal_material){.young_Pa = young, .poisson = 0.45, .density_kg_m3 = young * 5e-6 / (h * h), .damping_1_s = 4};
+    for (int i = 0; i < 3; i++) x[i] = NAN;
+    if (!bench_start(&b)) return false;
+    for (int i = 0; i < 3 * b.body->n_dof; i++)
+        if (!b.body->held[i / 3]) b.body->x[i] += 0.2 * h * (uniform() - 0.5);
+    pal_world_moved(b.world, 0);
+    bool ok = true;
+    for (int i = 0; i < 20; i++) ok = ok && !pal_world_step(b.world, 1.0 / 60);
+    int node = 3 * (b.body->n_dof - 1);
+    for (int i = 0; i < 3; i++) x[i] = (b.body->x[node + i] - b.body->x_rest[node + i]) / h;
+    bench_close(&b);
+    return ok;
+}
+
+static void any_scale_of_length_and_stiffness_gives_the_same_scaled_answer(void)
+{
+    static const double length[] = {1e-6, 1e-3, 1, 1e6}, young[] = {1e-3, 1, 1e6, 1e12};
+    double expect[3], x[3];
+    REQUIRE(scaled(0.01, 5000, expect));
+    CHECK(fabs(expect[0]) > 1e-6);
+    for (int l = 0; l < 4; l++)
+        for (int e = 0; e < 4; e++) {
+            CHECK(scaled(length[l], young[e], x));
+            for (int c = 0; c < 3; c++) CHECK_NEAR(x[c], expect[c], 1e-4);
+        }
+}
+
+static void huge_drag_creeps_and_no_drag_keeps_moving(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    b.scene->body[0].material.damping_1_s = 1e8;
+    REQUIRE(bench_start(&b));
+    for (int i = 0; i < b.body->n_dof; i++) b.body->x[3 * i + 2] *= 0.9;
+    pal_world_moved(b.world, 0);
+    double before = pal_world_energy_J(b.world);
+    for (int i = 0; i < 30; i++) {
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        double now = pal_world_energy_J(b.world);
+        CHECK_LE(now, before);
+        before = now;
+    }
+    bench_close(&b);
+}
+
+static void constraint_damping_far_beyond_critical_stays_stable(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    pal_item_put_number(&b.scene->body[0].model, "c_distance_Js", 1e-5, NULL);
+    pal_item_put_number(&b.scene->body[0].model, "c_area_Js", 1e-5, NULL);
+    pal_item_put_number(&b.scene->body[0].model, "c_volume_Js", 1e-5, NULL);
+    REQUIRE(bench_start(&b));
+    for (int i = 0; i < 3 * b.body->n_dof; i++)
+        if (!b.body->held[i / 3]) b.body->x[i] += 0.005 * (uniform() - 0.5);
+    pal_world_moved(b.world, 0);
+    run_bounded(&b, 2);
+    bench_close(&b);
+}
+
+static void held_and_single_element_bodies_step(void)
+{
+    pal_prepared one;
+    REQUIRE(!box_one_tet(0.01, &one));
+    for (int held = 0; held < 2; held++) {
+        pal_scene *scene = box_scene(&one, held, true);
+        scene->body[0].support[0].fraction = 1;
+        scene->body[0].n_effect = 1;
+        pal_world *world;
+        REQUIRE(!pal_world_create(scene, &note, &world));
+        for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(world, scene->step_s), 0);
+        const pal_body *body = pal_world_body(world, 0);
+        CHECK(pal_body_finite(body));
+        /* held: still there; free: fallen g/c^2 (c t - 1 + exp(-c t)) after t = 1/3 s at the drag rate c = 4/s */
+        double fall = held ? 0 : 9.81 / 16 * (4.0 / 3 - 1 + exp(-4.0 / 3));
+        CHECK_NEAR(body->x_rest[2] - body->x[2], fall, 0.02 * fall + 1e-12);
+        pal_world_destroy(world);
+        free(scene);
+    }
+    box_free(&one);
+}
+
+int main(void)
+{
+    RUN(an_inverted_corner_turns_back);
+    RUN(flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bounded);
+    RUN(a_meganewton_on_a_vertex_is_shortened_and_forgotten);
+    RUN(a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused);
+    RUN(a_material_beyond_the_budget_is_refused_and_changes_nothing);
+    RUN(any_scale_of_length_and_stiffness_gives_the_same_scaled_answer);
+    RUN(huge_drag_creeps_and_no_drag_keeps_moving);
+    RUN(constraint_damping_far_beyond_critical_stays_stable);
+    RUN(held_and_single_element_bodies_step);
+    return check_report();
+}
