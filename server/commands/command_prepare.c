@@ -257,6 +257,8 @@ int command_prepare(int argc, char **argv)
         {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.5, "its Poisson ratio (0.45)"},
         {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},
         {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
+        {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
+         "let it hang (a scanned shape carries its weight already)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
         {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
         {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},

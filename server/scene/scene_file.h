@@ -42,6 +42,7 @@ typedef struct pal_surface_scene {
     int label;             /* of a label volume; < 0: the most frequent           */
     int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
     pal_material material; /* young_Pa 0: the default material                 */
+    bool gravity; /* add the effect; a shape as scanned carries its own weight already, so the default is none */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
 } pal_surface_scene;

@@ -209,6 +209,16 @@ pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *option
 
 /* ---- scenes ---- */
 
+/* A shape that was scanned, or drawn as it lies, is in balance with its weight: pulling it down once more would count
+ * gravity twice (and let 5 kPa tissue sag by a third of its height). */
+static void leave_gravity_out(pal_body_def *body)
+{
+    int kept = 0;
+    for (int k = 0; k < body->n_effect; k++)
+        if (strcmp(body->effect[k].name, "gravity")) body->effect[kept++] = body->effect[k];
+    body->n_effect = kept;
+}
+
 /* one body with defaults around the prepared mesh in mesh[0] */
 static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
 {
@@ -219,6 +229,7 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     pal_scene_default(scene);
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
+    if (!options->gravity) leave_gravity_out(&scene->body[0]);
     for (int k = 0; k < scene->body[0].n_effect; k++)
         snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;

@@ -438,6 +438,25 @@ static void the_procedural_organ_is_a_scene(void)
     pal_scene_free(NULL);
 }
 
+static bool has_effect(const pal_body_def *body, const char *name)
+{
+    for (int k = 0; k < body->n_effect; k++)
+        if (!strcmp(body->effect[k].name, name)) return true;
+    return false;
+}
+
+static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
+{
+    for (int asked = 0; asked < 2; asked++) {
+        pal_surface_scene options = {.target_tri = 2000, .resolution = 8, .gravity = asked};
+        pal_loaded_scene *loaded = NULL;
+        REQUIRE(!pal_scene_procedural(&options, &loaded, NULL, NULL));
+        CHECK_INT(has_effect(&loaded->scene.body[0], "gravity"), asked);
+        CHECK(has_effect(&loaded->scene.body[0], "tool_push") && has_effect(&loaded->scene.body[0], "tool_grab"));
+        pal_scene_free(loaded);
+    }
+}
+
 int main(void)
 {
     char command[128];
@@ -457,6 +476,7 @@ int main(void)
     RUN(a_scene_may_name_a_surface);
     RUN(what_is_no_surface_is_refused_and_names_the_file);
     RUN(the_procedural_organ_is_a_scene);
+    RUN(a_shape_as_it_lies_is_pulled_down_only_when_asked);
     pal_prepared_free(&mesh);
     snprintf(command, sizeof command, "rm -rf '%s'", folder);
     return check_report() || system(command) != 0;
