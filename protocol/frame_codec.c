@@ -17,10 +17,13 @@ enum {
     QUOTIENT_MAX = 12, /* zeros that announce an escape */
     ESCAPE_BITS = 24,
     ESCAPE_LENGTH = QUOTIENT_MAX + 1 + ESCAPE_BITS,
-    K_MAX = 14,
-    K_ZERO = 15,                           /* all residuals of the group are zero */
-    TAIL = 8,                              /* zero bytes behind the codes */
-    SLACK = GROUP * ESCAPE_LENGTH / 8 + 16 /* a group may be read past the end before that is noticed */
+    K_SMALL = 7,    /* modes 0..6: k = mode, every vertex has codes                                          */
+    MODE_MASK = 7,  /* modes 7..13: k = mode - 7, a mask says which vertices have codes                      */
+    MODE_WIDE = 14, /* k in the next 4 bits, every vertex has codes                                          */
+    MODE_ZERO = 15, /* all residuals of the group are zero                                                   */
+    K_MAX = 15,
+    TAIL = 8,                                        /* zero bytes behind the codes */
+    SLACK = GROUP * (3 * ESCAPE_LENGTH + 1) / 8 + 16 /* a group may be read past the end before that is noticed */
 };
 #define Q_RATIO (1 + 1.0 / 16 + 1.0 / 64) /* q = 2 e / Q_RATIO */
 #define Q_MAX_M 1e9f
@@ -48,7 +51,7 @@ typedef struct tables {
 struct pal_frame_encoder {
     tables t;
     float4 *u;          /* displacement m, wire order    [n]             */
-    uint32_t *residual; /* folded, [group][axis][GROUP], zero past the end */
+    uint32_t *residual; /* folded, zero past the end    [groups * GROUP][3] */
     uint8_t *raw;
     void *lz4_state;
     double rest_max_m; /* largest |component| of the rest pose */
@@ -70,12 +73,13 @@ static size_t group_count(uint32_t n_vertex)
 
 static size_t parameter_bytes(uint32_t n_vertex)
 {
-    return (3 * group_count(n_vertex) + 1) / 2;
+    return (group_count(n_vertex) + 1) / 2;
 }
 
 static size_t raw_bound(uint32_t n_vertex)
 {
-    return parameter_bytes(n_vertex) + ((size_t)n_vertex * 3 * ESCAPE_LENGTH + 7) / 8 + TAIL;
+    return parameter_bytes(n_vertex) + (((size_t)n_vertex * 3 * ESCAPE_LENGTH + 7) / 8 + 2 * group_count(n_vertex)) +
+           TAIL;
 }
 
 size_t pal_frame_bound(uint32_t n_vertex)
@@ -136,7 +140,7 @@ int pal_frame_encoder_create(const float *rest_m, const pal_frame_order *order, 
     pal_frame_encoder *e = calloc(1, sizeof *e);
     if (!e) return PAL_REFUSAL_MEMORY;
     e->u = take(order->n_vertex, sizeof *e->u);
-    e->residual = take(group_count(order->n_vertex) * 3 * GROUP, sizeof *e->residual);
+    e->residual = take(group_count(order->n_vertex) * 3 * GROUP + 4, sizeof *e->residual);
     e->raw = take(raw_bound(order->n_vertex) + 8, 1);
     e->lz4_state = take((size_t)LZ4_sizeofState(), 1);
     if (!tables_create(&e->t, rest_m, order) || !e->u || !e->residual || !e->raw || !e->lz4_state) {
@@ -235,35 +239,53 @@ static bool quantise(pal_frame_encoder *e, double q)
         uint4 folded = (uint4)r << 1 ^ (uint4)(r >> 31);
         changed |= (uint4)(x ^ t->x[i]);
         t->x[i] = x;
-        uint32_t *residual = e->residual + (size_t)(i / GROUP) * 3 * GROUP + i % GROUP;
-        for (int c = 0; c < 3; c++) residual[c * GROUP] = folded[c];
+        /* the fourth number is overwritten by the next vertex */
+        memcpy(e->residual + 3 * (size_t)i, &folded, sizeof folded);
     }
+    memset(e->residual + 3 * (size_t)t->n, 0, 4 * sizeof *e->residual);
     return (changed[0] | changed[1] | changed[2]) != 0;
 }
 
-/* bits of a group's codes with parameter k; past the end of the last group the values are zero and count alike for
- * every k but their k bits, which is near enough for a choice */
-static uint32_t cost(const uint32_t *v, uint32_t k)
+/* bits of n_code codes with parameter k, whose values that are not zero are among v[0..3 GROUP) */
+static uint32_t cost(const uint32_t *v, uint32_t k, uint32_t n_code)
 {
-    uint32_t bits = GROUP * (k + 1), escape = ESCAPE_LENGTH - 1 - k;
-    for (int i = 0; i < GROUP; i++) {
+    uint32_t bits = n_code * (k + 1), escape = ESCAPE_LENGTH - 1 - k;
+    for (int i = 0; i < 3 * GROUP; i++) {
         uint32_t quotient = v[i] >> k;
         bits += quotient < QUOTIENT_MAX ? quotient : escape;
     }
     return bits;
 }
 
-static uint32_t choose_k(const uint32_t *v)
+/* the best parameter up to most is next to log2 of the mean, or far below it when few large values are better escaped
+ */
+static uint32_t choose_k(const uint32_t *v, uint32_t sum, uint32_t n_code, uint32_t most, uint32_t *bits)
 {
-    uint32_t sum = 0, k = 0;
-    for (int i = 0; i < GROUP; i++) sum += v[i];
-    if (sum == 0) return K_ZERO;
-    while (k < K_MAX && (uint32_t)GROUP << (k + 1) <= sum) k++;
-    /* the best parameter is next to log2 of the mean, or far below it when few large values are better escaped */
-    uint32_t least = cost(v, k), bits = k < K_MAX ? cost(v, k + 1) : UINT32_MAX;
-    if (bits < least) return k + 1;
-    while (k > 0 && (bits = cost(v, k - 1)) < least) least = bits, k--;
+    uint32_t k = 0, next;
+    while (k < most && n_code << (k + 1) <= sum) k++;
+    *bits = cost(v, k, n_code);
+    if (k < most && (next = cost(v, k + 1, n_code)) < *bits) {
+        *bits = next;
+        return k + 1;
+    }
+    while (k > 0 && (next = cost(v, k - 1, n_code)) < *bits) *bits = next, k--;
     return k;
+}
+
+typedef struct choice { /* how a group is written */
+    uint32_t mode, k, mask;
+} choice;
+
+static choice choose_mode(const uint32_t *v, uint32_t n)
+{
+    uint32_t mask = 0, sum = 0, dense_bits, masked_bits = UINT32_MAX, masked_k = 0;
+    for (uint32_t i = 0; i < GROUP; i++) mask |= (uint32_t)((v[3 * i] | v[3 * i + 1] | v[3 * i + 2]) != 0) << i;
+    for (int i = 0; i < 3 * GROUP; i++) sum += v[i];
+    if (!mask) return (choice){MODE_ZERO, 0, 0};
+    uint32_t k = choose_k(v, sum, 3 * n, K_MAX, &dense_bits), n_coded = (uint32_t)__builtin_popcount(mask);
+    if (n_coded < n) masked_k = choose_k(v, sum, 3 * n_coded, K_SMALL - 1, &masked_bits);
+    if (masked_bits < UINT32_MAX && masked_bits + n < dense_bits) return (choice){MODE_MASK + masked_k, masked_k, mask};
+    return (choice){k < K_SMALL ? k : MODE_WIDE, k, (1u << n) - 1};
 }
 
 typedef struct bit_writer {
@@ -284,20 +306,29 @@ static inline void flush(bit_writer *w)
     w->n &= 7;
 }
 
-static inline void write_group(bit_writer *out, const uint32_t *v, uint32_t n, uint32_t k)
+static inline void write_bits(bit_writer *w, uint64_t bits, unsigned n)
+{
+    w->word |= bits << w->n;
+    w->n += n;
+    flush(w);
+}
+
+/* what precedes the codes, then three codes for each vertex of the mask */
+static void write_group(bit_writer *out, const uint32_t *v, uint32_t n, choice how)
 {
     bit_writer w = *out;
-    uint32_t mask = (1u << k) - 1;
+    uint32_t k = how.k, low = (1u << k) - 1;
+    if (how.mode == MODE_WIDE) write_bits(&w, k, 4);
+    if (how.mode >= MODE_MASK && how.mode < MODE_WIDE) write_bits(&w, how.mask, n);
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t quotient = v[i] >> k;
-        if (quotient < QUOTIENT_MAX) {
-            w.word |= ((uint64_t)1 << quotient | (uint64_t)(v[i] & mask) << (quotient + 1)) << w.n;
-            w.n += quotient + 1 + k;
-        } else {
-            w.word |= ((uint64_t)1 << QUOTIENT_MAX | (uint64_t)v[i] << (QUOTIENT_MAX + 1)) << w.n;
-            w.n += ESCAPE_LENGTH;
+        if (!(how.mask >> i & 1)) continue;
+        for (uint32_t c = 0; c < 3; c++) {
+            uint32_t value = v[3 * i + c], quotient = value >> k;
+            if (quotient < QUOTIENT_MAX)
+                write_bits(&w, (uint64_t)1 << quotient | (uint64_t)(value & low) << (quotient + 1), quotient + 1 + k);
+            else
+                write_bits(&w, (uint64_t)1 << QUOTIENT_MAX | (uint64_t)value << (QUOTIENT_MAX + 1), ESCAPE_LENGTH);
         }
-        flush(&w);
     }
     *out = w;
 }
@@ -311,12 +342,10 @@ static size_t write_body(const pal_frame_encoder *e)
     memset(e->raw, 0, n_parameter);
     for (size_t g = 0; g < n_group; g++) {
         uint32_t n_here = g + 1 < n_group ? GROUP : n - (uint32_t)g * GROUP;
-        for (size_t c = 0; c < 3; c++) {
-            const uint32_t *v = e->residual + (g * 3 + c) * GROUP;
-            uint32_t k = choose_k(v);
-            e->raw[(3 * g + c) / 2] |= (uint8_t)(k << 4 * ((3 * g + c) % 2));
-            if (k != K_ZERO) write_group(&w, v, n_here, k);
-        }
+        const uint32_t *v = e->residual + g * 3 * GROUP;
+        choice how = choose_mode(v, n_here);
+        e->raw[g / 2] |= (uint8_t)(how.mode << 4 * (g % 2));
+        if (how.mode != MODE_ZERO) write_group(&w, v, n_here, how);
     }
     if (w.n) {
         w.n = 8;
@@ -470,24 +499,46 @@ static inline uint64_t load64(const uint8_t *b)
 #endif
 }
 
-/* codes of one group and axis from bit position `bit`: residuals to r[i][axis]; returns the position behind, or 0 for a
- * code that is none. Reads at most SLACK bytes past the start. */
-static inline size_t read_group(const uint8_t *codes, size_t bit, uint32_t k, uint32_t n, int32_t *r)
+static inline uint64_t bits_at(const uint8_t *codes, size_t bit)
 {
-    uint32_t mask = (1u << k) - 1;
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t word = load64(codes + (bit >> 3)) >> (bit & 7);
-        uint32_t low = (uint32_t)word, v;
-        uint32_t quotient = (uint32_t)__builtin_ctz(low | 1u << 31);
+    return load64(codes + (bit >> 3)) >> (bit & 7);
+}
+
+/* three codes from bit position `bit`; returns the position behind, 0 for a code that is none */
+static inline size_t read_vertex(const uint8_t *codes, size_t bit, uint32_t k, int32_t r[4])
+{
+    for (int c = 0; c < 3; c++) {
+        uint64_t word = bits_at(codes, bit);
+        uint32_t value, quotient = (uint32_t)__builtin_ctz((uint32_t)word | 1u << 31);
         if (quotient < QUOTIENT_MAX) {
-            v = quotient << k | ((uint32_t)(word >> (quotient + 1)) & mask);
+            value = quotient << k | ((uint32_t)(word >> (quotient + 1)) & ((1u << k) - 1));
             bit += quotient + 1 + k;
         } else {
             if (quotient != QUOTIENT_MAX) return 0;
-            v = (uint32_t)(word >> (QUOTIENT_MAX + 1)) & ((1u << ESCAPE_BITS) - 1);
+            value = (uint32_t)(word >> (QUOTIENT_MAX + 1)) & ((1u << ESCAPE_BITS) - 1);
             bit += ESCAPE_LENGTH;
         }
-        r[4 * i] = (int32_t)(v >> 1) ^ -(int32_t)(v & 1);
+        r[c] = (int32_t)(value >> 1) ^ -(int32_t)(value & 1);
+    }
+    return bit;
+}
+
+/* residuals of one group, zeroed before, from bit position `bit`; returns the position behind, SIZE_MAX for a code that
+ * is none. Reads at most SLACK bytes past the start. */
+static inline size_t read_group(const uint8_t *codes, size_t bit, uint32_t mode, uint32_t n, int32_t (*r)[4])
+{
+    uint32_t k = mode, mask = (1u << n) - 1;
+    if (mode == MODE_WIDE) {
+        k = bits_at(codes, bit) & 15;
+        bit += 4;
+    } else if (mode >= MODE_MASK) {
+        k = mode - MODE_MASK;
+        mask &= (uint32_t)bits_at(codes, bit);
+        bit += n;
+    }
+    for (; mask; mask &= mask - 1) {
+        bit = read_vertex(codes, bit, k, r[__builtin_ctz(mask)]);
+        if (bit == 0) return SIZE_MAX;
     }
     return bit;
 }
@@ -511,12 +562,10 @@ static int read_body(pal_frame_decoder *d, size_t n_raw, double step, float *pos
         int32_t residual[GROUP][4] __attribute__((aligned(16)));
         uint32_t first = (uint32_t)g * GROUP, n_here = g + 1 < n_group ? GROUP : t->n - first;
         memset(residual, 0, sizeof residual);
-        for (size_t c = 0; c < 3; c++) {
-            uint32_t k = d->raw[(3 * g + c) / 2] >> 4 * ((3 * g + c) % 2) & 15;
-            if (k == K_ZERO) continue;
-            size_t behind = read_group(codes, bit, k, n_here, &residual[0][c]);
-            if (behind == 0 || behind > n_bit) return PAL_REFUSAL_COUNT;
-            bit = behind;
+        uint32_t mode = d->raw[g / 2] >> 4 * (g % 2) & 15;
+        if (mode != MODE_ZERO) {
+            bit = read_group(codes, bit, mode, n_here, residual);
+            if (bit > n_bit) return PAL_REFUSAL_COUNT;
         }
         for (uint32_t i = 0; i < n_here; i++) {
             int4 r;

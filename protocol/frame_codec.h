@@ -1,7 +1,7 @@
 /* FRAME: the shown vertices of one part, coded alone against the rest pose (streaming.md 1.4).
  *
  * Displacements are predicted in a coarse-to-fine order from the vertices already reconstructed, the rest is quantised
- * with step q (closed loop, so that errors do not add up), written as Rice codes in groups of 32 vertices and packed in
+ * with step q (closed loop, so that errors do not add up), written as Rice codes in groups of 16 vertices and packed in
  * one LZ4 block. Every frame stands alone: it may be dropped, and any frame serves a client that joins.
  * Stated bound: |decoded - given| <= error_m per axis, for every vertex of every frame whose sent q was not raised
  * (pal_frame_result.error_m says the bound that holds). */
@@ -17,7 +17,7 @@
 
 #define PAL_FRAME_HEAD_BYTES   44 /* with the 8 bytes of pal_wire_head                                  */
 #define PAL_FRAME_AFFINE_BYTES 48 /* 3x4 f32 behind the head when PAL_FRAME_HAS_AFFINE is set           */
-#define PAL_FRAME_GROUP        32
+#define PAL_FRAME_GROUP        16
 #define PAL_FRAME_X_LIMIT      (1 << 18) /* |X| is below this, X the reconstruction in q/16             */
 enum { PAL_FRAME_HAS_AFFINE = 1, PAL_FRAME_FLAGS = 1 };
 

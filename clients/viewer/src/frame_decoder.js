@@ -3,8 +3,8 @@
 import { lz4Decode } from "./lz4.js";
 import { KIND, PART_MAX, readHead, VERTEX_MAX, WireError } from "./wire.js";
 
-const HEAD_BYTES = 44, AFFINE_BYTES = 48, GROUP = 32, QUOTIENT_MAX = 12, ESCAPE_BITS = 24, ESCAPE_LENGTH = 37;
-const K_ZERO = 15, TAIL = 8, X_MOST = 2 ** 18 - 1, SLACK = 192;
+const HEAD_BYTES = 44, AFFINE_BYTES = 48, GROUP = 16, QUOTIENT_MAX = 12, ESCAPE_BITS = 24, ESCAPE_LENGTH = 37;
+const MODE_MASK = 7, MODE_WIDE = 14, MODE_ZERO = 15, TAIL = 8, X_MOST = 2 ** 18 - 1, SLACK = 256;
 const LITTLE_ENDIAN = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1;
 
 /** @param {boolean} good @param {string} code @param {string} text */
@@ -13,10 +13,10 @@ function need(good, code, text) {
 }
 
 /** @param {number} n vertices */
-const parameterBytes = (n) => Math.ceil((3 * Math.ceil(n / GROUP)) / 2);
+const modeBytes = (n) => Math.ceil(Math.ceil(n / GROUP) / 2);
 
 /** @param {number} n vertices */
-const rawBound = (n) => parameterBytes(n) + Math.ceil((3 * n * ESCAPE_LENGTH) / 8) + TAIL;
+const rawBound = (n) => modeBytes(n) + Math.ceil((3 * n * ESCAPE_LENGTH) / 8) + 2 * Math.ceil(n / GROUP) + TAIL;
 
 /**
  * @typedef {{
@@ -45,7 +45,7 @@ export function readFrameHead(bytes) {
   need(Number.isFinite(q), "NAN", "step");
   need(q > 0, "RANGE", "step");
   need(n > 0 && n <= VERTEX_MAX, "COUNT", `${n} vertices`);
-  need(nRaw >= parameterBytes(n) + TAIL && nRaw <= rawBound(n), "COUNT", `body of ${nRaw} bytes`);
+  need(nRaw >= modeBytes(n) + TAIL && nRaw <= rawBound(n), "COUNT", `body of ${nRaw} bytes`);
   const affine = flags ? Array.from({ length: 12 }, (_, i) => view.getFloat32(HEAD_BYTES + 4 * i, true)) : null;
   need(!affine || affine.every(Number.isFinite), "NAN", "affine map");
   return {
@@ -58,9 +58,9 @@ export class FrameDecoder {
   /** @param {import("./asset.js").Asset} asset copied */
   constructor(asset) {
     const n = (this.n = asset.vertexOf.length);
-    this.parameterBytes = parameterBytes(n);
+    this.modeBytes = modeBytes(n);
     // the codes begin at a whole word
-    this.rawBegin = (4 - (this.parameterBytes % 4)) % 4;
+    this.rawBegin = (4 - (this.modeBytes % 4)) % 4;
     const buffer = new ArrayBuffer((this.rawBegin + rawBound(n) + SLACK + 3) & ~3);
     this.raw = new Uint8Array(buffer);
     this.words = new Int32Array(buffer);
@@ -85,64 +85,74 @@ export class FrameDecoder {
     const end = this.rawBegin + nRaw;
     lz4Decode(head.block, this.raw, this.rawBegin, end);
     this.raw.fill(0, end, Math.min(end + SLACK, this.raw.length));
-    if (!LITTLE_ENDIAN) swapWords(this.raw, this.rawBegin + this.parameterBytes);
-    this.body(8 * (nRaw - this.parameterBytes - TAIL), q / 16, positions);
+    if (!LITTLE_ENDIAN) swapWords(this.raw, this.rawBegin + this.modeBytes);
+    this.body(8 * (nRaw - this.modeBytes - TAIL), q / 16, positions);
     if (head.affine) this.move(head.affine, q / 16, positions);
     return head;
   }
 
   /** @param {number} nBit bits of codes @param {number} step @param {Float32Array} positions */
   body(nBit, step, positions) {
-    const { n, raw, rawBegin, residual } = this;
+    const { n, raw, rawBegin } = this;
     let bit = 0, outside = 0;
-    for (let first = 0, parameter = 0; first < n; first += GROUP) {
-      const here = Math.min(GROUP, n - first);
-      let moved = 0;
-      for (let axis = 0; axis < 3; axis++, parameter++) {
-        const k = (raw[rawBegin + (parameter >> 1)] >> (4 * (parameter & 1))) & 15;
-        if (k === K_ZERO) {
-          for (let i = axis; i < 3 * GROUP; i += 3) residual[i] = 0;
-          continue;
-        }
-        moved = 1;
-        bit = this.codes(bit, k, here, axis);
+    for (let first = 0, group = 0; first < n; first += GROUP, group++) {
+      const here = Math.min(GROUP, n - first), mode = (raw[rawBegin + (group >> 1)] >> (4 * (group & 1))) & 15;
+      if (mode !== MODE_ZERO) {
+        bit = this.codes(bit, mode, here);
         need(bit >= 0 && bit <= nBit, "COUNT", "codes do not fit the body");
       }
-      outside |= this.predict(first, here, moved, step, positions);
+      outside |= this.predict(first, here, mode !== MODE_ZERO, step, positions);
     }
     need(outside >= 0, "RANGE", "displacement out of range");
     need(((bit + 7) & ~7) === nBit, "COUNT", "codes end before the body");
   }
 
   /**
-   * Codes of one group and axis into this.residual; returns the bit behind them, -1 for a code that is none.
-   * @param {number} bit @param {number} k @param {number} here @param {number} axis
+   * Residuals of one group into this.residual; returns the bit behind its codes, -1 for a code that is none.
+   * @param {number} bit @param {number} mode @param {number} here
    */
-  codes(bit, k, here, axis) {
-    const { words, residual } = this, mask = (1 << k) - 1;
-    const base = (this.rawBegin + this.parameterBytes) >> 2;
-    for (let i = axis, end = 3 * here; i < end; i += 3) {
-      const w = base + (bit >>> 5), s = bit & 31;
-      const low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
-      const quotient = 31 - Math.clz32(low & -low);
-      let v = 0;
-      if (quotient < QUOTIENT_MAX && quotient >= 0) {
-        v = (quotient << k) | ((low >>> (quotient + 1)) & mask);
-        bit += quotient + 1 + k;
-      } else {
-        if (quotient !== QUOTIENT_MAX) return -1;
-        const w2 = base + ((bit + QUOTIENT_MAX + 1) >>> 5), s2 = (bit + QUOTIENT_MAX + 1) & 31;
-        v = ((words[w2] >>> s2) | ((words[w2 + 1] << 1) << (31 - s2))) & ((1 << ESCAPE_BITS) - 1);
-        bit += ESCAPE_LENGTH;
+  codes(bit, mode, here) {
+    const { words, residual } = this, base = (this.rawBegin + this.modeBytes) >> 2;
+    let k = mode, coded = (1 << here) - 1;
+    if (mode >= MODE_MASK) {
+      const w = base + (bit >>> 5), s = bit & 31, low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
+      if (mode === MODE_WIDE) k = low & 15;
+      else {
+        k = mode - MODE_MASK;
+        coded &= low;
       }
-      residual[i] = (v >>> 1) ^ -(v & 1);
+      bit += mode === MODE_WIDE ? 4 : here;
+    }
+    const mask = (1 << k) - 1;
+    for (let i = 0, end = 3 * here; i < end; coded >>>= 1) {
+      if ((coded & 1) === 0) {
+        residual[i] = residual[i + 1] = residual[i + 2] = 0;
+        i += 3;
+        continue;
+      }
+      for (const stop = i + 3; i < stop; i++) {
+        const w = base + (bit >>> 5), s = bit & 31;
+        const low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
+        const quotient = 31 - Math.clz32(low & -low);
+        let v = 0;
+        if (quotient < QUOTIENT_MAX && quotient >= 0) {
+          v = (quotient << k) | ((low >>> (quotient + 1)) & mask);
+          bit += quotient + 1 + k;
+        } else {
+          if (quotient !== QUOTIENT_MAX) return -1;
+          const w2 = base + ((bit + QUOTIENT_MAX + 1) >>> 5), s2 = (bit + QUOTIENT_MAX + 1) & 31;
+          v = ((words[w2] >>> s2) | ((words[w2 + 1] << 1) << (31 - s2))) & ((1 << ESCAPE_BITS) - 1);
+          bit += ESCAPE_LENGTH;
+        }
+        residual[i] = (v >>> 1) ^ -(v & 1);
+      }
     }
     return bit;
   }
 
   /**
    * X and positions of one group; negative when an X left its range.
-   * @param {number} first @param {number} here @param {number} moved @param {number} step @param {Float32Array} positions
+   * @param {number} first @param {number} here @param {boolean} moved @param {number} step @param {Float32Array} positions
    */
   predict(first, here, moved, step, positions) {
     const { x, rest, neighbour, weight, place, residual } = this;
