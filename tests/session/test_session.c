@@ -347,7 +347,7 @@ static void a_slow_step_slows_simulated_time_and_says_by_how_much(void)
     double step_s = scene.step_s;
     pal_prepared big;
     pal_scene slow;
-    REQUIRE(small_scene(&slow, &big, 48));
+    REQUIRE(small_scene(&slow, &big, 26));
     slow.step_s = 1e-4;
     pal_scene kept = scene;
     scene = slow;
@@ -355,7 +355,7 @@ static void a_slow_step_slows_simulated_time_and_says_by_how_much(void)
     REQUIRE(s != NULL);
     uint64_t start = pal_clock_ns();
     const pal_frame *f;
-    while ((f = next_frame(s, w)) && f->end_ns - start < 400000000u) {
+    while ((f = next_frame(s, w)) && (f->tick < 3 || f->end_ns - start < 400000000u)) {
     }
     REQUIRE(f != NULL);
     double real_s = 1e-9 * (double)(f->end_ns - start), ratio = real_s / f->time_s;
@@ -408,6 +408,7 @@ static void *put_poses(void *user)
     for (uint32_t k = 0; !atomic_load(&c->stop); k++) {
         pal_pose pose = pose_at(0.06 - 0.00001 * (k % 3000), 0.01 * c->tool, k);
         pal_session_put_pose(c->session, c->tool, k % 97 == 0 ? NULL : &pose);
+        if (k % 16 == 0) usleep(200);
     }
     return NULL;
 }
@@ -436,7 +437,7 @@ static void survives_poses_commands_and_frames_from_many_threads_and_a_close_in_
         pthread_t thread[4];
         for (int k = 0; k < 4; k++) pthread_create(&thread[k], NULL, k < 2 ? put_poses : give_orders, &member[k]);
         double sum = 0;
-        for (int k = 0; k < 150; k++) {
+        for (int k = 0; k < 60; k++) {
             const pal_frame *f = next_frame(s, w);
             REQUIRE(f != NULL);
             for (int v = 0; v < 3 * f->part[0].n_vertex; v++) sum += f->part[0].position_m[v];
@@ -490,7 +491,7 @@ static void rows_and_parts_are_known_to_every_thread(void)
 
 int main(void)
 {
-    if (!small_scene(&scene, &mesh, 8)) return 1;
+    if (!small_scene(&scene, &mesh, 6)) return 1;
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
