@@ -198,8 +198,13 @@ static pal_err find_lcm(serve_run *run, pal_note *note)
 static void become_lcm(const serve_run *run, const lcm_child *child)
 {
     sigset_t none;
-    char *const argv[] = {(char *)"palpate-lcm", (char *)"--server",      (char *)child->server,
-                          (char *)"--lcm",       (char *)run->config.lcm, NULL};
+    char *const argv[] = {(char *)"palpate-lcm",
+                          (char *)"--server",
+                          (char *)child->server,
+                          (char *)"--lcm",
+                          (char *)run->config.lcm,
+                          run->common.quiet ? (char *)"--quiet" : NULL,
+                          NULL};
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
@@ -223,16 +228,16 @@ static void start_lcm(serve_run *run, lcm_child *child)
         pal_log(PAL_LOG_INFO, "lcm", "palpate-lcm runs as %d", (int)pid);
 }
 
-static void reap_lcm(serve_run *run)
+static void reap_lcm(serve_run *run, pal_log_level level)
 {
     int status;
     for (int i = 0; i < run->n; i++) {
         lcm_child *child = &run->lcm[i];
         if (!child->pid || waitpid(child->pid, &status, WNOHANG) != child->pid) continue;
         if (WIFSIGNALED(status))
-            pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm (%d) died of signal %d", (int)child->pid, WTERMSIG(status));
+            pal_log(level, "lcm", "palpate-lcm (%d) died of signal %d", (int)child->pid, WTERMSIG(status));
         else
-            pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm (%d) ended with %d", (int)child->pid, WEXITSTATUS(status));
+            pal_log(level, "lcm", "palpate-lcm (%d) ended with %d", (int)child->pid, WEXITSTATUS(status));
         child->pid = 0;
     }
 }
@@ -269,7 +274,7 @@ static void end_lcm(serve_run *run, const sigset_t *signals)
         if (run->lcm[i].pid) kill(run->lcm[i].pid, SIGTERM);
     while (any_lcm(run) && pal_clock_ns() < end) {
         sigtimedwait(signals, NULL, &pause);
-        reap_lcm(run);
+        reap_lcm(run, PAL_LOG_DEBUG);
     }
     for (int i = 0; i < run->n; i++)
         if (run->lcm[i].pid) {
@@ -307,7 +312,7 @@ static void wait_for_end(serve_run *run, const sigset_t *signals)
         uint64_t wait_ns = tend_lcm(run);
         struct timespec wait = {(time_t)(wait_ns / 1000000000u), (long)(wait_ns % 1000000000u)};
         int signal_number = sigtimedwait(signals, NULL, wait_ns == UINT64_MAX ? NULL : &wait);
-        if (signal_number == SIGCHLD) reap_lcm(run);
+        if (signal_number == SIGCHLD) reap_lcm(run, PAL_LOG_WARN);
         if (signal_number == SIGINT || signal_number == SIGTERM || signal_number == SIGUSR1) return;
     }
 }

@@ -44,9 +44,6 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
 
     int refusal = pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
     if (refusal) return refuse(note, refusal, shown->name, "no vertex order");
-    /* a weight that was rounded to 0 names no neighbour: frame_order_check wants index 0 there */
-    for (uint32_t i = 0; i < order->n_vertex * PAL_ORDER_NEIGHBOURS; i++)
-        if (order->weight[i] == 0) order->neighbour[i] = 0;
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(note, refusal, shown->name, "no asset");
     for (int t = 0; !err && t < PAL_STREAM_TIER; t++) {

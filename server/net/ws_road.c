@@ -226,13 +226,13 @@ static int finish(connection *c)
 static int established(struct lws *wsi, connection *c)
 {
     pal_transport *t = road_of(wsi);
-    char session[64];
-    if (lws_get_urlarg_by_name(wsi, "session=", session, sizeof session) == NULL) session[0] = 0;
+    char argument[64];
+    const char *session = lws_get_urlarg_by_name(wsi, "session=", argument, sizeof argument);
     memset(c, 0, sizeof *c);
     c->wsi = wsi;
     c->peer.ops = &pal_ws_road;
     c->open = true;
-    t->events.opened(t->events.user, &c->peer, session);
+    t->events.opened(t->events.user, &c->peer, session ? session : "");
     return 0;
 }
 
