@@ -4,8 +4,8 @@
 #ifndef PAL_SIM_SPRING_ROW_H
 #define PAL_SIM_SPRING_ROW_H
 #include "server/base/vec3.h"
+#include "server/sim/lanes.h"
 #include "server/sim/spring_law.h"
-#include "server/sim/strips.h"
 
 /* C, its gradient at each corner and the row sums of its second derivative where that stiffens, for nodes at x */
 typedef struct pal_shape {

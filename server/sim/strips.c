@@ -10,7 +10,7 @@ enum { LEAST_LANES = 2, TILE = 128 };
 
 typedef struct lattice {
     double low[3];
-    int n[3], axis[3]; /* nodes along x, y, z; axes from the longest to the shortest */
+    int n[3], axis[3];    /* nodes along x, y, z; axes from the longest to the shortest */
     int half[3], n_class; /* half of the nodes along each sorted axis; their product  */
 } lattice;
 
@@ -194,21 +194,4 @@ void pal_slots_add(pal_slots *slots, double *force)
         force[3 * i] += fx[s], force[3 * i + 1] += fy[s], force[3 * i + 2] += fz[s];
     }
     memset(slots->f, 0, 3 * sizeof(double) * (size_t)slots->n_slot);
-}
-
-void pal_loose_load(const pal_slots *slots, const int32_t *node, int n_corner, double at[][3][PAL_LANES])
-{
-    for (int c = 0; c < n_corner; c++)
-        for (int d = 0; d < 3; d++)
-            for (int l = 0; l < PAL_LANES; l++) at[c][d][l] = slots->x[d * slots->n_slot + node[c * PAL_LANES + l]];
-}
-
-void pal_loose_add(pal_slots *slots, const int32_t *node, int n_corner, pal_v8 f[][3])
-{
-    for (int c = 1; c < n_corner; c++)
-        for (int l = 0; l < PAL_LANES; l++)
-            for (int d = 0; d < 3; d++) {
-                slots->f[d * slots->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
-                slots->f[d * slots->n_slot + node[l]] -= f[c - 1][d][l];
-            }
 }

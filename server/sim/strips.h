@@ -41,40 +41,4 @@ pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n
 void pal_slots_load(pal_slots *slots, const double *x);
 /* force [n_node][3] += slots->f, which is zero afterwards */
 void pal_slots_add(pal_slots *slots, double *force);
-
-/* 8 doubles side by side: GNU vectors, which gcc and clang turn into whatever the processor has. pal_lanes in memory
- * may stand at any multiple of 8 bytes */
-typedef double pal_v8 __attribute__((vector_size(64)));
-typedef int64_t pal_i8 __attribute__((vector_size(64)));
-typedef double pal_lanes __attribute__((vector_size(64), aligned(8), may_alias));
-
-#define PAL_INLINE static inline __attribute__((always_inline))
-
-PAL_INLINE pal_v8 pal_load8(const double *at)
-{
-    return *(const pal_lanes *)at;
-}
-PAL_INLINE void pal_add8(double *at, pal_v8 a)
-{
-    *(pal_lanes *)at += a;
-}
-/* lane by lane: a where the mask is set, else b */
-PAL_INLINE pal_v8 pal_pick8(pal_i8 mask, pal_v8 a, pal_v8 b)
-{
-    return (pal_v8)((mask & (pal_i8)a) | (~mask & (pal_i8)b));
-}
-/* 1 / sqrt(q) for positive normal q: a guess from the halved exponent and four Newton steps, within a few units of the
- * last place. The same bits on every IEEE machine, at a third of the cost of root and division */
-PAL_INLINE pal_v8 pal_inverse_root8(pal_v8 q)
-{
-    pal_v8 half = 0.5 * q, r = (pal_v8)(0x5fe6eb50c7b537a9 - ((pal_i8)q >> 1));
-    r = r * (1.5 - half * r * r);
-    r = r * (1.5 - half * r * r);
-    r = r * (1.5 - half * r * r);
-    return r * (1.5 - half * r * r);
-}
-/* coordinates of a loose block's corners; and the forces on corners 1, 2, 3 into slots->f, minus their sum on corner 0
- */
-void pal_loose_load(const pal_slots *slots, const int32_t *node, int n_corner, double at[][3][PAL_LANES]);
-void pal_loose_add(pal_slots *slots, const int32_t *node, int n_corner, pal_v8 f[][3]);
 #endif
