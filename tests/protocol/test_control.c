@@ -1,4 +1,4 @@
-/* Control messages: limits, fields, hostile text. That both directions agree is in test_golden.c. */
+/* Control messages: limits, fields, hostile text. That both directions agree is in test_golden_packets.c. */
 #include "protocol/control.h"
 #include "tests/check.h"
 #include "tests/protocol/golden.h"
