@@ -11,7 +11,7 @@ make_scene
 start_server --port 8090 --lcm "$bus" --log info
 await 20 grep -q lcm_joined "$work/serve.err"
 check "palpate-lcm has joined" $? == 0
-timeout 60 lcm-logger -l "$bus" -f "$work/record" >/dev/null 2>&1 &
+timeout 60 lcm-logger --lcm-url="$bus" -f "$work/record" >/dev/null 2>&1 &
 logger=$!
 pids="$pids $logger"
 await 10 test -e "$work/record"
