@@ -171,7 +171,9 @@ static void watcher_state(void *user, pal_link *link, pal_link_state state, int 
         pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, why);
         for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
     }
-    if (state == PAL_LINK_ENDED) pal_link_stop(b->loop);
+    if (state != PAL_LINK_ENDED) return;
+    b->count.refused = true;
+    pal_link_stop(b->loop);
 }
 
 /* the member of one tool */

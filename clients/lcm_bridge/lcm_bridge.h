@@ -21,7 +21,8 @@ typedef struct pal_lcm_bridge_options {
 
 typedef struct pal_lcm_bridge_counts {
     uint64_t n_frame, n_frame_dropped, n_state, n_state_refused, n_model, n_status;
-    int n_tool; /* with a member now */
+    int n_tool;   /* with a member now                          */
+    bool refused; /* the server refused for good: the loop was stopped */
 } pal_lcm_bridge_counts;
 
 /* REFUSED: a URL. Borrows loop. */

@@ -67,7 +67,8 @@ int main(int argc, char **argv)
                (unsigned long long)c.n_frame, (unsigned long long)c.n_frame_dropped, (unsigned long long)c.n_state,
                (unsigned long long)c.n_state_refused, (unsigned long long)c.n_model, (unsigned long long)c.n_status);
     }
+    const bool refused = !err && pal_lcm_bridge_count(bridge).refused;
     pal_link_loop_destroy(loop);
     pal_lcm_bridge_close(bridge);
-    return err ? 1 : 0;
+    return err || refused ? 1 : 0;
 }

@@ -16,7 +16,6 @@ check "the server runs palpate-lcm" "$(echo "$before" | wc -w)" == 1
 timeout 60 "$bin/palpate-trainee" "$url" --script press --seconds 7 --json >"$work/watch" 2>"$work/watch.err" &
 watch=$!
 sleep 2
-late() { curl -s "http://127.0.0.1:$port/metrics" 2>/dev/null; }
 start=$(date +%s%N)
 "$forge" 239.255.76.67 7667 PALPATE1/ball/TOOL/0
 other() { now=$(lcm_pid) && [ -n "$now" ] && [ "$now" != "$before" ]; }
@@ -37,4 +36,13 @@ check "never lost its connection" "$(json reconnects "$work/watch")" == 0
 check "and no gap of half a second in the session's frames (ms)" \
     "$(tr ',{}' '\n\n\n' <"$work/watch" | sed -n '/gap_ms/,/max/s/"max"://p' | head -1)" '<' 500
 check "the server is the same process" "$(kill -0 "$server_pid" && echo 1)" == 1
+
+# without a multicast route: one warning that names the remedy, and it goes on trying
+ip route del 224.0.0.0/4 dev lo
+timeout 30 "$bin/palpate-lcm" --server "$url" --seconds 2 --quiet >/dev/null 2>"$work/noroute"
+check "palpate-lcm runs without a multicast route" $? == 0
+check "says so once" "$(wc -l <"$work/noroute")" == 1
+check "and names the command that adds one" "$(grep -c 'ip route add' "$work/noroute")" == 1
+timeout 10 "$bin/palpate-lcm" --server "$url?session=none" --seconds 5 --quiet >/dev/null 2>&1
+check "a session that does not exist is a failure" $? == 1
 finish
