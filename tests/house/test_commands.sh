@@ -136,7 +136,7 @@ end
 begin "plan shows rows and JSON, for a scene, a folder and a surface"
 run plan scene/scene.json
 check "exit code $code" code_is 0
-check "no gravity row" has out "gravity"
+check "no row of springs" has out "edge_distance"
 run plan scene --json
 check "exit code $code for a folder" code_is 0
 check "not one JSON object" is_json out
@@ -259,9 +259,9 @@ begin "a bad scene is refused with file and entry"
 sed 's/"young_Pa"/"youngPa"/' scene/scene.json >scene/bad.json
 run plan scene/bad.json
 refused 1 "scene/bad.json: bodies\[0\].material.youngPa: unknown key"
-sed 's/"gravity"/"gravitas"/' scene/scene.json >scene/bad.json
+sed 's/"tool_push"/"tool_pusch"/' scene/scene.json >scene/bad.json
 run plan scene/bad.json
-refused 1 "gravitas"
+refused 1 "tool_pusch"
 sed 's/5000/1e12/' scene/scene.json >scene/bad.json
 run plan scene/bad.json
 refused 1 "sub-steps"
