@@ -9,22 +9,23 @@ enum { RAMP_STEPS = 10 };
 
 bool pal_pose_ok(const pal_pose *pose, double limit_m)
 {
-    double far2 = 0, quat2 = 0;
+    double far2 = 0, fast2 = 0, quat2 = 0;
     for (int c = 0; c < 3; c++) {
         if (!isfinite(pose->position_m[c]) || !isfinite(pose->velocity_m_s[c])) return false;
         far2 += pose->position_m[c] * pose->position_m[c];
+        fast2 += pose->velocity_m_s[c] * pose->velocity_m_s[c];
     }
     for (int c = 0; c < 4; c++) quat2 += pose->quat[c] * pose->quat[c];
-    return far2 <= limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
+    return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
 }
 
 void pal_tool_take(pal_tool *tool, const pal_pose *pose)
 {
-    bool before = tool->present || tool->ramp > 0;
     if (pose) {
         tool->next = *pose;
-        /* a tool that appears is where it is: its way there touches nothing */
-        if (!before) {
+        /* a tool that appears is where it is: its way there touches nothing, and its forces begin at zero */
+        if (!tool->present) {
+            tool->ramp = 0;
             tool->last = *pose;
             memcpy(tool->here_m, pose->position_m, sizeof tool->here_m);
         }

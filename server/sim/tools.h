@@ -56,7 +56,8 @@ typedef struct pal_tools {
     pal_tool tool[PAL_TOOL_MAX];
 } pal_tools;
 
-/* is every number finite, the position within reach of limit_m, the quaternion near unit? (poses are untrusted) */
+/* is every number finite, the position within reach of limit_m, the velocity at most 1000 limit_m a second, the
+ * quaternion near unit? (poses are untrusted) */
 bool pal_pose_ok(const pal_pose *pose, double limit_m);
 /* before a step: take over the pose asked for (NULL: let go), update ramp; the jump of a tool that appears is not swept
  */

@@ -1,11 +1,11 @@
 /* Solver verlet: v += dt f/m, x += dt v (paper B 4.1's Verlet in its velocity form, numerics.md 1 B).
  *
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks. The
- * sub-step is 0.5 of the stability limit that Gershgorin's bound gives: with K and C the row sums of stiffness and
- * explicit damping, 0.5 * 2/w is the largest dt with dt^2 K + dt C <= m at every free node. The bound is taken again at
- * the current state whenever a node may have moved a fifth of an element since the last time. A node moves at most 0.2
- * S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality
- * is met by adding mass to the nodes that break it. */
+ * sub-step is `safety` (key, 0.5) of the stability limit that Gershgorin's bound gives: with K and C the row sums of
+ * stiffness and explicit damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node.
+ * The bound is taken again at the current state whenever a node may have moved a fifth of an element since the last
+ * time. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps
+ * (step->heavy), the same inequality is met by adding mass to the nodes that break it. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 
@@ -13,6 +13,7 @@
 
 typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
+    double safety;        /* of the stability limit             */
     double limit_s;
     double way_m; /* no node has moved farther since the bound was taken */
     bool known;   /* limit_s holds                                       */
@@ -22,12 +23,15 @@ static const double most_way_h = 0.2, most_move_S = 0.2;
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
+    double safety = 0.5;
+    PAL_TRY(pal_item_number(item, "safety", 0.01, 0.9, &safety, build->note));
     PAL_TRY(pal_item_done(item, build->note));
     verlet *row = PAL_NEW(build->arena, verlet, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->stiff = PAL_NEW(build->arena, double, build->body->n_dof);
     row->damp = PAL_NEW(build->arena, double, build->body->n_dof);
     if (!row->stiff || !row->damp) return PAL_ERR_MEMORY;
+    row->safety = safety;
     *self = row;
     return PAL_ERR_OK;
 }
@@ -49,7 +53,7 @@ static bool has_bounds(const pal_row *rows, int n)
     return false;
 }
 
-/* the smallest over free nodes of the positive root of dt^2 K + dt C = m */
+/* the smallest over free nodes of 2 safety t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
     verlet *row = self;
@@ -66,7 +70,7 @@ static double limit(void *self, pal_step *step)
         double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
         if (body->held[i] || k + c == 0) continue;
-        double dt = 2 * m / (c + sqrt(c * c + 4 * k * m));
+        double dt = row->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < least) least = dt;
     }
     row->limit_s = sum == 0 ? least : NAN;
@@ -100,6 +104,7 @@ static pal_err run(void *self, pal_step *step)
     verlet *row = self;
     pal_body *body = step->body;
     double dt = step->dt_s, keep = 1 / (1 + dt * drag_rate(step)), most2 = 0;
+    double root = dt / (2 * row->safety);
     step->drag_apart = true;
     PAL_TRY(pal_gather(step));
 
@@ -107,7 +112,7 @@ static pal_err run(void *self, pal_step *step)
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
-        if (step->heavy) m = fmax(m, dt * (dt * row->stiff[i] + row->damp[i]));
+        if (step->heavy) m = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
         double s = body->held[i] ? 0 : dt / m, k = body->held[i] ? 0 : keep;
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
