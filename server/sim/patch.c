@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* haptics.md 2.3: forgetting 0.9, samples 0.05 mm apart, low-pass of one frame while the tool moves less than 0.2 mm */
-#define FORGET       0.9
+/* haptics.md 2.3: samples 0.05 mm apart, low-pass of one frame while the tool moves less than 0.2 mm */
+#define FORGET       0.8
 #define LEAST_MOVE_M 0.05e-3
 #define REST_MOVE_M  0.2e-3
 #define LOW_PASS     0.63212055882855767 /* 1 - 1/e */

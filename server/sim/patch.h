@@ -2,10 +2,11 @@
  * the tool's centre and the tangent stiffness of the tissue under it, so that a haptic bridge can render contact at its
  * own rate between frames.
  *
- * Contacts are grouped by direction into blobs. Departure from 2.3: blobs span 60 degrees about their mean direction,
+ * Contacts are grouped by direction into blobs. Departure from 2.3: blobs span 75 degrees about their mean direction,
  * not 20: one sphere in one dent touches tissue over its whole cap, and that is one patch; two walls of a fold are two
  * patches in two groups, whose forces add. k1 = dF/dd comes from least squares with forgetting on (d, F), taken only
- * when d has moved by 0.05 mm, started at the stiffness of a flat punch, 2 E a / (1 - nu^2), and clamped. k2 is 0.
+ * when d has moved by 0.05 mm, started at the stiffness of a flat punch, 2 E a / (1 - nu^2), and clamped. Forgetting is
+ * 0.8, not 0.9, which would lag a millimetre behind where tissue stiffens. k2 is 0.
  * Thread: [sim]. */
 #ifndef PAL_SIM_PATCH_H
 #define PAL_SIM_PATCH_H

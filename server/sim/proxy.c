@@ -116,6 +116,8 @@ void pal_proxy_move(pal_proxy *proxy, const double target[3], const double *p, i
 
     pal_sub3(way, target, proxy->x);
     double wanted2 = pal_dot3(way, way), least2 = 1e-18 * limits->radius_m * limits->radius_m;
+    /* once blocked it slides no farther than the tool itself moved, or than tissue may be moved */
+    double slide_m = fmax(limits->rise_m, limits->stroke_m);
     for (int pass = 0; pass < SLIDE_PASSES && pal_dot3(way, way) > least2; pass++) {
         double part;
         if (pass > 0 && !keep_inside(proxy->x, way, limits)) break;
@@ -125,6 +127,8 @@ void pal_proxy_move(pal_proxy *proxy, const double target[3], const double *p, i
         pal_scale3(way, 1 - part, way);
         pal_sub3(normal[pass], proxy->x, p + 3 * hit);
         if (!pal_unit3(normal[pass], normal[pass], 0) || !clip(way, normal, pass + 1)) break;
+        double left_m = pal_norm3(way);
+        if (left_m > slide_m) pal_scale3(way, slide_m / left_m, way);
     }
     /* exactly there when nothing was in the way */
     double left[3];

@@ -18,6 +18,7 @@ typedef struct pal_proxy {
 
 typedef struct pal_proxy_limits {
     double radius_m, deepest_m, rise_m;
+    double stroke_m;            /* way of the tool itself in this sub-step */
     double a[3], b[3], slack_m; /* where contact points are known: the proxy stays within slack of segment a..b */
 } pal_proxy_limits;
 

@@ -6,10 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-/* |sum of normals| over the root of the sum of squares of a fan (2.4 when flat): a frame's turning counts in full above
- * the second and not at all below the first, where the fan is folded and turning would be a matter of chance */
-#define FOLDED 0.6
-#define OPEN   1.2
+/* |sum of normals| over the sum of their lengths (1 when flat, 0.58 at the corner of a voxel): a frame's turning counts
+ * in full above the second and not at all below the first, where the fan is folded and turning would be a matter of
+ * chance */
+#define FOLDED 0.2
+#define OPEN   0.4
 /* tangential part of a frame's edge over its length */
 #define LEAST_TANGENT 0.3
 
@@ -340,29 +341,46 @@ void pal_touch_velocity(const pal_touch *touch, int point, double v[3])
     blend(touch, point, touch->v, v);
 }
 
-bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], int *vertex, double normal[3])
+/* a point of body->shown, vertex or sample */
+static void shown_point(const pal_touch *touch, const pal_body *body, int point, double p[3])
 {
-    double best = INFINITY;
-    *vertex = -1;
-    for (int i = 0; i < touch->n_vertex; i++) {
-        const float *s = body->shown + 3 * (size_t)i;
-        double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
-        double d2 = x * x + y * y + z * z;
-        if (d2 < best) best = d2, *vertex = i;
+    int32_t vertex[3];
+    double share[3];
+    int n = corners(touch, point, vertex, share);
+    pal_set3(p, 0, 0, 0);
+    for (int k = 0; k < n; k++)
+        for (int c = 0; c < 3; c++) p[c] += share[k] * (double)body->shown[3 * (size_t)vertex[k] + (size_t)c];
+}
+
+static void add_normal(const float *shown, const int32_t *corner, double sum[3])
+{
+    double a[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int c = 0; c < 3; c++) a[k][c] = (double)shown[3 * (size_t)corner[k] + (size_t)c];
+    pal_sub3(a[1], a[1], a[0]);
+    pal_sub3(a[2], a[2], a[0]);
+    pal_cross3(a[1], a[1], a[2]);
+    pal_add3(sum, sum, a[1]);
+}
+
+bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], double place[3],
+                       double normal[3])
+{
+    double best = INFINITY, at[3], sum[3] = {0};
+    int nearest = -1;
+    for (int i = 0; i < touch->n_fixed; i++) {
+        shown_point(touch, body, i, at);
+        pal_sub3(at, at, p);
+        double d2 = pal_dot3(at, at);
+        if (d2 < best) best = d2, nearest = i;
     }
-    if (*vertex < 0) return false;
-    double sum[3] = {0};
-    for (size_t t = 0; t < 3 * (size_t)body->surface->n_tri; t += 3) {
-        const int32_t *corner = body->surface->tri + t;
-        if (corner[0] != *vertex && corner[1] != *vertex && corner[2] != *vertex) continue;
-        double a[3][3];
-        for (int k = 0; k < 3; k++)
-            for (int c = 0; c < 3; c++) a[k][c] = (double)body->shown[3 * (size_t)corner[k] + (size_t)c];
-        pal_sub3(a[1], a[1], a[0]);
-        pal_sub3(a[2], a[2], a[0]);
-        pal_cross3(a[1], a[1], a[2]);
-        pal_add3(sum, sum, a[1]);
-    }
+    if (nearest < 0) return false;
+    shown_point(touch, body, nearest, place);
+    if (nearest >= touch->n_vertex)
+        add_normal(body->shown, touch->corner + 3 * (size_t)(nearest - touch->n_vertex), sum);
+    else
+        for (int k = touch->fan_start[nearest]; k < touch->fan_start[nearest + 1]; k++)
+            add_normal(body->shown, body->surface->tri + 3 * (size_t)touch->fan[k], sum);
     return pal_unit3(normal, sum, 0);
 }
 
@@ -446,7 +464,7 @@ static const pal_turn *turning(pal_touch *touch, const pal_body *body, int slot)
     touch->turning_mark[slot] = touch->sub_step;
     const pal_skin *skin = body->skin;
     const double *o = body->d + 3 * (size_t)skin->frame[slot];
-    double N[3] = {0}, squares = 0;
+    double N[3] = {0}, sum = 0;
     t->turns = false;
     for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
         double a[3], b[3];
@@ -454,10 +472,10 @@ static const pal_turn *turning(pal_touch *touch, const pal_body *body, int slot)
         pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
         pal_cross3(a, a, b);
         pal_add3(N, N, a);
-        squares += pal_dot3(a, a);
+        sum += pal_norm3(a);
     }
     double length = pal_norm3(N);
-    t->part = fmin(1, (length / sqrt(squares) - FOLDED) / (OPEN - FOLDED));
+    t->part = fmin(1, (length / sum - FOLDED) / (OPEN - FOLDED));
     if (!(t->part > 0) || !pal_unit3(t->X, N, 0)) return t;
     t->per_normal = 1 / length;
     for (int k = 0; k < 2 && !t->turns; k++) {

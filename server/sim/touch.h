@@ -71,8 +71,10 @@ void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s);
 void pal_touch_point(const pal_touch *touch, int point, double x[3]);
 void pal_touch_velocity(const pal_touch *touch, int point, double v[3]);
 
-/* the shown vertex nearest to p (all are looked at) and the unit normal of the shown surface there; false: none */
-bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], int *vertex, double normal[3]);
+/* the fixed contact point nearest to p (all are looked at), its place and the unit normal of the shown surface there;
+ * false: no such normal */
+bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const double p[3], double place[3],
+                       double normal[3]);
 
 /* Explicit stability in a sub-step (numerics.md part 3): the largest eigenvalue of M^-1 sum k J' J over the contacts,
  * J being a point's motion along `away` with the free nodes, 1/s^2. Two power iterations from a uniform push, which is

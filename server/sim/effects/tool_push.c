@@ -30,7 +30,7 @@
 #define SAFETY        1.3
 #define SHARE_RISE    1.01
 #define DEEPEST_RADII 0.5
-#define BLOB_COSINE   0.5
+#define BLOB_COSINE   0.25
 enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10 };
 
 /* one tool as this body feels it */
@@ -45,6 +45,7 @@ typedef struct holder {
     pal_proxy_limits limits;
     pal_contact *contact; /* [CONTACT_MAX] */
     int n_contact;
+    double slip[3];  /* sideways way of the tool over tissue that friction still holds, m */
     double share;    /* of the stiffness that is stable; falls at once, rises slowly */
     double total[3]; /* on the tool, this sub-step, this body */
     pal_patches patches;
@@ -145,15 +146,12 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 /* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
 static void seat(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
 {
-    int vertex;
-    double normal[3];
+    double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
     pal_copy3(h->proxy.x, at);
     h->active = true;
     h->behind_s = 0;
-    if (!pal_touch_nearest(&push->touch, body, at, &vertex, normal)) return;
-    double p[3], out[3];
-    for (int c = 0; c < 3; c++) p[c] = (double)body->shown[3 * (size_t)vertex + (size_t)c];
+    if (!pal_touch_nearest(&push->touch, body, at, p, normal)) return;
     pal_sub3(out, at, p);
     if (pal_dot3(out, normal) > 0) {
         if (pal_norm3(out) >= DEEPEST_RADII * radius_m) return;
@@ -226,6 +224,7 @@ static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step 
     double here[3];
     pal_sub3(here, tool->here_m, step->body->offset_m);
     h->limits.rise_m = push->clamp_S * step->body->size_m / step->n_sub;
+    h->limits.stroke_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     size_t used = pal_arena_used(step->scratch);
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
            *core = PAL_NEW(step->scratch, double, h->n_list);
@@ -237,21 +236,34 @@ static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step 
     pal_arena_return(step->scratch, used);
 }
 
-/* force on one contact point: penalty with damping, and Coulomb friction with a viscous core */
-static void contact_force(const tool_push *push, const holder *h, pal_contact *c, double k, double dt_s)
+/* force on one contact point: penalty with damping */
+static void contact_force(const tool_push *push, pal_contact *c, double k, double dt_s)
 {
     double v[3];
     pal_touch_velocity(&push->touch, c->point, v);
-    double away = pal_dot3(v, c->away), f = k * (c->depth_m - GAMMA * dt_s * away);
-    pal_set3(c->force, 0, 0, 0);
-    if (!(f > 0)) return;
-    pal_scale3(c->force, f, c->away);
-    if (push->friction <= 0) return;
-    double slide[3];
-    pal_sub3(slide, v, h->proxy.v);
-    pal_axpy3(slide, -pal_dot3(slide, c->away), c->away);
-    double speed = pal_norm3(slide);
-    if (speed > 0) pal_axpy3(c->force, -fmin(GAMMA * k * dt_s, push->friction * f / speed), slide);
+    double f = k * (c->depth_m - GAMMA * dt_s * pal_dot3(v, c->away));
+    pal_scale3(c->force, f > 0 ? f : 0, c->away);
+}
+
+/* Coulomb friction: the tool's way sideways over the tissue it presses stretches a spring as stiff as the contact,
+ * which slips at friction times the normal force; shared out like the normal force */
+static void add_friction(tool_push *push, holder *h, const double sum[3], double stiffness, double dt_s)
+{
+    double size = pal_norm3(sum), drift[3], along[3], total = 0;
+    if (push->friction <= 0 || !pal_unit3(along, sum, 0)) return;
+    pal_copy3(drift, h->proxy.v);
+    for (int i = 0; i < h->n_contact; i++) total += pal_norm3(h->contact[i].force);
+    for (int i = 0; i < h->n_contact; i++) {
+        double v[3];
+        pal_touch_velocity(&push->touch, h->contact[i].point, v);
+        pal_axpy3(drift, -pal_norm3(h->contact[i].force) / total, v);
+    }
+    pal_axpy3(h->slip, dt_s, drift);
+    pal_axpy3(h->slip, -pal_dot3(h->slip, along), along);
+    double most = push->friction * size / stiffness, slip = pal_norm3(h->slip);
+    if (slip > most) pal_scale3(h->slip, most / slip, h->slip);
+    for (int i = 0; i < h->n_contact; i++)
+        pal_axpy3(h->contact[i].force, pal_norm3(h->contact[i].force) / total * stiffness, h->slip);
 }
 
 /* how much of the asked stiffness a tool may have in this sub-step */
@@ -276,16 +288,24 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    double soft = tool->ramp * h->ease * h->share, sum[3] = {0};
-    if (h->n_contact == 0 || soft <= 0) return;
-    pal_touch_force_begin(&push->touch);
+    double soft = tool->ramp * h->ease * h->share, sum[3] = {0}, stiffness = 0;
+    if (h->n_contact == 0 || soft <= 0) {
+        pal_set3(h->slip, 0, 0, 0);
+        return;
+    }
     for (int i = 0; i < h->n_contact; i++) {
-        pal_contact *c = &h->contact[i];
-        contact_force(push, h, c, soft * c->k_N_m, step->dt_s);
-        pal_touch_push(&push->touch, body, c->point, c->force);
-        pal_add3(sum, sum, c->force);
+        contact_force(push, &h->contact[i], soft * h->contact[i].k_N_m, step->dt_s);
+        pal_add3(sum, sum, h->contact[i].force);
+        stiffness += soft * h->contact[i].k_N_m;
     }
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
+    add_friction(push, h, sum, stiffness, step->dt_s);
+    pal_set3(sum, 0, 0, 0);
+    pal_touch_force_begin(&push->touch);
+    for (int i = 0; i < h->n_contact; i++) {
+        pal_touch_push(&push->touch, body, h->contact[i].point, h->contact[i].force);
+        pal_add3(sum, sum, h->contact[i].force);
+    }
     pal_scale3(h->total, -1, sum);
     double room = fmin(pal_tool_room(tool, h->total), pal_touch_gather(&push->touch, body));
     pal_touch_apply(&push->touch, body, room);
@@ -301,7 +321,7 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     }
 }
 
-/* the strongest contacts not yet grouped, within 60 degrees of their mean */
+/* the strongest contacts not yet grouped, within 75 degrees of their mean */
 static bool contact_blob(const holder *h, uint8_t *grouped, pal_blob *blob)
 {
     double axis[3], sum[3];
@@ -329,8 +349,10 @@ static bool contact_blob(const holder *h, uint8_t *grouped, pal_blob *blob)
     return pal_unit3(blob->normal, sum, 0);
 }
 
-/* the nearest tissue not in the direction of an earlier blob; directions of what is about as near are averaged */
-static bool near_blob(const holder *h, const double *x, const pal_blob *earlier, int n_earlier, pal_blob *blob)
+/* the nearest tissue not in the direction of an earlier blob (beside a contact: only what faces it, since the tissue
+ * around a dent goes along with the tool); directions of what is about as near are averaged */
+static bool near_blob(const holder *h, const double *x, double near, const pal_blob *earlier, int n_earlier,
+                      pal_blob *blob)
 {
     double radius = h->limits.radius_m, least = INFINITY, sum[3] = {0};
     for (int pass = 0; pass < 2; pass++)
@@ -338,10 +360,11 @@ static bool near_blob(const holder *h, const double *x, const pal_blob *earlier,
             double out[3];
             pal_sub3(out, h->proxy.x, x + 3 * i);
             double distance = pal_norm3(out);
-            if (pass == 1 && distance > least + 0.2 * radius) continue;
+            if (distance > radius + near || (pass == 1 && distance > least + 0.2 * radius)) continue;
             if (!pal_unit3(out, out, 1e-9 * radius)) continue;
             bool seen = false;
-            for (int b = 0; b < n_earlier && !seen; b++) seen = pal_dot3(out, earlier[b].normal) >= BLOB_COSINE;
+            for (int b = 0; b < n_earlier && !seen; b++)
+                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : BLOB_COSINE);
             if (seen) continue;
             if (pass == 0)
                 least = fmin(least, distance);
@@ -365,7 +388,7 @@ static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     if (x && grouped) {
         while (n < PAL_PATCH_MAX && contact_blob(h, grouped, &blob[n])) n++;
         for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
-        while (n < PAL_PATCH_MAX && near_blob(h, x, blob, n, &blob[n])) n++;
+        while (n < PAL_PATCH_MAX && near_blob(h, x, near_m(push, tool->radius_m), blob, n, &blob[n])) n++;
     }
     pal_arena_return(step->scratch, used);
     double radius = tool->radius_m;
