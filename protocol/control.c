@@ -72,6 +72,7 @@ static const field hello_fields[] = {
     {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
     {"box_min_m", NUMBERS, true, AT(pal_wire_hello, box_min_m), 0, FIXED, 3, NULL},
     {"box_max_m", NUMBERS, true, AT(pal_wire_hello, box_max_m), 0, FIXED, 3, NULL},
+    {"up", NUMBERS, true, AT(pal_wire_hello, up), 0, FIXED, 3, NULL},
     {"parts", OBJECTS, true, AT(pal_wire_hello, part), sizeof(pal_wire_part_info), AT(pal_wire_hello, n_part),
      PAL_WIRE_PART_MAX, part_fields},
     {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),

@@ -79,6 +79,7 @@ typedef struct pal_wire_hello {
     double step_rate_hz, frame_rate_hz;
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
+    double up[3];                      /* unit, away from the ground                            */
     uint32_t n_part, n_tool, n_row;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];

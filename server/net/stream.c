@@ -344,6 +344,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
     for (int c = 0; c < 3; c++) {
         out->box_min_m[c] = stream->box_min_m[c];
         out->box_max_m[c] = stream->box_max_m[c];
+        out->up[c] = scene->up[c];
         size += pow(stream->box_max_m[c] - stream->box_min_m[c], 2);
     }
     out->n_part = (uint32_t)stream->n_part;

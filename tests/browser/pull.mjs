@@ -42,7 +42,7 @@ async function open(address, name, viewport) {
   page.on("console", (m) => m.type() === "error" && troubles.push(`${name}: ${m.text()}`));
   page.on("pageerror", (e) => troubles.push(`${name}: ${e.message}`));
   await page.goto(`${address}?name=${name}`);
-  await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status, null, { timeout: 30000 });
+  await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status, null, { timeout: 90000 });
   return { browser, page };
 }
 const moved = (page) => page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
@@ -106,7 +106,8 @@ try {
   check("the one who pulls sees the force", force > 0.05 && force < 50, `${force.toFixed(2)} N`);
   const label = await until(() => ben.page.evaluate(() => [...document.querySelectorAll("#labels span")].filter((s) => !s.hidden).map((s) => s.textContent)), (l) => l.includes("Ada"));
   check("the other's tool is shown with its name", label.includes("Ada"), label.join(" "));
-  await ada.page.click("#panel-toggle", { noWaitAfter: true, force: true }).catch(() => {});
+  await ada.page.keyboard.press("p"); // the panel, without letting go
+  await new Promise((r) => setTimeout(r, 1500));
   await ada.page.screenshot({ path: join(pictures, "pull_ada.png") });
   await ben.page.screenshot({ path: join(pictures, "pull_ben_phone.png") });
   await ada.page.mouse.up();

@@ -17,7 +17,8 @@ allowed() {
     server/scene | server/session | server/lab) echo "server/sim server/mesh server/num server/base" ;;
     server/net) echo "server/session server/sim protocol server/base server/mesh" ;;
     server/commands | server) echo "server/commands server/net server/session server/scene server/lab server/sim server/mesh server/num server/base protocol server" ;;
-    clients/*) echo "protocol server/base lcmtypes" ;;
+    clients/link) echo "protocol server/base lcmtypes" ;;
+    clients/*) echo "clients/link protocol server/base lcmtypes" ;;
     *) echo "?" ;;
     esac
 }

@@ -124,6 +124,7 @@ static inline void golden_hello(pal_wire_hello *h)
                           .credit = 3,
                           .box_min_m = {-0.1, -0.2, -0.3},
                           .box_max_m = {0.1, 0.2, 1.0 / 3},
+                          .up = {0, 0.6, 0.8},
                           .n_part = 2,
                           .n_tool = 1,
                           .n_row = 3,

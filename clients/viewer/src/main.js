@@ -101,7 +101,7 @@ const control = {
     state.hello = m;
     state.me = m.you.id;
     state.myTool = m.you.tool ?? -1;
-    if (!again) stage.frameBox([m.box_min_m, m.box_max_m], m.up ?? [0, 0, 1]);
+    if (!again) stage.frameBox([m.box_min_m, m.box_max_m], m.up);
     state.colourTop = stage.size / 15;
     byId("scale-top").textContent = (1000 * state.colourTop).toFixed(0) + " mm";
     input.radius = m.tools[Math.max(0, state.myTool)]?.radius_m ?? 0.02 * stage.size;

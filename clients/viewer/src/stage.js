@@ -44,7 +44,8 @@ export class Stage {
     this.size = 0.3; // of the scene, m
     this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
     this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
-    this.scene.add(this.key, this.rim, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
+    this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the eye and below: no side looked at is black
+    this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
     this.scene.environment = makeStudio(this.renderer);
     this.scene.environmentIntensity = 0.8;
     this.dirty = true;
@@ -128,6 +129,9 @@ export class Stage {
     this.key.target.position.copy(this.target);
     this.rim.position.copy(this.target).addScaledVector(this.up, 0.5).addScaledVector(right, 1.1).addScaledVector(away, -1.0);
     this.rim.target.position.copy(this.target);
+    this.fill.position.copy(this.target).addScaledVector(away, 1).addScaledVector(this.up, -0.6).addScaledVector(right, 0.35);
+    this.fill.target.position.copy(this.target);
+    this.fill.target.updateMatrixWorld();
     this.key.target.updateMatrixWorld();
     this.rim.target.updateMatrixWorld();
   }
