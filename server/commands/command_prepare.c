@@ -35,6 +35,7 @@ typedef struct wishes {
 typedef struct outcome {
     pal_surface_scene_report report;
     double write_s, total_s;
+    int n_piece; /* components of the tetrahedra: the border layer joins what nearly touches */
     char file[FILES][80];
     int n_file;
 } outcome;
@@ -71,6 +72,11 @@ static int list_labels(const pal_flag_common *common, const char *path)
 
 /* ---- writing ---- */
 
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(a, b);
+}
+
 /* moves every file of the staging folder up into its parent, scene.json last */
 static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_note *note)
 {
@@ -82,6 +88,7 @@ static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_
         if (entry->d_name[0] != '.' && strcmp(entry->d_name, "scene.json"))
             snprintf(out->file[out->n_file++], sizeof out->file[0], "%.79s", entry->d_name);
     closedir(list);
+    qsort(out->file, (size_t)out->n_file, sizeof out->file[0], by_name);
     snprintf(out->file[out->n_file++], sizeof out->file[0], "scene.json");
     for (int k = 0; k < out->n_file; k++) {
         snprintf(from, sizeof from, "%s/%s", stage, out->file[k]);
@@ -156,6 +163,7 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
     cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
     cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
+    cJSON_AddNumberToObject(o, "pieces", out->n_piece);
     cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
     cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
     cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
@@ -191,10 +199,15 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
            mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution,
            r->prepare.voxel.n_component, r->prepare.voxel.n_component == 1 ? "" : "s", r->prepare.voxel.method);
     if (r->prepare.voxel.surface_volume_m3 > 0)
-        printf("volume of the surface %.1f ml, of the voxels inside %+.1f %%\n",
+        printf("volume %.1f ml by the surface, %+.1f %% by the voxels inside\n",
                1e6 * r->prepare.voxel.surface_volume_m3, 100 * r->prepare.volume_error);
     else
-        printf("the surface is open; volume of the voxels inside %.1f ml\n", 1e6 * r->prepare.voxel.inside_volume_m3);
+        printf("volume %.1f ml by the voxels inside; the surface is open and has none\n",
+               1e6 * r->prepare.voxel.inside_volume_m3);
+    if (out->n_piece > 1)
+        printf("the tetrahedra are %d pieces that do not hang together; those without support drift (--largest keeps "
+               "one)\n",
+               out->n_piece);
     if (r->surface.n_degenerate + r->surface.n_duplicate + r->surface.n_nonfinite > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite\n",
                (long long)r->surface.n_degenerate, (long long)r->surface.n_duplicate,
@@ -223,7 +236,9 @@ static int run(pal_flag_common *common, const char *in, wishes *wish)
     pal_err err = wish->procedural ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
                                    : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
     if (err) return pal_report_refusal(common, err, &note);
-    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
+    out.n_piece = 1;
+    if (out.report.prepare.voxel.n_component > 1) err = pal_tets_components(&loaded->mesh[0].tets, NULL, &out.n_piece);
+    if (!err) err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
     if (!err) err = save(loaded, wish, &out, &note);
@@ -253,6 +268,8 @@ int command_prepare(int argc, char **argv)
          "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
         {"--triangles", "N", PAL_FLAG_COUNT, &wish.scene.target_tri, 100, 10000000,
          "shown triangles of a scan's surface or of the procedural organ (50,000)"},
+        {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
+         "keep only the largest of several pieces that do not hang together"},
         {"--young-Pa", "E", PAL_FLAG_NUMBER, &m->young_Pa, 1e-6, 1e12, "stiffness of the tissue (5000)"},
         {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.5, "its Poisson ratio (0.45)"},
         {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},

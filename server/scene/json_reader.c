@@ -149,6 +149,15 @@ pal_err pal_json_count(const pal_json *json, const cJSON *object, const char *pa
     return PAL_ERR_OK;
 }
 
+pal_err pal_json_bool(const pal_json *json, const cJSON *object, const char *path, const char *key, bool *out)
+{
+    char at[PAL_JSON_PATH];
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    if (item && !cJSON_IsBool(item)) return pal_json_bad(json, pal_json_key(at, path, key), "is not true or false");
+    if (item) *out = cJSON_IsTrue(item);
+    return PAL_ERR_OK;
+}
+
 pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *path, const char *key, double out[3])
 {
     char at[PAL_JSON_PATH];

@@ -32,6 +32,7 @@ pal_err pal_json_number(const pal_json *json, const cJSON *object, const char *p
                         double high, double *out);
 pal_err pal_json_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int low, int high,
                        int *out);
+pal_err pal_json_bool(const pal_json *json, const cJSON *object, const char *path, const char *key, bool *out);
 pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *path, const char *key, double out[3]);
 /* a text without control characters of at most n_byte - 1 bytes; empty only when allowed */
 pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,

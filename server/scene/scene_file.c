@@ -115,8 +115,8 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
     pal_note why = {""};
     pal_err err;
     if (has_mesh) {
-        static const char *const only_surface[] = {"units", "resolution", "label", "triangles"};
-        for (int k = 0; k < 4; k++)
+        static const char *const only_surface[] = {"units", "resolution", "label", "triangles", "largest"};
+        for (int k = 0; k < 5; k++)
             if (cJSON_GetObjectItemCaseSensitive(body, only_surface[k]))
                 return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
         err = pal_prepared_load(file, out, &why);
@@ -125,6 +125,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
         PAL_TRY(pal_json_count(json, body, path, "resolution", 0, 1024, &options.resolution));
         PAL_TRY(pal_json_count(json, body, path, "label", -1, 1 << 30, &options.label));
         PAL_TRY(pal_json_count(json, body, path, "triangles", 0, 10000000, &options.target_tri));
+        PAL_TRY(pal_json_bool(json, body, path, "largest", &options.largest_only));
         PAL_TRY(pal_json_text(json, body, path, "units", false, units, sizeof units));
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0)
@@ -157,8 +158,9 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
 static pal_err read_body(const pal_json *json, const cJSON *object, int index, const char *folder,
                          pal_loaded_scene *scene)
 {
-    static const char *const known[] = {"name",     "mesh",  "surface", "units",  "resolution", "label",   "triangles",
-                                        "material", "model", "solver",  "output", "supports",   "effects", NULL};
+    static const char *const known[] = {"name",       "largest", "mesh",      "surface",  "units",
+                                        "resolution", "label",   "triangles", "material", "model",
+                                        "solver",     "output",  "supports",  "effects",  NULL};
     char path[PAL_JSON_PATH], name[PAL_NAME];
     pal_json_entry(path, "bodies", index);
     PAL_TRY(pal_json_object(json, object, path, known));

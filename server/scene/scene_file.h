@@ -7,7 +7,7 @@
  *   "bodies": [{
  *     "name": "liver", "mesh": "liver.palmesh"            (relative to the scene file; or "surface": "x.stl" with
  *                                                          "units": "mm", "resolution": 24, "label": 2,
- *                                                          "triangles": 50000, prepared at load)
+ *                                                          "triangles": 50000, "largest": true, prepared at load)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "model": {"name": "tet_springs", "k_distance_J": ...},
  *     "solver": {"name": "verlet"}, "output": {"name": "skin_out"},
@@ -42,6 +42,7 @@ typedef struct pal_surface_scene {
     int label;             /* of a label volume; < 0: the most frequent           */
     int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
     pal_material material; /* young_Pa 0: the default material                 */
+    bool largest_only;     /* keep only the largest of several pieces             */
     bool gravity; /* add the effect; a shape as scanned carries its own weight already, so the default is none */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;

@@ -95,12 +95,12 @@ static int clamp(int n, int low, int high)
 }
 
 /* the resolution whose kept voxels come nearest to 2,600 */
-static pal_err choose_resolution(const pal_surface *surface, int *out, pal_note *note)
+static pal_err choose_resolution(const pal_surface *surface, bool largest_only, int *out, pal_note *note)
 {
     int n = clamp(first_resolution(surface), 4, 400), best = 0;
     double best_miss = INFINITY;
     for (int round = 0; round < 4; round++) {
-        pal_voxel_options options = {.resolution = n, .border = true};
+        pal_voxel_options options = {.resolution = n, .border = true, .largest_only = largest_only};
         pal_voxels voxels;
         pal_voxel_report report;
         pal_err err = pal_voxels_fill(surface, &options, &voxels, &report, note);
@@ -186,9 +186,11 @@ static pal_err make(const char *name, const pal_surface *surface, const pal_surf
                     pal_surface_scene_report *report, pal_note *note)
 {
     pal_note why = {""};
-    pal_voxel_options voxel = {.resolution = options->resolution, .border = true};
+    pal_voxel_options voxel = {
+        .resolution = options->resolution, .border = true, .largest_only = options->largest_only};
     say(options, "fill", 0);
-    pal_err err = options->resolution ? PAL_ERR_OK : choose_resolution(surface, &voxel.resolution, &why);
+    pal_err err =
+        options->resolution ? PAL_ERR_OK : choose_resolution(surface, options->largest_only, &voxel.resolution, &why);
     say(options, "split and skin", 0);
     if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
     report->resolution = voxel.resolution;

@@ -112,6 +112,7 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"units\": \"mm\"}]}", "bodies[0].units: only goes with surface"},
         {"{\"bodies\": [{\"surface\": \"x.stl\", \"units\": \"mile\"}]}", "bodies[0].units: is not m, cm, mm"},
         {"{\"bodies\": [{\"surface\": \"x.stl\", \"resolution\": 2000}]}", "bodies[0].resolution: 2000 is outside"},
+        {"{\"bodies\": [{\"surface\": \"x.stl\", \"largest\": 1}]}", "bodies[0].largest: is not true or false"},
         {"{\"bodies\": [{\"surface\": \"x.stl\"}]}", "bodies[0].surface: "},
         {"{\"bodies\": [{\"surface\": \"scene.json\"}]}", "bodies[0].surface: "},
         {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"x\": 1}]}", "bodies[0].x: unknown key"},
