@@ -173,7 +173,8 @@ static void trainee_latency(pal_trainee *t, const pal_wire_tool *own, uint64_t n
 static void trainee_after_stall(pal_trainee *t, const pal_wire_tool *own, uint64_t now_ns)
 {
     if (!t->result.stall_done || !own || own->echo_seq == 0) return;
-    if ((double)(now_ns / 1000) - (double)own->echo_stamp_us > 1e5 && now_ns - t->stall_ns < 2000000000)
+    if ((double)(now_ns / 1000) - (double)own->echo_stamp_us > t->options.stall_s * 5e5 &&
+        now_ns - t->stall_ns < 2000000000)
         t->result.n_old_after_stall++;
 }
 

@@ -47,7 +47,7 @@ typedef struct pal_trainee_options {
 typedef struct pal_trainee_result {
     bool joined, stall_done;
     int tool;                          /* held at the end, PAL_WIRE_TOOL_NONE        */
-    uint32_t joins, n_old_after_stall; /* cycles older than 100 ms behind the newest after a stall */
+    uint32_t joins, n_old_after_stall; /* cycles after a stall whose pose is older than half of it */
     uint64_t n_frame, n_coarse, n_cycle, n_pose, bytes_in;
     uint64_t fault[PAL_FAULT_COUNT];
     char first_fault[256], closed[160];

@@ -94,6 +94,8 @@ check() {
 }
 
 finish() {
+    # a sanitizer that speaks on any stderr is a failure
+    check "no sanitizer has spoken" "$(cat "$work"/*.err 2>/dev/null | grep -c 'Sanitizer')" == 0
     echo "$passed passed, $failed failed"
     [ "$failed" -eq 0 ]
     exit
