@@ -65,7 +65,7 @@ static bool has_index(const char *folder)
     return (size_t)snprintf(path, sizeof path, "%s/index.html", folder) < sizeof path && access(path, R_OK) == 0;
 }
 
-/* the page's files: as configured, else installed beside the program, else the source tree's; NULL: none */
+/* the page's files: as configured, else beside the program (installed or in the build tree); NULL: none */
 static const char *viewer_folder(const pal_config *config, char *folder, size_t cap)
 {
     char own[PATH_MAX];
@@ -73,9 +73,6 @@ static const char *viewer_folder(const pal_config *config, char *folder, size_t 
     if (program_folder(own, sizeof own) && (size_t)snprintf(folder, cap, "%s/../share/palpate/viewer", own) < cap &&
         has_index(folder))
         return folder;
-#ifdef PAL_VIEWER_SOURCE
-    if (has_index(PAL_VIEWER_SOURCE)) return PAL_VIEWER_SOURCE;
-#endif
     return NULL;
 }
 

@@ -70,7 +70,8 @@ static pal_err open_context(pal_loop *loop, int most_socket, pal_note *note)
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.user = loop;
     info.fd_limit_per_thread = (unsigned)most_socket;
-    info.max_http_header_pool = 64;
+    /* one per socket, made on demand: with fewer, that many idle connections keep everybody else waiting */
+    info.max_http_header_pool = (unsigned short)(most_socket < 4096 ? most_socket : 4096);
     info.timeout_secs = 5;
     loop->context = lws_create_context(&info);
     if (!loop->context) return pal_note_set(note, PAL_ERR_IO, "the network context could not be made");

@@ -422,6 +422,7 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
     info.protocols = protocols;
     info.user = t;
     info.timeout_secs = 5;
+    info.timeout_secs_ah_idle = 5;
     info.keepalive_timeout = 7;
     info.retry_and_idle_policy = &alive;
     t->vhost = lws_create_vhost(pal_loop_context(loop), &info);

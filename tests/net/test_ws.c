@@ -20,6 +20,7 @@ static pthread_t net;
 static int port;
 static char folder[] = "/tmp/palpate_ws_XXXXXX";
 static char head[8192];
+enum { LARGE = 400001 };
 
 static void *net_main(void *user)
 {
@@ -201,6 +202,30 @@ static void one_connection_serves_many_requests(void)
     close(fd);
 }
 
+static void large_file_arrives_whole_at_a_slow_reader(void)
+{
+    char request[256];
+    static uint8_t piece[8192];
+    int fd = raw_connect(port), small = 16384;
+    size_t at = 0, wrong = 0;
+    setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
+    snprintf(request, sizeof request, "GET /large.bin HTTP/1.1\r\nHost: localhost:%d\r\n\r\n", port);
+    raw_say(fd, request);
+    CHECK_INT(raw_head(fd, head, sizeof head), 200);
+    while (at < LARGE) {
+        size_t n = raw_get(fd, piece, at + sizeof piece < LARGE ? sizeof piece : LARGE - at);
+        if (n == 0) break;
+        for (size_t i = 0; i < n; i++) wrong += piece[i] != (uint8_t)((at + i) * 2654435761u >> 13);
+        at += n;
+    }
+    CHECK_INT(at, LARGE);
+    CHECK_INT(wrong, 0);
+    /* and the connection goes on */
+    raw_say(fd, "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    CHECK_INT(raw_head(fd, head, sizeof head), 200);
+    close(fd);
+}
+
 static void pages_tell_health_sessions_and_figures(void)
 {
     static char body[32768];
@@ -335,7 +360,7 @@ static void flood_closes_the_flooder_alone(void)
     close(good);
 }
 
-enum { CROWD = 60 };
+enum { CROWD = 150 };
 static int crowd[CROWD];
 
 static void half_open_connections_keep_nobody_out(void)
@@ -392,12 +417,22 @@ static void put(const char *name, const char *text)
     if (f) fputs(text, f), fclose(f);
 }
 
+static void put_large(void)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/large.bin", folder);
+    FILE *f = fopen(path, "w");
+    for (size_t i = 0; f && i < LARGE; i++) fputc((int)((i * 2654435761u >> 13) & 0xFF), f);
+    if (f) fclose(f);
+}
+
 int main(void)
 {
     static const char *const file[][2] = {
         {"index.html", "<p>hello\n"}, {"code.mjs", "export {}"}, {"module.wasm", "x"}, {".secret.html", "no"}};
     if (!mkdtemp(folder) || !small_scene_make(&organ, "small")) return 1;
     for (size_t i = 0; i < 4; i++) put(file[i][0], file[i][1]);
+    put_large();
     begin();
     RUN(half_open_connections_keep_nobody_out);
     RUN(upgrade_needs_the_subprotocol_the_path_and_the_own_origin);
@@ -406,6 +441,7 @@ int main(void)
     RUN(other_upgrades_leave_the_server_well);
     RUN(files_have_type_tag_and_policy);
     RUN(one_connection_serves_many_requests);
+    RUN(large_file_arrives_whole_at_a_slow_reader);
     RUN(pages_tell_health_sessions_and_figures);
     RUN(a_client_sees_the_asset_and_frames_of_it);
     RUN(bad_messages_are_closed_with_a_code);
@@ -414,9 +450,9 @@ int main(void)
     RUN(half_open_connections_are_closed_by_the_server);
     RUN(goodbye_is_said_to_everybody);
     end();
-    for (size_t i = 0; i < 4; i++) {
+    for (size_t i = 0; i < 5; i++) {
         char path[300];
-        snprintf(path, sizeof path, "%s/%s", folder, file[i][0]);
+        snprintf(path, sizeof path, "%s/%s", folder, i < 4 ? file[i][0] : "large.bin");
         unlink(path);
     }
     rmdir(folder);
