@@ -37,6 +37,23 @@ PAL_INLINE pal_v8 pal_inverse_root8(pal_v8 q)
     return r * (1.5 - half * r * r);
 }
 
+/* sqrt(q) for q >= 0, to a few units of the last place */
+PAL_INLINE pal_v8 pal_root8(pal_v8 q)
+{
+    const pal_v8 floor = 1e-300 - (pal_v8){0};
+    return q * pal_inverse_root8(pal_pick8(q < floor, floor, q));
+}
+/* length of the cross product a x b */
+PAL_INLINE pal_v8 pal_cross_length8(const pal_v8 a[3], const pal_v8 b[3])
+{
+    pal_v8 x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    return pal_root8(x * x + y * y + z * z);
+}
+PAL_INLINE pal_v8 pal_length8(const pal_v8 a[3])
+{
+    return pal_root8(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+}
+
 /* coordinates of a loose block's corners, slots node [n_corner][8] */
 PAL_INLINE void pal_loose_load(const pal_slots *slots, const int32_t *node, int n_corner, double at[][3][PAL_LANES])
 {

@@ -7,9 +7,11 @@
 #include "server/sim/lanes.h"
 #include "server/sim/spring_law.h"
 
-/* C, its gradient at each corner and the row sums of its second derivative where that stiffens, for nodes at x */
+#include <string.h>
+
+/* C and its gradient at each corner, for nodes at x */
 typedef struct pal_shape {
-    double c, g[PAL_CORNERS][3], bend[PAL_CORNERS];
+    double c, g[PAL_CORNERS][3];
 } pal_shape;
 typedef void (*pal_shape_of)(const double *const x[PAL_CORNERS], double w, pal_shape *out);
 
@@ -17,6 +19,10 @@ typedef void (*pal_shape_of)(const double *const x[PAL_CORNERS], double w, pal_s
  * forces on corners 1, 2, 3, the first gets minus their sum; least may be lowered to anything the effect wants to know
  * the least of */
 typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least);
+
+/* Gershgorin row sums of 8 springs, one per corner: k q |g_a| sum |g_b|, and with `bend` what the second derivative of
+ * C adds where it stiffens */
+typedef void (*pal_bound_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[]);
 
 typedef struct pal_spring_row {
     pal_spring spring;
@@ -50,23 +56,6 @@ PAL_INLINE double pal_spring_energy(const pal_spring_row *row, const pal_body *b
         sum += 0.5 * row->q[lane] * row->spring.k_J * s.c * s.c;
     }
     return sum;
-}
-
-/* Gershgorin row sums: k |g_a| sum |g_b|, and with `bend` what the second derivative adds */
-PAL_INLINE void pal_spring_bound(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of, int n_corner,
-                                 double k, bool bend, double *bound)
-{
-    for (int i = 0; i < row->n_item; i++) {
-        const double *x[PAL_CORNERS];
-        pal_shape s;
-        int lane = row->strips.place[i];
-        pal_spring_corners(row, body->d, i, x);
-        shape_of(x, row->w[lane], &s);
-        double size[PAL_CORNERS], sum = 0, kq = k * row->q[lane];
-        for (int c = 0; c < n_corner; c++) sum += size[c] = pal_norm3(s.g[c]);
-        for (int c = 0; c < n_corner; c++)
-            bound[row->item[n_corner * i + c]] += kq * (size[c] * sum + (bend ? s.bend[c] : 0));
-    }
 }
 
 /* f -= c q (sum of g.v) g */
@@ -121,5 +110,31 @@ PAL_INLINE double pal_spring_run(const pal_spring_row *row, pal_slots *slots, pa
     }
     for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
     return least[0];
+}
+
+/* bound [n_node] += the row sums at positions x [n_node][3] */
+PAL_INLINE void pal_spring_bound(const pal_spring_row *row, pal_slots *slots, const double *at, pal_bound_kernel kernel,
+                                 int n_corner, double k, bool bend, double *bound)
+{
+    const int n_strip = row->strips.n_strip, n_slot = slots->n_slot;
+    const double *p[PAL_CORNERS][3];
+    pal_v8 b8[PAL_CORNERS];
+    pal_slots_load(slots, at);
+    for (int b = 0; b < n_strip + row->strips.n_loose; b++) {
+        bool loose = b >= n_strip;
+        const int32_t *base = row->strips.base + n_corner * b;
+        const int32_t *node = row->strips.node + n_corner * PAL_LANES * (b - n_strip);
+        double x[PAL_CORNERS][3][PAL_LANES];
+        if (loose) pal_loose_load(slots, node, n_corner, x);
+        for (int c = 0; c < n_corner; c++)
+            for (int d = 0; d < 3; d++) p[c][d] = loose ? x[c][d] : slots->x + d * n_slot + base[c];
+        kernel(p, pal_load8(row->w + PAL_LANES * b), k * pal_load8(row->q + PAL_LANES * b), bend, b8);
+        for (int c = 0; c < n_corner; c++) {
+            if (!loose) pal_add8(slots->f + base[c], b8[c]);
+            for (int l = 0; l < PAL_LANES && loose; l++) slots->f[node[c * PAL_LANES + l]] += b8[c][l];
+        }
+    }
+    for (int i = 0; i < slots->n_node; i++) bound[i] += slots->f[slots->slot[i]];
+    memset(slots->f, 0, sizeof(double) * (size_t)n_slot);
 }
 #endif

@@ -319,8 +319,41 @@ static void held_and_single_element_bodies_step(void)
     box_free(&one);
 }
 
+static void a_body_that_is_no_number_freezes_and_the_other_goes_on(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    b.scene->n_body = 2;
+    b.scene->body[1] = b.scene->body[0];
+    snprintf(b.scene->body[1].name, PAL_NAME, "other");
+    REQUIRE(bench_start(&b));
+    pal_body *other = pal_world_body(b.world, 1);
+    b.body->x[3 * 40] = NAN;
+    pal_world_moved(b.world, 0);
+    other->v[3 * 40] = 0.1;
+    CHECK(b.body->frozen);
+    for (int i = 0; i < 5; i++) CHECK_INT(pal_world_step(b.world, 1.0 / 60), 0);
+    CHECK(!other->frozen);
+    CHECK(pal_body_finite(other));
+    CHECK(other->x[3 * 40] != other->x_rest[3 * 40]);
+    pal_world_reset(b.world);
+    CHECK(!b.body->frozen);
+    CHECK_INT(pal_world_step(b.world, 1.0 / 60), 0);
+    CHECK(pal_body_finite(b.body));
+    /* diverging within a step is told by its code */
+    b.body->x[3 * 40 + 1] = INFINITY;
+    b.body->v[3 * 40] = NAN;
+    pal_err err = PAL_ERR_OK;
+    for (int i = 0; i < 60 && !err; i++) err = pal_world_step(b.world, 1.0 / 60);
+    CHECK_INT(err, PAL_ERR_FROZEN);
+    CHECK(b.body->frozen);
+    for (int i = 0; i < 3 * b.body->n_shown; i++) REQUIRE(isfinite(b.body->shown[i]));
+    bench_close(&b);
+}
+
 int main(void)
 {
+    RUN(a_body_that_is_no_number_freezes_and_the_other_goes_on);
     RUN(an_inverted_corner_turns_back);
     RUN(flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bounded);
     RUN(a_meganewton_on_a_vertex_is_shortened_and_forgotten);

@@ -21,11 +21,9 @@ static double measure(const double *const x[PAL_CORNERS])
     return pal_norm3(n);
 }
 
-/* the second derivative of A stiffens where C > 0: its row sums are C w (e_a sum e_b/|n| + 2) at most, e the edge
- * opposite a corner */
 static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
 {
-    double e[3][3], n[3], length[3], sum = 0;
+    double e[3][3], n[3];
     for (int c = 0; c < 3; c++) pal_sub3(e[c], x[(c + 2) % 3], x[(c + 1) % 3]);
     pal_cross3(n, e[2], e[0]);
     double size = pal_norm3(n), scale = size * w > 1e-12 ? w / size : 0;
@@ -33,9 +31,7 @@ static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
     for (int c = 0; c < 3; c++) {
         pal_cross3(s->g[c], n, e[c]);
         pal_scale3(s->g[c], scale, s->g[c]);
-        sum += length[c] = pal_norm3(e[c]);
     }
-    for (int c = 0; c < 3; c++) s->bend[c] = s->c > 0 ? s->c * (length[c] * sum * scale + 2 * w) : 0;
 }
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -68,6 +64,25 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
     f[1][0] = ny * az - nz * ay, f[1][1] = nz * ax - nx * az, f[1][2] = nx * ay - ny * ax;
 }
 
+/* |g_a| = e_a w with e_a the edge opposite the corner, w = 1/(2 A0). The second derivative of A stiffens where C > 0:
+ * row sums C w (e_a sum e_b/|n| + 2) at most */
+PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[])
+{
+    pal_v8 e[3][3], length[3], along = kq * w * w, flat = w - w;
+    for (int c = 0; c < 3; c++) {
+        for (int d = 0; d < 3; d++) e[c][d] = pal_load8(p[(c + 2) % 3][d]) - pal_load8(p[(c + 1) % 3][d]);
+        length[c] = pal_length8(e[c]);
+    }
+    if (bend) {
+        pal_v8 size = pal_cross_length8(e[0], e[1]), c = size * w - 1;
+        pal_v8 cw = kq * w * pal_pick8(c > 0, c, flat);
+        along += cw / pal_pick8(c > 0, size, flat + 1);
+        flat = 2 * cw;
+    }
+    pal_v8 sum = length[0] + length[1] + length[2];
+    for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     const pal_spring_row *row = self;
@@ -87,13 +102,14 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const pal_spring_row *row = self;
-    pal_spring_bound(row, body, shape_of, 3, row->spring.k_J, true, bound_N_m);
+    pal_spring_bound(row, body->slots, body->d, bound_kernel, 3, row->spring.k_J, true, bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const pal_spring_row *row = self;
-    if (row->spring.c_Js > 0) pal_spring_bound(row, body, shape_of, 3, row->spring.c_Js, false, bound_Ns_m);
+    if (row->spring.c_Js > 0)
+        pal_spring_bound(row, body->slots, body->d, bound_kernel, 3, row->spring.c_Js, false, bound_Ns_m);
 }
 
 const pal_effect pal_effect_face_area = {.name = "face_area",

@@ -19,26 +19,15 @@ static double measure(const double *const x[PAL_CORNERS])
     return pal_dot3(e[0], n);
 }
 
-/* the second derivative of V: row sums |C w| (perimeter of the face opposite the corner) */
 static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
 {
-    double e[3][3], length[3], other[3], sum;
+    double e[3][3];
     for (int c = 0; c < 3; c++) pal_sub3(e[c], x[c + 1], x[0]);
-    for (int c = 0; c < 3; c++) {
-        pal_cross3(s->g[c + 1], e[(c + 1) % 3], e[(c + 2) % 3]);
-        length[c] = pal_norm3(e[c]);
-        other[c] = pal_dist3(x[(c + 1) % 3 + 1], x[(c + 2) % 3 + 1]);
-    }
+    for (int c = 0; c < 3; c++) pal_cross3(s->g[c + 1], e[(c + 1) % 3], e[(c + 2) % 3]);
     s->c = pal_dot3(e[0], s->g[1]) * w - 1;
     for (int d = 0; d < 3; d++) {
         for (int c = 1; c < 4; c++) s->g[c][d] *= w;
         s->g[0][d] = -(s->g[1][d] + s->g[2][d] + s->g[3][d]);
-    }
-    double bend = fabs(s->c * w);
-    s->bend[0] = bend * (other[0] + other[1] + other[2]);
-    for (int c = 0; c < 3; c++) {
-        sum = other[c] + length[(c + 1) % 3] + length[(c + 2) % 3];
-        s->bend[c + 1] = bend * sum;
     }
 }
 
@@ -74,6 +63,32 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
     f[2][0] = t * (ay * bz - az * by), f[2][1] = t * (az * bx - ax * bz), f[2][2] = t * (ax * by - ay * bx);
 }
 
+/* |g_a| = 2 |w| (area opposite); the second derivative of V has row sums |C w| (perimeter of the face opposite) */
+PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[])
+{
+    pal_v8 e[3][3], f[2][3], zero = w - w, size[4], length[6];
+    for (int c = 0; c < 3; c++)
+        for (int d = 0; d < 3; d++) e[c][d] = pal_load8(p[c + 1][d]) - pal_load8(p[0][d]);
+    for (int c = 0; c < 2; c++)
+        for (int d = 0; d < 3; d++) f[c][d] = e[c + 1][d] - e[0][d];
+    size[0] = pal_cross_length8(f[0], f[1]);
+    for (int c = 0; c < 3; c++) size[c + 1] = pal_cross_length8(e[(c + 1) % 3], e[(c + 2) % 3]);
+    pal_v8 sum = kq * w * w * (size[0] + size[1] + size[2] + size[3]);
+    for (int c = 0; c < 4; c++) bound[c] = sum * size[c];
+    if (!bend) return;
+    pal_v8 g[3] = {e[1][1] * e[2][2] - e[1][2] * e[2][1], e[1][2] * e[2][0] - e[1][0] * e[2][2],
+                   e[1][0] * e[2][1] - e[1][1] * e[2][0]};
+    pal_v8 c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, turn[3];
+    c = kq * pal_pick8(c < 0, zero - c, c);
+    /* edges 01 02 03 12 13 23 */
+    for (int k = 0; k < 3; k++) length[k] = pal_length8(e[k]), turn[k] = e[2][k] - e[1][k];
+    length[3] = pal_length8(f[0]), length[4] = pal_length8(f[1]), length[5] = pal_length8(turn);
+    bound[0] += c * (length[3] + length[4] + length[5]);
+    bound[1] += c * (length[1] + length[2] + length[5]);
+    bound[2] += c * (length[0] + length[2] + length[4]);
+    bound[3] += c * (length[0] + length[1] + length[3]);
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     const pal_spring_row *row = self;
@@ -93,13 +108,14 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const pal_spring_row *row = self;
-    pal_spring_bound(row, body, shape_of, 4, row->spring.k_J, true, bound_N_m);
+    pal_spring_bound(row, body->slots, body->d, bound_kernel, 4, row->spring.k_J, true, bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const pal_spring_row *row = self;
-    if (row->spring.c_Js > 0) pal_spring_bound(row, body, shape_of, 4, row->spring.c_Js, false, bound_Ns_m);
+    if (row->spring.c_Js > 0)
+        pal_spring_bound(row, body->slots, body->d, bound_kernel, 4, row->spring.c_Js, false, bound_Ns_m);
 }
 
 const pal_effect pal_effect_tet_volume = {.name = "tet_volume",

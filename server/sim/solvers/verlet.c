@@ -103,7 +103,7 @@ static pal_err run(void *self, pal_step *step)
 {
     verlet *row = self;
     pal_body *body = step->body;
-    double dt = step->dt_s, keep = 1 / (1 + dt * drag_rate(step)), most2 = 0;
+    double dt = step->dt_s, keep = 1 / (1 + dt * drag_rate(step)), most2 = 0, poison = 0;
     double root = dt / (2 * row->safety);
     step->drag_apart = true;
     PAL_TRY(pal_gather(step));
@@ -117,10 +117,12 @@ static pal_err run(void *self, pal_step *step)
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
         most2 = v2 > most2 ? v2 : most2;
+        poison += 0 * v2;
     }
     double way = sqrt(most2) * dt, most = most_move_S * body->size_m;
     if (way > most) clamp_moves(body, dt, most);
-    row->way_m += way < most ? way : most;
+    /* a velocity that is no number makes the way one too, and so the next limit */
+    row->way_m += (way < most ? way : most) + poison;
 
     /* positions */
     for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += dt * body->v[i];
