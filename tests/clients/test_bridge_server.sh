@@ -6,7 +6,7 @@ bin=$1
 make_scene
 start_server --port 0
 
-timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:premium --seconds 6 --json >"$work/hold" 2>/dev/null
+timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:premium --seconds 4.5 --json >"$work/hold" 2>/dev/null
 check "a bridge that presses and holds ends well" $? == 0
 check "it holds a tool" "$(json tool "$work/hold")" '>=' 0
 check "models come" "$(json models "$work/hold")" '>' 20
@@ -17,9 +17,9 @@ check "poses go out" "$(json poses "$work/hold")" '>' 200
 echo "     largest step of force at a model: $(json jump_max_N "$work/hold") N"
 
 # emergency stop by signal while it presses
-timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:touch --seconds 7 --json >"$work/stop" 2>/dev/null &
+timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:touch --seconds 5 --json >"$work/stop" 2>/dev/null &
 job=$!
-sleep 5
+sleep 4
 bridge=$(ps -o pid= --ppid "$job" | head -1)
 kill -USR1 $bridge
 wait $job
@@ -27,9 +27,9 @@ check "an emergency stop is latched" "$([ "$(json state "$work/stop")" = estop ]
 check "it had pressed before" "$(json force_max_N "$work/stop")" '>' 0.05
 
 # the server goes while it presses: models stale, force gone
-timeout 60 "$bin/palpate-bridge" --server "$url" --seconds 7 --json >"$work/gone" 2>/dev/null &
+timeout 60 "$bin/palpate-bridge" --server "$url" --seconds 6 --json >"$work/gone" 2>/dev/null &
 job=$!
-sleep 5
+sleep 4
 kill "$server_job"
 wait "$server_job" 2>/dev/null
 wait $job

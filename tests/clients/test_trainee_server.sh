@@ -13,30 +13,30 @@ run() { # NAME flags: report in $work/NAME, exit code in $code
     [ $code -eq 0 ] || cat "$work/$name.err"
 }
 
-run press --script press --seconds 4
+run press --script press --seconds 2.5
 check "a press passes every check of every frame" $code == 0
 check "its poses come back in frames" "$(tr ',{}' '\n\n\n' <"$work/press" | sed -n '/latency_ms/,/mean/s/"n"://p' | head -1)" '>' 20
 check "the organ gives way by more than 2 mm" "$(json moved_mm "$work/press")" '>' 2
 check "the tool feels it" "$(json force_max_N "$work/press")" '>' 0.05
 
-run pull --script pull --seconds 4
+run pull --script pull --seconds 3
 check "a pull passes every check" $code == 0
 check "it moves the organ by more than 5 mm" "$(json moved_mm "$work/pull")" '>' 5
 
 printf '# t x y z buttons\n0 0 0 0.02 0\n1 0 0 0.004 0\n2 0 0 0.02 0\n' >"$work/script"
-run file --script "$work/script" --seconds 3
+run file --script "$work/script" --seconds 2
 check "a script from a file runs" $code == 0
 check "and touches" "$(json force_max_N "$work/file")" '>' 0.01
 
-run crowd --clients 8 --script circle --seconds 3
+run crowd --clients 8 --script circle --seconds 2
 check "eight at once pass every check" $code == 0
 check "all of them have joined" "$(json joined "$work/crowd")" == 8
 check "each tool has one holder" "$(json with_tool "$work/crowd")" == 3
 
 # a slow reader beside a fast one: the fast one is served as if alone
-timeout 60 "$bin/palpate-trainee" "$url" --json --script idle --slow 3000 --seconds 6 --name slow >"$work/slow" 2>/dev/null &
+timeout 60 "$bin/palpate-trainee" "$url" --json --script idle --slow 3000 --seconds 4 --name slow >"$work/slow" 2>/dev/null &
 slow=$!
-run fast --script press --seconds 4
+run fast --script press --seconds 3
 wait $slow
 check "a slow reader passes every check" $? == 0
 check "and takes fewer cycles" "$(json cycles_per_s "$work/slow")" '<' "$(json cycles_per_s "$work/fast")"
@@ -48,7 +48,7 @@ check "a reader that stalls for 2 s passes every check" $code == 0
 check "and is current again within the credit" "$(json old_cycles_after_stall "$work/stall")" '<=' 13
 
 # the server goes away and comes back on the same port
-timeout 60 "$bin/palpate-trainee" "$url" --json --seconds 9 >"$work/again" 2>/dev/null &
+timeout 60 "$bin/palpate-trainee" "$url" --json --seconds 6 >"$work/again" 2>/dev/null &
 again=$!
 sleep 2
 kill "$server_job"
