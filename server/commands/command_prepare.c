@@ -10,6 +10,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -127,11 +128,19 @@ static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome 
     int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", wish->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage)
         return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
+    /* an interrupt waits until the files are there or gone */
+    sigset_t asked, old;
+    sigemptyset(&asked);
+    sigaddset(&asked, SIGINT);
+    sigaddset(&asked, SIGTERM);
+    sigaddset(&asked, SIGHUP);
+    sigprocmask(SIG_BLOCK, &asked, &old);
     pal_err err = pal_scene_make_folder(wish->folder, note);
     if (!err) err = write_files(loaded, stage, tetgen, note);
     if (!err) err = move_up(stage, wish->folder, out, note);
     remove_folder(stage);
     if (err && !was_there) rmdir(wish->folder);
+    sigprocmask(SIG_SETMASK, &old, NULL);
     return err;
 }
 

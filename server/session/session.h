@@ -2,10 +2,12 @@
  *
  * Pacing: steps are due at absolute times, one per scene step_s. A step that is too slow makes simulated time slow
  * down: the next step is due at once, missed steps are dropped, never queued; the frame says by how much (slowdown) and
- * how often (n_late). Input never queues up: a tool's newest pose wins.
+ * how often (n_late: a step that begins a tenth of a step or more after its time). Input never queues up: a tool's
+ * newest pose wins, and at most 64 commands are taken before a step.
+ * While paused a frame is published when a command or pose came in; tools are then shown where they are held.
  * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
- * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback. No heap call after
- * open until close. */
+ * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback; a lock guards only
+ * the sentence of pal_session_last_note. No heap or file call after open until close. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/sim/effect.h"
@@ -16,7 +18,7 @@ typedef struct pal_session pal_session;
 typedef enum pal_command_kind {
     PAL_COMMAND_PAUSE,
     PAL_COMMAND_RESUME,
-    PAL_COMMAND_STEP, /* one step while paused */
+    PAL_COMMAND_STEP, /* one step while paused, nothing else */
     PAL_COMMAND_RESET,
     PAL_COMMAND_MATERIAL, /* body, material        */
     PAL_COMMAND_COUNT

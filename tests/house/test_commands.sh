@@ -163,6 +163,28 @@ run dance
 refused 2 'no command "dance"'
 end
 
+begin "what serve records replays to the same hashes, and not against another scene"
+"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+server=$!
+tries=0
+while ! grep -qs "http://" serve.out serve.err && [ "$tries" -lt 100 ]; do
+    tries=$((tries + 1))
+    sleep 0.1
+done
+check "serve did not start" [ "$tries" -lt 100 ]
+sleep 1
+kill -TERM "$server"
+wait "$server"
+code=$?
+check "serve: exit code $code" code_is 0
+run replay rec.bin scene --json
+check "replay: exit code $code" code_is 0
+check "not one JSON object" is_json out
+check "a hash differs" has out '"first_difference":null'
+run replay rec.bin organ
+refused 1 "recorded from another scene"
+end
+
 # ---- wrong usage ----
 begin "wrong flags are refused by name with exit code 2"
 run prepare box.obj -o x --resolutoin 3
