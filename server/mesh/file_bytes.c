@@ -1,4 +1,4 @@
-/* Whole files in and out. */
+/* Whole files in and out; names and places in messages. */
 #include "server/mesh/file_bytes.h"
 
 #include "server/mesh/mesh_file.h"
@@ -81,4 +81,21 @@ pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_n
     PAL_TRY(pal_file_begin(&out, path, note));
     if (n_byte) fwrite(bytes, 1, n_byte, out.file);
     return pal_file_end(&out, PAL_ERR_OK, note);
+}
+
+void pal_file_show_name(char out[128], const char *name)
+{
+    size_t n = strlen(name), from = n > 120 ? n - 117 : 0;
+    snprintf(out, 128, "%s%s", from ? "..." : "", name + from);
+    for (char *c = out; *c; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7F) *c = '?';
+}
+
+pal_err pal_file_refuse(pal_note *note, const char *name, const char *unit, int64_t at, const char *format,
+                        va_list list)
+{
+    if (!note) return PAL_ERR_REFUSED;
+    char sentence[320];
+    vsnprintf(sentence, sizeof sentence, format, list);
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
 }

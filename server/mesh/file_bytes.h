@@ -1,9 +1,12 @@
-/* Files that appear whole or not at all: written under a temporary name beside the path, then renamed. Only for the
- * writers of this room; pal_file_read and pal_file_write are declared in mesh_file.h. Thread: [load]. */
+/* Files that appear whole or not at all: written under a temporary name beside the path, then renamed; and how readers
+ * name a file and a place in it. Only for the readers and writers of this room; pal_file_read and pal_file_write are
+ * declared in mesh_file.h. Thread: [load]. */
 #ifndef PAL_MESH_FILE_BYTES_H
 #define PAL_MESH_FILE_BYTES_H
 #include "server/base/err.h"
 
+#include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 
 typedef struct pal_file_out {
@@ -14,4 +17,10 @@ typedef struct pal_file_out {
 pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note);
 /* closes; with err == 0 and every write good the file takes its name, else the temporary one is removed. IO or err */
 pal_err pal_file_end(pal_file_out *out, pal_err err, pal_note *note);
+
+/* the name as messages show it: printable, one line, its end when it is long */
+void pal_file_show_name(char out[128], const char *name);
+/* REFUSED with "NAME: UNIT AT: sentence"; unit is "line" or "byte", note may be NULL */
+pal_err pal_file_refuse(pal_note *note, const char *name, const char *unit, int64_t at, const char *format,
+                        va_list list) __attribute__((format(printf, 5, 0)));
 #endif

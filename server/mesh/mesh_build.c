@@ -1,8 +1,9 @@
 /* Growing arrays, polygon fans and located refusals of the surface readers. */
 #include "server/mesh/mesh_build.h"
 
+#include "server/mesh/file_bytes.h"
+
 #include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,14 +12,11 @@ static const size_t most_piece = 700000000;
 
 pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
 {
-    if (!build->note) return PAL_ERR_REFUSED;
-    char sentence[320];
     va_list list;
     va_start(list, format);
-    vsnprintf(sentence, sizeof sentence, format, list);
+    pal_err err = pal_file_refuse(build->note, build->name, build->binary ? "byte" : "line", at, format, list);
     va_end(list);
-    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: %s %lld: %s", build->name, build->binary ? "byte" : "line",
-                        (long long)at, sentence);
+    return err;
 }
 
 /* array with room for n + more pieces of size bytes, at least half as many again when it moves */

@@ -2,6 +2,7 @@
 #include "server/mesh/mesh_file.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/file_bytes.h"
 #include "server/mesh/mesh_build.h"
 
 #include <stdio.h>
@@ -30,15 +31,6 @@ static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
     if (ends_with(name, ".stl")) return pal_stl_parse;
     if (ends_with(name, ".off")) return pal_off_parse;
     return pal_obj_is(bytes, n_byte) ? pal_obj_parse : NULL;
-}
-
-/* the name as shown in messages: one line, its end when it is long */
-static void show_name(char out[128], const char *name)
-{
-    size_t n = strlen(name), from = n > 120 ? n - 117 : 0;
-    snprintf(out, 128, "%s%s", from ? "..." : "", name + from);
-    for (char *c = out; *c; c++)
-        if ((unsigned char)*c < 0x20 || *c == 0x7F) *c = '?';
 }
 
 static pal_err parse(pal_mesh_build *build)
@@ -86,7 +78,7 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
 {
     static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
     char shown[128];
-    show_name(shown, name);
+    pal_file_show_name(shown, name);
     pal_mesh_build build = {
         .name = shown, .bytes = bytes, .n_byte = n_byte, .note = note, .binary = true, .most_index = -1};
     pal_err err = parse(&build);

@@ -3,6 +3,7 @@
  *
  * A claimed count is never trusted: room is made for what the bytes that are left can hold. */
 #include "server/mesh/mesh_build.h"
+#include "server/mesh/scalar_bytes.h"
 #include "server/mesh/text_scan.h"
 
 #include <math.h>
@@ -11,14 +12,11 @@
 
 enum { MOST_ELEMENT = 32, MOST_PROPERTY = 128 };
 
-typedef enum kind { I8, U8, I16, U16, I32, U32, F32, F64, N_KIND } kind;
-static const int kind_size[N_KIND] = {1, 1, 2, 2, 4, 4, 4, 8};
-
 /* what a property means to us */
 typedef enum role { OTHER, X, Y, Z, INDICES } role;
 
 typedef struct property {
-    kind type, count_type;
+    pal_scalar type, count_type;
     bool list;
     role use;
 } property;
@@ -40,17 +38,20 @@ typedef struct ply {
     const uint8_t *at; /* binary body                                   */
 } ply;
 
-static bool take_kind(pal_text_scan *scan, kind *out)
+static bool take_type(pal_text_scan *scan, pal_scalar *out)
 {
-    static const char *const word[2][N_KIND] = {
-        {"char", "uchar", "short", "ushort", "int", "uint", "float", "double"},
-        {"int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"}};
-    for (int k = 0; k < N_KIND; k++)
-        for (int i = 0; i < 2; i++)
-            if (pal_text_is(scan, word[i][k])) {
-                *out = (kind)k;
-                return true;
-            }
+    static const struct {
+        const char *word[2];
+        pal_scalar type;
+    } known[] = {{{"char", "int8"}, PAL_SCALAR_I8},      {{"uchar", "uint8"}, PAL_SCALAR_U8},
+                 {{"short", "int16"}, PAL_SCALAR_I16},   {{"ushort", "uint16"}, PAL_SCALAR_U16},
+                 {{"int", "int32"}, PAL_SCALAR_I32},     {{"uint", "uint32"}, PAL_SCALAR_U32},
+                 {{"float", "float32"}, PAL_SCALAR_F32}, {{"double", "float64"}, PAL_SCALAR_F64}};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++)
+        if (pal_text_is(scan, known[k].word[0]) || pal_text_is(scan, known[k].word[1])) {
+            *out = known[k].type;
+            return true;
+        }
     return false;
 }
 
@@ -98,9 +99,9 @@ static pal_err read_property(ply *p)
     element *e = &p->elements[p->n_element - 1];
     property *q = &p->properties[p->n_property++];
     *q = (property){.list = pal_text_is(&p->scan, "list"), .use = OTHER};
-    if (q->list && (!take_kind(&p->scan, &q->count_type) || q->count_type >= F32))
+    if (q->list && (!take_type(&p->scan, &q->count_type) || q->count_type >= PAL_SCALAR_F32))
         return refuse_header(p, "a list needs a whole-number type for its length");
-    if (!take_kind(&p->scan, &q->type)) return refuse_header(p, "a property needs a known type");
+    if (!take_type(&p->scan, &q->type)) return refuse_header(p, "a property needs a known type");
     bool face = e->what == FACE || e->what == STRIP;
     if (e->what == VERTEX && !q->list && pal_text_is(&p->scan, "x"))
         q->use = X;
@@ -110,7 +111,7 @@ static pal_err read_property(ply *p)
         q->use = Z;
     else if (face && q->list && (pal_text_is(&p->scan, "vertex_indices") || pal_text_is(&p->scan, "vertex_index")))
         q->use = INDICES;
-    e->least += kind_size[q->list ? q->count_type : q->type];
+    e->least += pal_scalar_size(q->list ? q->count_type : q->type);
     e->n++;
     return PAL_ERR_OK;
 }
@@ -153,39 +154,8 @@ static int64_t place(const ply *p)
     return p->ascii ? p->scan.line : p->at - p->build->bytes;
 }
 
-/* the scalar at bytes in the host's order */
-static double scalar(const uint8_t *bytes, kind type, bool big)
-{
-    uint64_t word = 0;
-    int n = kind_size[type];
-    for (int k = 0; k < n; k++) word |= (uint64_t)bytes[big ? n - 1 - k : k] << 8 * k;
-    uint32_t half = (uint32_t)word;
-    float f;
-    double d;
-    memcpy(&f, &half, sizeof f);
-    memcpy(&d, &word, sizeof d);
-    switch (type) {
-    case I8:
-        return (int8_t)word;
-    case U8:
-        return (uint8_t)word;
-    case I16:
-        return (int16_t)word;
-    case U16:
-        return (uint16_t)word;
-    case I32:
-        return (int32_t)word;
-    case U32:
-        return (uint32_t)word;
-    case F32:
-        return (double)f;
-    default:
-        return d;
-    }
-}
-
 /* takes one value of either body */
-static pal_err take_value(ply *p, kind type, double *out)
+static pal_err take_value(ply *p, pal_scalar type, double *out)
 {
     if (p->ascii) {
         if (pal_text_seek(&p->scan) && pal_text_double(&p->scan, out)) return PAL_ERR_OK;
@@ -193,9 +163,10 @@ static pal_err take_value(ply *p, kind type, double *out)
         return pal_mesh_refuse(p->build, p->scan.line, "expected a number, found %s", pal_text_show(&p->scan).text);
     }
     const uint8_t *end = p->build->bytes + p->build->n_byte;
-    if (end - p->at < kind_size[type]) return pal_mesh_refuse(p->build, place(p), "the file ends inside the body");
-    *out = scalar(p->at, type, p->big);
-    p->at += kind_size[type];
+    if (end - p->at < pal_scalar_size(type))
+        return pal_mesh_refuse(p->build, place(p), "the file ends inside the body");
+    *out = pal_scalar_at(p->at, type, p->big);
+    p->at += pal_scalar_size(type);
     return PAL_ERR_OK;
 }
 
@@ -228,7 +199,7 @@ static pal_err read_indices(ply *p, const element *e, const property *q, int64_t
     for (int64_t k = 0; k < n; k++) {
         double value;
         PAL_TRY(take_value(p, q->type, &value));
-        int64_t at = p->ascii ? p->scan.line : place(p) - kind_size[q->type];
+        int64_t at = p->ascii ? p->scan.line : place(p) - pal_scalar_size(q->type);
         if (!(fabs(value) < 4294967296.0) || value != floor(value))
             return pal_mesh_refuse(p->build, at, "vertex index %g is no whole number in range", value);
         if (e->what == STRIP)
@@ -248,12 +219,12 @@ static pal_err read_list(ply *p, const element *e, const property *q)
         return pal_mesh_refuse(p->build, at, "a list of %g entries", count);
     int64_t n = (int64_t)count,
             left = (p->ascii ? p->scan.end : p->build->bytes + p->build->n_byte) - (p->ascii ? p->scan.at : p->at);
-    if (n > left / (p->ascii ? 2 : kind_size[q->type]))
+    if (n > left / (p->ascii ? 2 : pal_scalar_size(q->type)))
         return pal_mesh_refuse(p->build, at, "a list of %lld entries, but only %lld bytes follow", (long long)n,
                                (long long)left);
     if (q->use == INDICES) return read_indices(p, e, q, n);
     if (!p->ascii) {
-        p->at += n * kind_size[q->type];
+        p->at += n * pal_scalar_size(q->type);
         return PAL_ERR_OK;
     }
     for (double unused; n > 0; n--) PAL_TRY(take_value(p, q->type, &unused));

@@ -363,19 +363,19 @@ static void hostile_inrimage_is_refused_with_its_line(void)
 {
     static const struct {
         const char *from, *to, *wanted;
-    } change[] = {{"XDIM=44", "XDIM=-4", "XDIM is -4"},
-                  {"XDIM=44", "XDIM=0 ", "XDIM is 0"},
+    } change[] = {{"XDIM=44", "XDIM=-4", "line 2: XDIM is -4"},
+                  {"XDIM=44", "XDIM=0 ", "line 2: XDIM is 0"},
                   {"XDIM=44", "XDIM=xx", "line 2: the value of XDIM is 'xx'"},
-                  {"XDIM=44", "ADIM=44", "XDIM is 0"},
+                  {"XDIM=44", "ADIM=44", "line 1: XDIM is 0"},
                   {"YDIM=40", "YDIM=99", "the file ends"},
                   {"YDIM=40", "YDIM   ", "line 3: expected KEY=value"},
-                  {"ZDIM=24\nVDIM=1", "ZDIM=24\nVDIM=3", "VDIM is 3"},
+                  {"ZDIM=24\nVDIM=1", "ZDIM=24\nVDIM=3", "line 5: VDIM is 3"},
                   {"ZDIM=24\nVDIM=1", "ZDIM=1e7\nVDIM=", "line 5: the value of VDIM is nothing"},
                   {"TYPE=unsigned fixed", "TYPE=unsigned magic", "the value of TYPE is 'magic'"},
-                  {"PIXSIZE=8", "PIXSIZE=9", "do not name a voxel type"},
+                  {"PIXSIZE=8", "PIXSIZE=9", "line 7: TYPE and PIXSIZE do not name a voxel type"},
                   {"CPU=decm", "CPU=z80a", "line 9: the value of CPU is 'z80a'"},
-                  {"VY=1.25", "VY=0.00", "a voxel of 1 x 0 x 2 mm"},
-                  {"VY=1.25", "VY=nan ", "a voxel of 1 x nan x 2 mm"},
+                  {"VY=1.25", "VY=0.00", "line 11: a voxel of 1 x 0 x 2 mm"},
+                  {"VY=1.25", "VY=nan ", "line 11: a voxel of 1 x nan x 2 mm"},
                   {"##}", "###", "no end of the header"}};
     bytes b = make_inr("unsigned fixed", 2, false);
     n_hostile = 0;
@@ -413,6 +413,19 @@ static void a_gzip_bomb_costs_no_more_than_its_header_asks_for(void)
     check_refused(packed.at, packed.n, "byte 41943040: the unpacked file ends, but 800 x 800 x 800 voxels");
     free(packed.at);
     free(large.at);
+    free(b.at);
+}
+
+static void damage_is_found_wherever_it_is_in_a_packed_file(void)
+{
+    /* larger than the piece that the header is read from; the checksum is the last thing in the file */
+    bytes b = make_nifti(64, false, 0, 0), packed = pack(&b);
+    CHECK(b.n > 300000);
+    packed.at[packed.n - 6] ^= 1;
+    check_refused(packed.at, packed.n, "the compressed data are damaged");
+    packed.at[packed.n - 6] ^= 1;
+    check_ball(&packed, "nifti");
+    free(packed.at);
     free(b.at);
 }
 
@@ -484,6 +497,7 @@ int main(void)
     RUN(hostile_nifti_is_refused_with_its_byte);
     RUN(hostile_inrimage_is_refused_with_its_line);
     RUN(a_gzip_bomb_costs_no_more_than_its_header_asks_for);
+    RUN(damage_is_found_wherever_it_is_in_a_packed_file);
     RUN(plates_rods_and_specks_keep_their_volume);
     RUN(voxels_like_needles_are_refused_before_they_cost_memory);
     RUN(files_are_told_apart_by_name_or_content);
