@@ -337,7 +337,9 @@ static pal_err run_stage(pal_world *w, pal_stage stage, double dt_s)
         step.n_sub = 1;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
             pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];
+            /* a frozen body is shown where it stopped, as long as that is somewhere; its guard may put it back */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
+            if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
             uint64_t before = pal_clock_ns();
             PAL_TRY(row->effect->run(row->self, &step));
             row->spent_ns += pal_clock_ns() - before;
