@@ -5,9 +5,11 @@
  * gives a first h, the fill then counts (it takes milliseconds at this size), and the resolution is corrected by the
  * cube root of what is missing, at most three times. */
 #include "server/scene/scene_make.h"
+#include "server/base/vec3.h"
 
 #include "server/base/clock.h"
 #include "server/base/utf8.h"
+#include "server/base/vec3.h"
 #include "server/mesh/label_volume.h"
 #include "server/mesh/mesh_file.h"
 #include "server/mesh/organ.h"
@@ -237,6 +239,9 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;
     scene->n_body = 1;
     pal_tools_default(scene, 3);
+    double low[3], high[3];
+    pal_surface_box(&loaded->mesh[0].surface, low, high);
+    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
     return pal_scene_check(scene, note);
 }
 

@@ -9,6 +9,7 @@ import { ToolMarks } from "./tool_marks.js";
 /** @param {string} id @returns {any} */
 const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const POSE_MS = 16; // poses while a tool moves
+const GRAB_MS = 1500; // longest wait for the server to take hold
 const HOLD_MS = 50; // and while it rests: a silent tool is let go by the server
 
 const stage = new Stage(byId("view"));
@@ -26,6 +27,7 @@ const state = {
   me: 0,
   myTool: -1,
   /** @type {import("./tool_input.js").ToolWish} */ wish: null,
+  /** @type {{position: number[], since: number} | null} where the present grab began */ anchor: null,
   away: true,
   poseAt: 0,
   drawn: 0,
@@ -50,6 +52,21 @@ const input = new ToolInput(
 );
 input.touchedOnce = () => byId("hint").classList.add("gone");
 
+/**
+ * Where to send the tool: to the wish, but a grab stays where it began until the server holds the tissue there. The
+ * newest pose wins on its way, so a quick hand would otherwise close beside the organ.
+ * @param {{position: number[], grab: boolean}} wish @param {number} t ms
+ */
+function destination(wish, t) {
+  if (!wish.grab) state.anchor = null;
+  else if (!state.anchor) state.anchor = { position: wish.position, since: t };
+  if (!state.anchor) return wish.position;
+  const mine = state.tools[state.myTool];
+  const waits = t - state.anchor.since < GRAB_MS && !(mine?.held && mine.grabs);
+  if (!waits) state.anchor.since = -Infinity;
+  return waits ? state.anchor.position : wish.position;
+}
+
 /** @param {boolean} now do not wait for the next turn */
 function sendPose(now) {
   if (state.myTool < 0) return;
@@ -57,12 +74,13 @@ function sendPose(now) {
   if (state.wish) {
     if (!now && t - state.poseAt < HOLD_MS) return;
     if (now && t - state.poseAt < POSE_MS / 2 && !state.away) return;
-    worker.postMessage({ type: "pose", tool: state.myTool, position: state.wish.position, grab: state.wish.grab, away: false });
+    worker.postMessage({ type: "pose", tool: state.myTool, position: destination(state.wish, t), grab: state.wish.grab, away: false });
     state.away = false;
     state.poseAt = t;
   } else if (!state.away) {
     worker.postMessage({ type: "pose", tool: state.myTool, position: null, grab: false, away: true });
     state.away = true;
+    state.anchor = null;
   }
 }
 
