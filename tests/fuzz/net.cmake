@@ -1,0 +1,1 @@
+pal_fuzz(hub LINK pal_net)
