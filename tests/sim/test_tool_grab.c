@@ -87,7 +87,7 @@ static void lets_go_when_the_button_goes_up(void)
     REQUIRE(step_world(&s, 1));
     CHECK(!tool_of(&s, 0)->holding && !tool_of(&s, 0)->has_grip);
     CHECK(pal_norm3(tool_of(&s, 0)->mean_force_N) == 0);
-    REQUIRE(step_world(&s, 240));
+    REQUIRE(step_world(&s, 300));
     CHECK_LE(rms_displacement(s.body), 1e-3 * s.body->size_m);
     tool_scene_close(&s);
 }

@@ -18,7 +18,7 @@ static void torque_of_loads(const pal_world *world, const pal_body *body, double
 static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 10, true, 2, 0.008, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, 8, true, 2, 0.008, 15) && tool_scene_open(&s));
     double worst_force = 0, worst_torque = 0, most = 0;
     for (int i = 0; i < 60; i++) {
         double down = 0.0003 * i, z = 0.058 - down;
@@ -60,7 +60,9 @@ static void gives_no_force_without_contact(void)
 static void grows_with_depth_and_publishes_its_slope(void)
 {
     tool_scene s;
-    REQUIRE(slab_scene(&s, 10, 10, 5, 0.01, 1, 0.015, 15) && tool_scene_open(&s));
+    REQUIRE(slab_scene(&s, 10, 10, 5, 0.01, 1, 0.015, 15));
+    s.scene->body[0].material.damping_1_s = 25;
+    REQUIRE(tool_scene_open(&s));
     double force[120], last = 0, depth_step = 0.0001;
     bool monotonic = true;
     int16_t id = 0;
@@ -95,15 +97,15 @@ static void grows_with_depth_and_publishes_its_slope(void)
 static void tells_the_bridge_where_the_surface_is_before_it_touches(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 10, true, 1, 0.008, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, 8, true, 1, 0.008, 15) && tool_scene_open(&s));
     move_tool(&s, 0, 0, 0.063, 0, false);
     REQUIRE(step_world(&s, 2));
     const pal_tool *tool = tool_of(&s, 0);
     REQUIRE(tool->n_patch == 1);
     const pal_patch *patch = &tool->patch[0];
     CHECK(pal_norm3(tool->mean_force_N) == 0);
-    /* the shown ball has flat triangles, 0.1 mm within the sphere */
-    CHECK_NEAR(pal_norm3(patch->point_m), 0.058, 3e-4);
+    /* the shown ball has flat triangles, 0.2 mm within the sphere */
+    CHECK_NEAR(pal_norm3(patch->point_m), 0.058, 4e-4);
     CHECK(patch->normal[1] > 0.995);
     CHECK_NEAR(patch->k1_N_m, 2 * 5000 * 0.008 / (1 - 0.45 * 0.45), 1e-6);
     /* and nothing when the tool is farther than a radius or 10 mm */
@@ -116,12 +118,13 @@ static void tells_the_bridge_where_the_surface_is_before_it_touches(void)
 static void keeps_plane_and_stiffness_still_while_the_tool_rests(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 10, true, 1, 0.008, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, 8, true, 1, 0.008, 15) && tool_scene_open(&s));
     for (int i = 0; i < 60; i++) {
         move_tool(&s, 0, 0, 0.003, 0.058 - 0.0001 * i, false);
         REQUIRE(step_world(&s, 1));
     }
-    REQUIRE(step_world(&s, 60));
+    /* the ball rocks for a while */
+    REQUIRE(step_world(&s, 150));
     pal_patch first = tool_of(&s, 0)->patch[0];
     double plane = 0, stiff = 0;
     for (int i = 0; i < 120; i++) {
@@ -147,8 +150,8 @@ static void lets_the_body_go_back_to_rest(void)
     }
     CHECK(rms_displacement(s.body) > 1e-3 * s.body->size_m);
     pal_world_pose(s.world, 0, NULL);
-    /* damping 20 1/s makes the rocking mode creep; 5 s are allowed (numerics.md part 3) */
-    REQUIRE(step_world(&s, 240));
+    /* 5 s are allowed (numerics.md part 3) */
+    REQUIRE(step_world(&s, 300));
     printf("  off by %.3g %% of S\n", 1e2 * rms_displacement(s.body) / s.body->size_m);
     CHECK_LE(rms_displacement(s.body), 1e-3 * s.body->size_m);
     CHECK(pal_norm3(tool_of(&s, 0)->mean_force_N) == 0);
@@ -214,7 +217,7 @@ static void presses_from_any_side(void)
 static void pushes_on_when_it_is_three_radii_deep(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 12, true, 1, 0.008, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, 11, true, 1, 0.008, 15) && tool_scene_open(&s));
     double last = 0;
     for (int i = 0; i < 120; i++) {
         double depth = fmin(0.0003 * i, 0.024);

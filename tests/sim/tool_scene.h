@@ -52,7 +52,7 @@ static inline pal_err ball_surface(int n_ring, double radius_m, pal_surface *out
     return PAL_ERR_OK;
 }
 
-/* scene defaults: n_tool tools of one radius and cap, no gravity, damping 20 1/s */
+/* scene defaults: n_tool tools of one radius and cap, no gravity, heavy and damped */
 static inline void tool_scene_fill(tool_scene *s, const char *output, bool held, int n_tool, double radius_m,
                                    double cap_N)
 {
@@ -63,7 +63,9 @@ static inline void tool_scene_fill(tool_scene *s, const char *output, bool held,
     pal_body_def *def = &s->scene->body[0];
     pal_body_default(def, "body", &s->mesh);
     pal_item_init(&def->output, "output", output);
-    def->material.damping_1_s = 20;
+    /* heavy tissue: longer sub-steps, the same forces at rest */
+    def->material.density_kg_m3 = 2000;
+    def->material.damping_1_s = 10;
     def->n_support = held ? 1 : 0;
     for (int i = 1; i < def->n_effect; i++) def->effect[i - 1] = def->effect[i];
     def->n_effect--;
@@ -91,7 +93,7 @@ static inline bool ball_scene(tool_scene *s, int resolution, bool held, int n_to
     pal_prepare_report report;
     memset(s, 0, sizeof *s);
     s->skinned = true;
-    if (ball_surface(24, 0.05, &surface)) return false;
+    if (ball_surface(18, 0.05, &surface)) return false;
     pal_err err = pal_prepared_make(&surface, &options, &s->mesh, &report, &note);
     pal_surface_free(&surface);
     if (err) printf("  %s\n", note.text);
