@@ -63,7 +63,8 @@ step "sources are formatted" sh "$tree/tests/house/check_format.sh" "$tree"
 step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types
 step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test
 if [ -z "$fast" ]; then
-    step "viewer: in a browser" sh "$tree/tests/browser/run.sh" "$build"
+    step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
+    step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
     build_preset asan && tests_of asan -j 2 -LE "accuracy|bench"
     say "building with thread sanitizer"

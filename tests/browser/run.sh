@@ -1,7 +1,21 @@
 #!/bin/sh
-# The browser test: real Chromium on a real server. usage: run.sh BUILD [PICTURES]
+# The browser tests: real Chromium on a real server. usage: run.sh pull|together BUILD [PICTURES]
+#   pull      two browsers share an organ that one of them pulls
+#   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
-build=$(cd "${1:-$here/../../build}" && pwd) || exit 2
-exec node "$here/pull.mjs" "$build" "${2:-$build/pictures}"
+which=${1:-pull}
+build=$(cd "${2:-$here/../../build}" && pwd) || exit 2
+pictures=${3:-$build/pictures}
+case $which in
+pull) exec node "$here/pull.mjs" "$build" "$pictures" ;;
+together)
+    exec unshare -n sh -c 'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec node "$0/together.mjs" "$1" "$2"' \
+        "$here" "$build" "$pictures"
+    ;;
+*)
+    echo "usage: run.sh pull|together BUILD [PICTURES]" >&2
+    exit 2
+    ;;
+esac

@@ -1,0 +1,76 @@
+// Shared by the browser tests: arguments, a small scene, a server on it, real Chromium pages, conditions waited for.
+import { execFileSync, spawn } from "node:child_process";
+import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const [build] = process.argv.slice(2);
+export const pictures = process.argv[3];
+export const program = (name) => join(build, "release", "bin", name);
+export const palpate = program("palpate");
+export const scratch = mkdtempSync(join(tmpdir(), "palpate-browser-"));
+const { chromium } = createRequire(join(build, "viewer_packages", "package.json"))("playwright-core");
+mkdirSync(pictures, { recursive: true });
+
+let passed = 0, failed = 0;
+export function check(what, good, figure = "") {
+  console.log(`${good ? "ok  " : "FAIL"} ${what} ${figure}`);
+  if (good) passed++;
+  else failed++;
+}
+export function finish() {
+  rmSync(scratch, { recursive: true, force: true });
+  console.log(`${passed} passed, ${failed} failed`);
+  process.exit(failed ? 1 : 0);
+}
+
+/** our own organ, small and quick to step; gives its scene file */
+export function prepare() {
+  const folder = join(scratch, "organ");
+  execFileSync(palpate, ["prepare", "--procedural", "--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"]);
+  return join(folder, "scene.json");
+}
+
+/** starts the server, resolves with its first JSON line */
+export function serve(scene, port, more = []) {
+  const child = spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], { stdio: ["ignore", "pipe", "inherit"] });
+  return new Promise((resolve, reject) => {
+    let text = "";
+    child.stdout.on("data", (bytes) => {
+      text += bytes;
+      if (text.includes("\n")) resolve({ child, info: JSON.parse(text.split("\n")[0]) });
+    });
+    child.on("exit", (code) => reject(new Error(`palpate serve ended with ${code}`)));
+  });
+}
+
+const FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+  "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+/** what the pages complained of in their consoles */
+export const troubles = [];
+export const launch = () => chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: FLAGS });
+
+/** a page that shows the organ */
+export async function open(browser, address, name, viewport) {
+  const page = await browser.newPage({ viewport });
+  page.setDefaultTimeout(90000);
+  page.on("console", (m) => m.type() === "error" && troubles.push(`${name}: ${m.text()}`));
+  page.on("pageerror", (e) => troubles.push(`${name}: ${e.message}`));
+  await page.goto(`${address}?name=${name}`);
+  await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status);
+  return page;
+}
+
+/** largest displacement of what a page shows, m */
+export const moved = (page) => page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
+
+/** waits until test(await read()) or the time is over, gives the last value */
+export async function until(read, test, ms = 20000) {
+  const end = Date.now() + ms;
+  for (;;) {
+    const value = await read();
+    if (test(value) || Date.now() > end) return value;
+    await new Promise((r) => setTimeout(r, 60));
+  }
+}
