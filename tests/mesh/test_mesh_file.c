@@ -124,15 +124,19 @@ static size_t put(uint8_t *to, const char *type, double value, bool big)
     uint8_t raw[8];
     size_t n = 0;
 #define PUT(NAME, TYPE)                                                                                                \
-    if (strcmp(type, NAME) == 0) {                                                                                     \
+    do {                                                                                                               \
         TYPE v = (TYPE)value;                                                                                          \
-        memcpy(raw, &v, n = sizeof v);                                                                                 \
-    }
-    PUT("char", int8_t)
-    PUT("uint8", uint8_t)
-    PUT("short", int16_t)
-    PUT("uint16", uint16_t) PUT("int", int32_t) PUT("uint32", uint32_t) PUT("float", float)
-        PUT("float64", double) for (size_t k = 0; k < n; k++) to[k] = raw[big ? n - 1 - k : k];
+        if (strcmp(type, NAME) == 0) memcpy(raw, &v, n = sizeof v);                                                    \
+    } while (0)
+    PUT("char", int8_t);
+    PUT("uint8", uint8_t);
+    PUT("short", int16_t);
+    PUT("uint16", uint16_t);
+    PUT("int", int32_t);
+    PUT("uint32", uint32_t);
+    PUT("float", float);
+    PUT("float64", double);
+    for (size_t k = 0; k < n; k++) to[k] = raw[big ? n - 1 - k : k];
     return n;
 }
 
