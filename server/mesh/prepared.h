@@ -17,8 +17,8 @@ typedef struct pal_prepared {
 typedef struct pal_prepare_report {
     pal_voxel_report voxel;
     int64_t n_voxel;     /* kept, border included                          */
-    double volume_m3;    /* of the tetrahedra                              */
-    double volume_error; /* inside voxels over the surface's volume, - 1; 0 when the surface is open */
+    double volume_m3;    /* of the tetrahedra, border included             */
+    double volume_error; /* inside voxels over the surface's volume, - 1; 0 when that is not known */
     double split_s, skin_s;
 } pal_prepare_report;
 

@@ -365,7 +365,8 @@ static pal_err run_method(decision *d, const char *method, bool *open)
         err = by_vote(d);
     /* a scanline that was asked for is taken at its word */
     *open = !even && strcmp(d->report->method, "scanline") != 0;
-    if (even) d->report->surface_volume_m3 = parts_volume(d);
+    d->report->surface_volume_m3 = parts_volume(d);
+    d->report->open = !even;
     return err;
 }
 

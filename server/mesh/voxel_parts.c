@@ -5,6 +5,8 @@
  * orientation; others take the patches'. */
 #include "server/mesh/voxel_parts.h"
 
+#include "server/base/vec3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -154,18 +156,93 @@ static void turn_triangle(int32_t *tri)
     tri[2] = swap;
 }
 
+/* a . (b x c) */
+static double triple(const double a[3], const double b[3], const double c[3])
+{
+    double cross[3];
+    pal_cross3(cross, b, c);
+    return pal_dot3(a, cross);
+}
+
 /* six times the volume of the triangle and the part's centre */
 static double fan_volume(const pal_scan_surface *scan, int32_t tri, const double o[3])
 {
     double p[3][3];
     for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++) p[k][d] = corner(scan, tri, k)[d] - o[d];
-    return p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-           p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+    return triple(p[0], p[1], p[2]);
 }
 
-/* decides each part's kind, turns its triangles alike, then outward */
-static void orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *chains)
+/* an open edge, from a to b in its triangle's sense */
+typedef struct rim_edge {
+    int32_t tri, a, b; /* vertices by number: holes of unwelded triangles do not join, and stay as they are */
+} rim_edge;
+
+/* corners that belong to the same hole: union-find, and the sum of its corners at the root */
+typedef struct rim_corner {
+    int32_t up, n;
+    double sum[3];
+} rim_corner;
+
+static int32_t find_rim(rim_corner *corner_of, int32_t i)
+{
+    while (corner_of[i].up != i) i = corner_of[i].up = corner_of[corner_of[i].up].up;
+    return i;
+}
+
+/* the open edge of a table entry as its triangle stands now */
+static rim_edge rim_of(const pal_scan_surface *scan, const edge_entry *e)
+{
+    const int32_t *c = scan->tri + 3 * (size_t)e->tri[0];
+    int k = 0, sign;
+    while (k < 2 && pal_scan_edge(corner(scan, e->tri[0], k), corner(scan, e->tri[0], k + 1), &sign) != e->key) k++;
+    return (rim_edge){e->tri[0], c[k], c[(k + 1) % 3]};
+}
+
+/* adds what the holes' fans enclose with each part's centre to the parts' volumes; MEMORY */
+static pal_err close_holes(const finder *f, chain *chains)
+{
+    const pal_scan_surface *scan = f->scan;
+    size_t n_vertex = 0, n_open = 0;
+    for (size_t i = 0; i < 3 * (size_t)scan->n_tri; i++)
+        if ((size_t)scan->tri[i] >= n_vertex) n_vertex = (size_t)scan->tri[i] + 1;
+    for (size_t i = 0; i <= f->mask; i++) n_open += f->table[i].n == 1;
+    if (n_open == 0) return PAL_ERR_OK;
+    rim_corner *rim = calloc(n_vertex, sizeof *rim);
+    if (!rim) return PAL_ERR_MEMORY;
+    for (size_t v = 0; v < n_vertex; v++) rim[v].up = (int32_t)v;
+    for (size_t i = 0; i <= f->mask; i++) {
+        if (f->table[i].n != 1) continue;
+        rim_edge e = rim_of(scan, &f->table[i]);
+        rim[find_rim(rim, e.a)].up = find_rim(rim, e.b);
+    }
+    for (size_t i = 0; i <= f->mask; i++) {
+        if (f->table[i].n != 1) continue;
+        rim_edge e = rim_of(scan, &f->table[i]);
+        rim_corner *root = &rim[find_rim(rim, e.a)];
+        root->n += 2;
+        for (int d = 0; d < 3; d++)
+            root->sum[d] += (double)scan->point[3 * (size_t)e.a + (size_t)d] + scan->point[3 * (size_t)e.b + (size_t)d];
+    }
+    for (size_t i = 0; i <= f->mask; i++) {
+        if (f->table[i].n != 1) continue;
+        rim_edge e = rim_of(scan, &f->table[i]);
+        const rim_corner *root = &rim[find_rim(rim, e.a)];
+        chain *c = &chains[scan->part[e.tri]];
+        double p[3][3];
+        for (int d = 0; d < 3; d++) {
+            p[0][d] = scan->point[3 * (size_t)e.b + (size_t)d] - c->centre[d];
+            p[1][d] = scan->point[3 * (size_t)e.a + (size_t)d] - c->centre[d];
+            p[2][d] = root->sum[d] / root->n - c->centre[d];
+        }
+        c->volume += triple(p[0], p[1], p[2]) / 6;
+    }
+    free(rim);
+    return PAL_ERR_OK;
+}
+
+/* decides each part's kind, turns its triangles alike, then outward; MEMORY */
+static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *chains)
 {
     uint8_t turn;
     for (int32_t t = 0; t < scan->n_tri; t++) {
@@ -187,12 +264,14 @@ static void orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *c
         if (turn && c->sum != 0 && !c->torn) turn_triangle(scan->tri + 3 * (size_t)t);
         c->volume += fan_volume(scan, t, c->centre) / 6;
     }
+    PAL_TRY(close_holes(f, chains));
     for (int32_t t = 0; t < scan->n_tri; t++)
         if (chains[scan->part[t]].volume < 0) turn_triangle(scan->tri + 3 * (size_t)t);
     for (int i = 0; i < parts->n; i++) {
         parts->part[i].inward = chains[i].volume < 0;
         parts->part[i].volume = fabs(chains[i].volume);
     }
+    return PAL_ERR_OK;
 }
 
 pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
@@ -216,7 +295,7 @@ pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
             int32_t root = find_joined(f.joined, t);
             scan->part[t] = root == t ? next++ : scan->part[root];
         }
-        orient(scan, &f, &parts, chains);
+        err = orient(scan, &f, &parts, chains);
     }
     finder_free(&f);
     free(chains);

@@ -13,10 +13,10 @@ typedef enum pal_part_kind {
 typedef struct pal_part {
     int n_tri;
     pal_part_kind kind;
-    bool coherent; /* every edge of two triangles runs both ways                      */
-    bool inward;   /* faced inward in the file; now it faces outward like all others  */
-    bool cavity;   /* lies inside another part that faces the other way in the file   */
-    double volume; /* enclosed, in cubic grid units, never negative; open: by its fan */
+    bool coherent; /* every edge of two triangles runs both ways                                                     */
+    bool inward;   /* faced inward in the file; now it faces outward like all others                                 */
+    bool cavity;   /* lies inside another part that faces the other way in the file                                  */
+    double volume; /* enclosed, in cubic grid units, never negative; holes count as closed by fans from their middle */
 } pal_part;
 
 typedef struct pal_parts {

@@ -115,12 +115,28 @@ static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *
     }
 }
 
-/* border, counts, budget, bytes */
-static pal_err keep_voxels(const pal_bits *inside, const pal_voxel_options *options, pal_voxels *voxels, pal_note *note)
+/* pieces that hang together face by face, border voxels included; the border is left as it was */
+static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_component)
+{
+    size_t n = (size_t)inside->n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
+    for (size_t i = 0; i < n; i++) border->word[i] |= inside->word[i];
+    pal_err err = pal_bits_components(border, false, n_component);
+    for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
+    return err;
+}
+
+/* border, pieces, counts, budget, bytes */
+static pal_err keep_voxels(const pal_bits *inside, const pal_voxel_options *options, pal_voxels *voxels,
+                           int *n_component, pal_note *note)
 {
     pal_bits border;
     PAL_TRY(pal_bits_create(inside->n, &border));
     if (options->border) find_border(inside, &border);
+    pal_err err = count_pieces(inside, &border, n_component);
+    if (err) {
+        pal_bits_free(&border);
+        return err;
+    }
     voxels->n_inside = pal_bits_count(inside);
     voxels->n_border = pal_bits_count(&border);
     int64_t most = options->most_voxel > 0 ? options->most_voxel : MOST_VOXEL;
@@ -145,8 +161,9 @@ pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *opt
     PAL_TRY(lay_grid(surface, options, &voxels, note));
     pal_err err = pal_bits_create(voxels.n, &inside);
     if (!err) err = pal_voxels_decide(surface, options, &voxels, &inside, &told, note);
-    if (!err) err = pal_bits_components(&inside, options->largest_only, &told.n_component);
-    if (!err) err = keep_voxels(&inside, options, &voxels, note);
+    int n_before;
+    if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
+    if (!err) err = keep_voxels(&inside, options, &voxels, &told.n_component, note);
     pal_bits_free(&inside);
     if (err == PAL_ERR_MEMORY)
         pal_note_set(note, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);

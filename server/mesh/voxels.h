@@ -17,7 +17,7 @@
 typedef struct pal_voxel_options {
     int resolution;     /* voxels on the longest axis, 1..1024                                            */
     bool border;        /* keep the one layer of border voxels outside (paper B); false: inside only      */
-    bool largest_only;  /* keep only the largest face-connected component                                 */
+    bool largest_only;  /* keep only the largest face-connected component of inside voxels, and its border */
     int64_t most_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
     const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
 } pal_voxel_options;
@@ -33,9 +33,11 @@ typedef struct pal_voxels {
 
 typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
-    int n_component;          /* face-connected components of inside voxels                        */
+    int n_component;          /* face-connected components of the kept voxels, the border included */
     int64_t n_disagree;       /* voxels that no two axes settle unopposed                          */
-    double surface_volume_m3; /* by the divergence theorem, cavities off; 0: the surface is open    */
+    bool open;                /* some edge has an odd number of triangles                           */
+    double surface_volume_m3; /* by the divergence theorem, cavities off, holes closed by fans from the middle of
+                               * their rims; 0: not known (open, and flood was asked for)           */
     double inside_volume_m3;  /* inside voxels                                                     */
     double tree_s, fill_s;    /* time for the box tree (0: not built) and for the fill             */
 } pal_voxel_report;

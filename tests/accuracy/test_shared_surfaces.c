@@ -54,6 +54,9 @@ static void mesh_one(const struct known *k, const pal_surface *surface, int reso
     double tolerance = resolution < 60 ? 3 * k->tolerance : k->tolerance;
     if (k->volume > 0 && !(fabs(report.inside_volume_m3 / k->volume - 1) <= tolerance))
         CHECK_FAIL("%s at %d: volume %g, wanted %g", k->file, resolution, report.inside_volume_m3, k->volume);
+    if (k->volume > 0 && !(fabs(report.surface_volume_m3 / k->volume - 1) <= 0.005))
+        CHECK_FAIL("%s at %d: surface's volume %g, wanted %g", k->file, resolution, report.surface_volume_m3,
+                   k->volume);
     if (*k->method && strcmp(k->method, report.method))
         CHECK_FAIL("%s at %d: decided by %s, wanted %s", k->file, resolution, report.method, k->method);
     CHECK(!pal_voxels_split(&voxels, &tets));

@@ -74,6 +74,27 @@ static void doubled_shells_do_not_cancel(void)
                   "");
 }
 
+static void turned_copy_beside_its_twin_is_no_cavity(void)
+{
+    /* moved by a twentieth of a voxel, so that neither lies inside the other by much */
+    pal_surface turned = shape_sphere(0.1);
+    shape_invert(&turned);
+    shape_move(&turned, 0.00025, 0, 0);
+    expect_volume(shape_join(shape_sphere(0.1), turned), 40, sphere_volume(0.1), 0.02, "scanline");
+}
+
+static void doubled_fin_leaves_a_closed_body_closed(void)
+{
+    /* a fin outside that shares an edge with the cube, there in both senses: every edge stays even */
+    pal_surface s = shape_cube(0.2), fin = shape_room(3, 2);
+    const double corner[9] = {0.1, 0.1, -0.1, 0.1, 0.1, 0.1, 0.17, 0.19, 0.03};
+    const int32_t both[6] = {0, 1, 2, 1, 0, 2};
+    memcpy(fin.x, corner, sizeof corner);
+    memcpy(fin.tri, both, sizeof both);
+    expect_volume(shape_join(s, fin), 40, 0.008, 0.05, "scanline");
+    CHECK(!report.open);
+}
+
 static void overlapping_shapes_are_joined(void)
 {
     /* two balls of radius r, centres r apart: the lens of each is 5/12 pi r^3 in all */
@@ -141,6 +162,32 @@ static void open_shapes_are_closed_by_vote_or_winding_number(void)
     expect_volume(s, 40, sphere_volume(0.1) * 0.844, 0.1, "");
 }
 
+static void surface_volume_has_its_holes_closed_flat(void)
+{
+    pal_voxels v;
+    pal_surface s = shape_sphere(0.1);
+    double whole = pal_surface_volume(&s);
+    REQUIRE(!fill(&s, 40, NULL, &v));
+    CHECK(!report.open);
+    CHECK_NEAR(report.surface_volume_m3 / whole, 1, 1e-4);
+    pal_voxels_free(&v);
+    /* half a ball turned inside out, and a tube without its ends, which has two rims in one part */
+    shape_cut(&s, 0);
+    shape_invert(&s);
+    double low[3] = {-0.05, -0.05, -0.2}, high[3] = {0.05, 0.05, 0.2};
+    pal_surface tube = shape_box(low, high);
+    memmove(tube.tri, tube.tri + 12, 24 * sizeof *tube.tri);
+    tube.n_tri = 8;
+    for (int shape = 0; shape < 2; shape++) {
+        REQUIRE(!fill(shape ? &tube : &s, 40, NULL, &v));
+        CHECK(report.open);
+        CHECK_NEAR(report.surface_volume_m3 / (shape ? 0.004 : whole / 2), 1, 1e-4);
+        pal_voxels_free(&v);
+    }
+    pal_surface_free(&tube);
+    pal_surface_free(&s);
+}
+
 static void open_tube_is_a_volume(void)
 {
     /* a long box without its two ends */
@@ -184,6 +231,31 @@ static void every_component_is_found(void)
     CHECK_NEAR((double)v.n_inside / (double)all, 0.25, 0.01);
     pal_voxels_free(&v);
     pal_surface_free(&s);
+}
+
+static void pieces_are_counted_with_their_border(void)
+{
+    /* two boxes of 4 voxels: 3 apart their borders leave a gap, 2 apart they touch */
+    for (int gap = 2; gap <= 3; gap++) {
+        double low[3] = {0, 0, 0}, high[3] = {4, 4, 4}, low2[3] = {4 + gap, 0, 0}, high2[3] = {8 + gap, 4, 4};
+        pal_surface s = shape_join(shape_box(low, high), shape_box(low2, high2));
+        pal_voxels v;
+        REQUIRE(!fill(&s, 8 + gap, NULL, &v));
+        CHECK_INT(v.n_inside, 128);
+        CHECK_INT(report.n_component, gap == 3 ? 2 : 1);
+        pal_tets t;
+        int n_part = 0;
+        REQUIRE(!pal_voxels_split(&v, &t) && !pal_tets_components(&t, NULL, &n_part));
+        CHECK_INT(report.n_component, n_part);
+        pal_tets_free(&t);
+        pal_voxels_free(&v);
+        pal_voxel_options options = {.resolution = 8 + gap, .border = true, .largest_only = true};
+        REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &note));
+        CHECK_INT(v.n_inside, 64);
+        CHECK_INT(report.n_component, 1);
+        pal_voxels_free(&v);
+        pal_surface_free(&s);
+    }
 }
 
 /* voxels where two fills differ */
@@ -298,9 +370,30 @@ static void thousand_rotations_give_the_convex_shapes_own_voxels(void)
     CHECK_INT(disagree, 0);
 }
 
+/* inside voxels of a surface, which is freed, in the grid of n unit voxels from the origin; specks in two far corners
+ * hold the grid. No two axes may disagree. */
+static int64_t count_in_grid(pal_surface s, int n, const char *method)
+{
+    double low[3] = {0, 0, 0}, high[3] = {n, n, n};
+    pal_surface specks = shape_box(low, high);
+    for (int t = 0; t < 12; t++) specks.tri[3 * t + 2] = specks.tri[3 * t + 1] = specks.tri[3 * t];
+    pal_surface both = shape_join(s, specks);
+    pal_voxels v;
+    int64_t n_inside = -1;
+    if (fill(&both, n, method, &v)) {
+        CHECK_FAIL("%s", note.text);
+    } else {
+        CHECK_INT(report.n_disagree, 0);
+        n_inside = v.n_inside;
+        pal_voxels_free(&v);
+    }
+    pal_surface_free(&both);
+    return n_inside;
+}
+
 static void centres_on_vertices_edges_and_faces_belong_to_one_side_on_every_axis(void)
 {
-    /* 2 m octahedron in 2 n voxels of odd count: corners lie on planes of centres, edges and faces on centres */
+    /* 2 m octahedron in voxels of odd count: rows of centres run through corners and along edges */
     for (int n = 3; n <= 41; n += 2) {
         pal_surface s = shape_octahedron(1);
         static const char *const METHOD[] = {"scanline", "vote"};
@@ -317,25 +410,38 @@ static void centres_on_vertices_edges_and_faces_belong_to_one_side_on_every_axis
         pal_surface_free(&s);
     }
     /* cubes that tile space share no voxel and leave none: eight cubes whose faces all lie on planes of centres */
-    double h = 0.1, low[3] = {0, 0, 0}, high[3] = {11 * h, 11 * h, 11 * h};
-    int64_t sum = 0;
-    for (int k = 0; k < 8; k++) {
-        double a[3], b[3];
-        for (int d = 0; d < 3; d++) {
-            a[d] = k >> d & 1 ? 5.5 * h : 0;
-            b[d] = k >> d & 1 ? 11 * h : 5.5 * h;
+    for (int m = 0; m < 2; m++) {
+        int64_t sum = 0;
+        for (int k = 0; k < 8; k++) {
+            double a[3], b[3];
+            for (int d = 0; d < 3; d++) {
+                a[d] = k >> d & 1 ? 5.5 : 0;
+                b[d] = k >> d & 1 ? 11 : 5.5;
+            }
+            sum += count_in_grid(shape_box(a, b), 11, m ? "vote" : "scanline");
         }
-        /* a far speck keeps the same grid for each */
-        pal_surface one = shape_join(shape_box(a, b), shape_box(low, high));
-        one.n_tri = 24;
-        for (int t = 12; t < 24; t++) one.tri[3 * t + 2] = one.tri[3 * t + 1] = one.tri[3 * t];
-        pal_voxels v;
-        REQUIRE(!fill(&one, 11, NULL, &v));
-        sum += v.n_inside;
-        pal_voxels_free(&v);
-        pal_surface_free(&one);
+        CHECK_INT(sum, 11 * 11 * 11);
     }
-    CHECK_INT(sum, 11 * 11 * 11);
+}
+
+static void centres_on_slanted_faces_belong_to_one_side_on_every_axis(void)
+{
+    /* octahedron of radius r voxels round a centre: all centres with |i| + |j| + |k| = r lie on it, and those that the
+     * shift (e, e^2, e^3) takes inside have i < 0 */
+    for (int r = 1; r <= 9; r++) {
+        int64_t expected = 0;
+        for (int i = -r; i <= r; i++)
+            for (int j = -r; j <= r; j++)
+                for (int k = -r; k <= r; k++) {
+                    int sum = abs(i) + abs(j) + abs(k);
+                    expected += sum < r || (sum == r && i < 0);
+                }
+        for (int m = 0; m < 2; m++) {
+            pal_surface s = shape_octahedron(r);
+            shape_move(&s, r + 0.5, r + 0.5, r + 0.5);
+            CHECK_INT(count_in_grid(s, 2 * r + 1, m ? "vote" : "scanline"), expected);
+        }
+    }
 }
 
 static void refused(pal_surface s, int resolution, const char *words)
@@ -553,19 +659,24 @@ int main(void)
     RUN(inside_out_shapes_have_their_volume);
     RUN(unwelded_triangles_have_their_volume);
     RUN(doubled_shells_do_not_cancel);
+    RUN(turned_copy_beside_its_twin_is_no_cavity);
+    RUN(doubled_fin_leaves_a_closed_body_closed);
     RUN(overlapping_shapes_are_joined);
     RUN(inward_shells_within_stay_empty);
     RUN(outward_shells_within_stay_full);
     RUN(flipped_triangles_are_turned_back);
     RUN(open_shapes_are_closed_by_vote_or_winding_number);
+    RUN(surface_volume_has_its_holes_closed_flat);
     RUN(open_tube_is_a_volume);
     RUN(inner_wall_does_not_empty_its_row);
     RUN(every_component_is_found);
+    RUN(pieces_are_counted_with_their_border);
     RUN(all_methods_agree_on_closed_shapes);
     RUN(flood_says_that_it_leaks);
     RUN(border_is_the_layer_beside_the_inside);
     RUN(thousand_rotations_give_the_convex_shapes_own_voxels);
     RUN(centres_on_vertices_edges_and_faces_belong_to_one_side_on_every_axis);
+    RUN(centres_on_slanted_faces_belong_to_one_side_on_every_axis);
     RUN(surfaces_without_a_volume_are_refused_with_numbers);
     RUN(options_out_of_range_are_refused);
     RUN(noise_is_refused_within_a_budget);
