@@ -24,27 +24,27 @@ void *__wrap_aligned_alloc(size_t align, size_t n_byte);
 void __wrap_free(void *old);
 void *__wrap_malloc(size_t n_byte)
 {
-    n_heap_call += counting;
+    if (counting) n_heap_call++;
     return __real_malloc(n_byte);
 }
 void *__wrap_calloc(size_t n, size_t n_byte)
 {
-    n_heap_call += counting;
+    if (counting) n_heap_call++;
     return __real_calloc(n, n_byte);
 }
 void *__wrap_realloc(void *old, size_t n_byte)
 {
-    n_heap_call += counting;
+    if (counting) n_heap_call++;
     return __real_realloc(old, n_byte);
 }
 void *__wrap_aligned_alloc(size_t align, size_t n_byte)
 {
-    n_heap_call += counting;
+    if (counting) n_heap_call++;
     return __real_aligned_alloc(align, n_byte);
 }
 void __wrap_free(void *old)
 {
-    n_heap_call += counting;
+    if (counting) n_heap_call++;
     __real_free(old);
 }
 
