@@ -89,9 +89,9 @@ bool pal_text_is(pal_text_scan *scan, const char *word)
     return true;
 }
 
-/* sign, digits, point, digits, exponent: the value is mantissa times 10^power when every digit fitted */
+/* sign, digits, point, digits, exponent: the value is mantissa times 10^power unless the mantissa reached 10^18 */
 typedef struct decimal {
-    bool negative, whole; /* whole: no digit was left out */
+    bool negative;
     uint64_t mantissa;
     int64_t power;
 } decimal;
@@ -99,7 +99,7 @@ typedef struct decimal {
 /* reads a decimal from p up to end exactly; false when the bytes are no decimal number */
 static bool read_decimal(const uint8_t *p, const uint8_t *end, decimal *out)
 {
-    decimal d = {.whole = true};
+    decimal d = {0};
     int n_digit = 0;
     bool point = false;
     if (p < end && (*p == '-' || *p == '+')) d.negative = *p++ == '-';
@@ -113,9 +113,6 @@ static bool read_decimal(const uint8_t *p, const uint8_t *end, decimal *out)
         if (d.mantissa < 1000000000000000000u) {
             d.mantissa = 10 * d.mantissa + (uint64_t)(*p - '0');
             d.power -= point;
-        } else {
-            d.whole &= *p == '0';
-            d.power += !point;
         }
     }
     if (n_digit == 0) return false;
@@ -169,7 +166,7 @@ bool pal_text_double(pal_text_scan *scan, double *out)
     if (end - scan->at > LONGEST_NUMBER) return false;
     if (!read_decimal(scan->at, end, &d)) {
         if (!read_special(scan->at, end, out)) return false;
-    } else if (d.whole && d.mantissa <= (uint64_t)1 << 53 && d.power >= -22 && d.power <= 22) {
+    } else if (d.mantissa <= (uint64_t)1 << 53 && d.power >= -22 && d.power <= 22) {
         double m = (double)d.mantissa, value = d.power < 0 ? m / ten[-d.power] : m * ten[d.power];
         *out = d.negative ? -value : value;
     } else {

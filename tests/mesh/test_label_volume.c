@@ -416,6 +416,53 @@ static void a_gzip_bomb_costs_no_more_than_its_header_asks_for(void)
     free(b.at);
 }
 
+static void packed_members_may_follow_one_another(void)
+{
+    bytes b = make_nifti(2, false, 0, 0), half[2] = {{b.at, b.n / 3}, {b.at + b.n / 3, b.n - b.n / 3}};
+    bytes first = pack(&half[0]), second = pack(&half[1]), both = {malloc(first.n + second.n), first.n + second.n};
+    if (!both.at) exit(1);
+    memcpy(both.at, first.at, first.n);
+    memcpy(both.at + first.n, second.at, second.n);
+    check_ball(&both, "nifti");
+    free(both.at);
+    free(first.at);
+    free(second.at);
+    free(b.at);
+}
+
+static void slopes_of_a_few_degrees_leave_no_terraces(void)
+{
+    /* a block in 2.5 mm slices whose top rises by 1 in 20: terraces 50 mm wide, which no small blur takes out */
+    enum { N = 140, M = 60, L = 16 };
+    static int32_t label[L * M * N];
+    pal_label_volume v = {.n = {N, M, L}, .to_m = {1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 2.5e-3, 0}, .label = label};
+    for (int i = 0; i < L * M * N; i++) {
+        int x = i % N, y = i / N % M;
+        double z = 2.5 * (i / N / M);
+        label[i] = x > 3 && x < N - 4 && y > 3 && y < M - 4 && z > 5 && z < 25 + (x - N / 2) / 20.0;
+    }
+    pal_label_surface_options o = {.blur_m = -1, .smooth_rounds = -1};
+    double worst[2] = {0, 0};
+    for (int k = 0; k < 2; k++, o.smooth_rounds = 0) {
+        pal_surface s = {0};
+        REQUIRE(pal_label_volume_surface(&v, 1, &o, &s, NULL) == PAL_ERR_OK);
+        double *normal = malloc(sizeof *normal * 3 * (size_t)s.n_vertex), slope = 1 / sqrt(401.0);
+        REQUIRE(normal != NULL);
+        pal_surface_normals(&s, normal);
+        for (int i = 0; i < s.n_vertex; i++) {
+            const double *x = s.x + 3 * i, *n = normal + 3 * i;
+            if (fabs(x[0]) > 0.045 || fabs(x[1]) > 0.015 || x[2] < 0) continue;
+            double cosine = slope * (20 * n[2] - n[0]);
+            worst[k] = fmax(worst[k], acos(fmin(cosine, 1)) * 180 / PI);
+        }
+        free(normal);
+        pal_surface_free(&s);
+    }
+    printf("  worst normal on the slope: %.1f degrees off, %.1f without smoothing\n", worst[0], worst[1]);
+    CHECK_LE(worst[0], 11);
+    CHECK(worst[1] > 18);
+}
+
 static void damage_is_found_wherever_it_is_in_a_packed_file(void)
 {
     /* larger than the piece that the header is read from; the checksum is the last thing in the file */
@@ -497,6 +544,8 @@ int main(void)
     RUN(hostile_nifti_is_refused_with_its_byte);
     RUN(hostile_inrimage_is_refused_with_its_line);
     RUN(a_gzip_bomb_costs_no_more_than_its_header_asks_for);
+    RUN(slopes_of_a_few_degrees_leave_no_terraces);
+    RUN(packed_members_may_follow_one_another);
     RUN(damage_is_found_wherever_it_is_in_a_packed_file);
     RUN(plates_rods_and_specks_keep_their_volume);
     RUN(voxels_like_needles_are_refused_before_they_cost_memory);

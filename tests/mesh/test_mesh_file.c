@@ -37,6 +37,8 @@ static void check_tetrahedron(const char *name, const void *bytes, size_t n, con
     CHECK_INT(s.n_vertex, 4);
     CHECK_INT(s.n_tri, 4);
     CHECK_NEAR(pal_surface_volume(&s), 1.0 / 6, 1e-15);
+    pal_surface_topology topology;
+    CHECK(!pal_surface_check(&s, &topology) && topology.closed && topology.oriented);
     for (int a = 0; a < 3; a++) CHECK_NEAR(s.origin_m[a], 0.5, 1e-15);
     pal_surface_free(&s);
 }
@@ -549,6 +551,21 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
         CHECK_TEXT(text, wanted[k]);
         CHECK_INT(pal_file_read(name, 5, &bytes, &n, NULL), PAL_ERR_BUDGET);
         free(bytes);
+        unlink(name);
+    }
+    /* a body of less than a micrometre keeps its digits */
+    tets.h_m = 1e-7;
+    x[3] = 1.0 / 3 * 1e-7;
+    REQUIRE(pal_mesh_file_write_tetgen(path, &tets, NULL) == PAL_ERR_OK);
+    for (int k = 0; k < 3; k++) {
+        char name[80];
+        snprintf(name, sizeof name, "%s%s", path, tail[k]);
+        FILE *file = fopen(name, "r");
+        double value = 0;
+        REQUIRE(file != NULL);
+        if (k == 0) CHECK_INT(fscanf(file, "%*[^\n] %*[^\n] 2 %lf", &value), 1);
+        if (k == 0) CHECK_NEAR(value, 1.0 / 3 * 1e-7, 0);
+        fclose(file);
         unlink(name);
     }
     /* a file that cannot be written leaves nothing behind */

@@ -26,6 +26,7 @@ static void ball_becomes_a_sound_mesh(void)
     CHECK_INT(p.tets.n_tet, 5 * report.n_voxel);
     CHECK_NEAR(report.volume_m3, (double)report.n_voxel * pow(p.tets.h_m, 3), 1e-12);
     CHECK_LE(fabs(report.volume_error), 0.05);
+    CHECK_NEAR((1 + report.volume_error) * pal_surface_volume(&p.surface) / report.voxel.inside_volume_m3, 1, 1e-4);
     CHECK_TEXT(report.voxel.method, "scanline");
     CHECK_NEAR(p.tets.origin_m[1], 7.5, 0);
     CHECK_INT(p.skin.n_vertex, p.surface.n_vertex);

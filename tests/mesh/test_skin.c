@@ -260,6 +260,20 @@ static void pressed_through_itself_or_crumpled_the_surface_does_not_jump(void)
     unbind(&b);
 }
 
+static void second_edge_gives_the_same_axes_as_the_first(void)
+{
+    /* first edges that count as collapsed: their rest length is a thousand times what they have */
+    bound b;
+    REQUIRE(bind_surface(shape_ball(0.1, 60, 30, 0.2), 12, &b));
+    int n_second = 0;
+    for (int f = 0; f < b.skin.n_frame; f++)
+        if (b.skin.frame_edge[2 * f + 1] >= 0) b.skin.frame_rest[3 * f + 1] *= 1000, n_second++;
+    CHECK_INT(n_second, b.skin.n_frame);
+    show(&b);
+    CHECK_LE(largest_error(&b, b.surface.x), 0.02 * b.tets.h_m);
+    unbind(&b);
+}
+
 static void voxels_that_touch_along_an_edge_carry_no_frame_there(void)
 {
     /* two cubes that share one edge: its middle nodes have no normal */
@@ -305,6 +319,7 @@ int main(void)
     RUN(one_vertex_is_the_same_as_all);
     RUN(flat_inverted_and_collapsed_bodies_stay_finite_and_near);
     RUN(pressed_through_itself_or_crumpled_the_surface_does_not_jump);
+    RUN(second_edge_gives_the_same_axes_as_the_first);
     RUN(voxels_that_touch_along_an_edge_carry_no_frame_there);
     RUN(a_mesh_without_a_surface_is_refused);
     return check_report();

@@ -114,6 +114,10 @@ static void inward_shells_within_stay_empty(void)
         shape_invert(&cavity);
         pal_surface s = shape_join(shape_sphere(0.1), cavity);
         if (turned) shape_invert(&s);
+        pal_voxels v;
+        REQUIRE(!fill(&s, 30, "winding", &v));
+        CHECK_NEAR(report.inside_volume_m3 / (sphere_volume(0.1) - sphere_volume(0.06)), 1, 0.02);
+        pal_voxels_free(&v);
         expect_volume(s, 50, sphere_volume(0.1) - sphere_volume(0.06), 0.02, "scanline");
     }
     /* an island in the cavity, the outer shell doubled */
@@ -225,6 +229,9 @@ static void every_component_is_found(void)
     REQUIRE(!fill(&s, 60, NULL, &v));
     CHECK_INT(report.n_component, 4);
     int64_t all = v.n_inside;
+    pal_voxels_free(&v);
+    REQUIRE(!fill(&s, 60, "flood", &v));
+    CHECK_INT(v.n_inside, all);
     pal_voxels_free(&v);
     pal_voxel_options options = {.resolution = 60, .border = true, .largest_only = true};
     REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &note));
