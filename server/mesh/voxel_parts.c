@@ -434,13 +434,25 @@ bool pal_parts_row(const pal_parts *parts, pal_parts_work *work, const pal_cross
     return clean;
 }
 
-/* the largest part that the row entered at least 1/16 voxel before the crossing, other than its own; -1: none */
-static int32_t outermost(const pal_parts *parts, const pal_parts_work *w, const pal_crossing *c)
+enum { COINCIDENT = PAL_SCAN_ONE / 16 };
+
+/* does the row cross the part once more within a sixteenth of a voxel? */
+static bool crosses_soon(const pal_crossing *c, const pal_crossing *end, int32_t part)
+{
+    for (const pal_crossing *k = c + 1; k < end && k->depth < c->depth + COINCIDENT; k++)
+        if (k->part == part) return true;
+    return false;
+}
+
+/* the largest part other than its own that the row is within at a crossing, a sixteenth of a voxel and more before and
+ * behind it; -1: none. end: of the row */
+static int32_t outermost(const pal_parts *parts, const pal_parts_work *w, const pal_crossing *c,
+                         const pal_crossing *end)
 {
     int32_t best = -1;
     for (int k = 0; k < w->n_open; k++) {
         int32_t part = w->open[k];
-        if (part == c->part || w->entered[part] > c->depth - PAL_SCAN_ONE / 16) continue;
+        if (part == c->part || w->entered[part] > c->depth - COINCIDENT || crosses_soon(c, end, part)) continue;
         if (best < 0 || parts->part[part].volume > parts->part[best].volume) best = part;
     }
     return best;
@@ -457,7 +469,7 @@ pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
             begin_row(parts, w, item, n);
             for (int64_t i = 0; i < n; i++) {
                 if (w->count[item[i].part] == UNCLEAN) continue;
-                int32_t around = outermost(parts, w, &item[i]);
+                int32_t around = outermost(parts, w, &item[i], item + n);
                 bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
                 votes[item[i].part] += opposed ? 1 : -1;
                 cross(parts, w, &item[i]);
