@@ -36,7 +36,6 @@ typedef struct wishes {
 typedef struct outcome {
     pal_surface_scene_report report;
     double write_s, total_s;
-    int n_piece; /* components of the tetrahedra: the border layer joins what nearly touches */
     char file[FILES][80];
     int n_file;
 } outcome;
@@ -172,8 +171,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
     cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
     cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
-    cJSON_AddNumberToObject(o, "pieces", out->n_piece);
     cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
+    cJSON_AddBoolToObject(o, "open", r->prepare.voxel.open);
     cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
     cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
     cJSON_AddNumberToObject(o, "surface_volume_m3", r->prepare.voxel.surface_volume_m3);
@@ -183,6 +182,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     cJSON_AddNumberToObject(dropped, "degenerate", (double)r->surface.n_degenerate);
     cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
     cJSON_AddNumberToObject(dropped, "nonfinite", (double)r->surface.n_nonfinite);
+    cJSON_AddNumberToObject(dropped, "folded", (double)r->surface.n_folded);
+    cJSON_AddNumberToObject(o, "mended", (double)r->surface.n_mended);
     cJSON_AddNumberToObject(o, "welded", (double)r->surface.n_welded);
     cJSON *seconds = cJSON_AddObjectToObject(o, "seconds");
     cJSON_AddNumberToObject(seconds, "read", r->read_s);
@@ -195,32 +196,50 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     return o;
 }
 
+typedef struct volume_text {
+    char text[32];
+} volume_text;
+
+/* in the unit that leaves one to four digits before the point */
+static volume_text say_volume(double volume_m3)
+{
+    static const struct {
+        double m3;
+        const char *unit;
+    } unit[] = {{1, "m3"}, {1e-3, "l"}, {1e-6, "ml"}, {1e-9, "mm3"}};
+    volume_text out;
+    size_t k = 0;
+    while (k < 3 && volume_m3 < 5 * unit[k].m3) k++;
+    snprintf(out.text, sizeof out.text, "%.1f %s", volume_m3 / unit[k].m3, unit[k].unit);
+    return out;
+}
+
 static void print(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
+    const pal_surface_report *d = &r->surface;
     const pal_prepared *mesh = &loaded->mesh[0];
+    int n_component = r->prepare.voxel.n_component;
     double low[3], high[3];
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
            1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
     if (r->unit_guessed) printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
+    if (r->n_label > 1 && wish->scene.label < 0)
+        printf(", the most frequent of %d labels (--list-labels shows them)", r->n_label);
     printf("\n%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
-           mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution,
-           r->prepare.voxel.n_component, r->prepare.voxel.n_component == 1 ? "" : "s", r->prepare.voxel.method);
-    if (r->prepare.voxel.surface_volume_m3 > 0)
-        printf("volume %.1f ml by the surface, %+.1f %% by the voxels inside\n",
-               1e6 * r->prepare.voxel.surface_volume_m3, 100 * r->prepare.volume_error);
-    else
-        printf("volume %.1f ml by the voxels inside; the surface is open and has none\n",
-               1e6 * r->prepare.voxel.inside_volume_m3);
-    if (out->n_piece > 1)
-        printf("the tetrahedra are %d pieces that do not hang together; those without support drift (--largest keeps "
-               "one)\n",
-               out->n_piece);
-    if (r->surface.n_degenerate + r->surface.n_duplicate + r->surface.n_nonfinite > 0)
-        printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite\n",
-               (long long)r->surface.n_degenerate, (long long)r->surface.n_duplicate,
-               (long long)r->surface.n_nonfinite);
+           mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution, n_component,
+           n_component == 1 ? "" : "s", r->prepare.voxel.method);
+    volume_text known = say_volume(r->prepare.voxel.surface_volume_m3), whole = say_volume(r->prepare.volume_m3);
+    printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n", known.text,
+           r->prepare.voxel.open ? " (open: its holes count as closed)" : "", 100 * r->prepare.volume_error,
+           whole.text);
+    if (n_component > 1)
+        printf("the components do not hang together; those without support drift (--largest keeps one)\n");
+    if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
+        printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
+               (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
+               (long long)d->n_folded);
     printf("wrote");
     for (int k = 0; k < out->n_file; k++) printf(" %s", out->file[k]);
     printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", wish->folder, out->total_s, wish->folder);
@@ -245,9 +264,7 @@ static int run(pal_flag_common *common, const char *in, wishes *wish)
     pal_err err = wish->procedural ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
                                    : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
     if (err) return pal_report_refusal(common, err, &note);
-    out.n_piece = 1;
-    if (out.report.prepare.voxel.n_component > 1) err = pal_tets_components(&loaded->mesh[0].tets, NULL, &out.n_piece);
-    if (!err) err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
+    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
     if (!err) err = save(loaded, wish, &out, &note);
@@ -285,6 +302,8 @@ int command_prepare(int argc, char **argv)
         {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
         {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
          "let it hang (a scanned shape carries its weight already)"},
+        {"--area-springs", NULL, PAL_FLAG_SWITCH, &wish.scene.area_springs, 0, 0,
+         "springs that keep face areas too (edges and volumes alone have the same moduli and cost half)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
         {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
         {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},

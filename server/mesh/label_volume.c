@@ -368,6 +368,7 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     }
     *out = (pal_label_volume){.n = {(int)h->n[0], (int)h->n[1], (int)h->n[2]}, .label = label};
     memcpy(out->to_m, h->to_m, sizeof out->to_m);
+    out->first_byte = (int64_t)h->offset;
     snprintf(out->format, sizeof out->format, "%s", h->format);
     return PAL_ERR_OK;
 }

@@ -9,10 +9,11 @@
 #include "server/mesh/surface.h"
 
 typedef struct pal_label_volume {
-    int n[3];        /* voxels, x fastest                                     */
-    double to_m[12]; /* 3x4 row-major: metres = to_m (i, j, k, 1), voxel centres */
-    int32_t *label;  /* [n2][n1][n0]; non-integer voxels are rounded          */
-    char format[16]; /* "nifti" | "inr"                                       */
+    int n[3];           /* voxels, x fastest                                     */
+    double to_m[12];    /* 3x4 row-major: metres = to_m (i, j, k, 1), voxel centres */
+    int32_t *label;     /* [n2][n1][n0]; non-integer voxels are rounded          */
+    int64_t first_byte; /* of the voxels in the file, unpacked                */
+    char format[16];    /* "nifti" | "inr"                                    */
 } pal_label_volume;
 
 pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_note *note);

@@ -86,6 +86,7 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
     pal_surface_report found = {.n_vertex_read = (int64_t)build.n_vertex, .n_tri_read = (int64_t)build.n_tri};
     if (!err) {
         snprintf(found.format, sizeof found.format, "%s", build.format);
+        snprintf(found.place, sizeof found.place, "%s %lld", build.binary ? "byte" : "line", (long long)build.first_at);
         err = finish(&build, options ? options : &plain, &s, &found, unit_m, unit_name);
     }
     if (err) {

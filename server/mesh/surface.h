@@ -20,6 +20,7 @@ typedef struct pal_surface {
 /* what reading and cleaning dropped or joined; all counts of the file's own pieces */
 typedef struct pal_surface_report {
     char format[16];                   /* "obj", "stl binary", "stl ascii", "ply", "off", "nifti", "inr"         */
+    char place[32];                    /* where the first face or voxel stands: "line 12", "byte 84"; or empty   */
     int64_t n_vertex_read, n_tri_read; /* as stored; polygons count as their triangles                           */
     int64_t n_welded;                  /* vertices joined to an earlier one                                      */
     int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */

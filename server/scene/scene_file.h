@@ -43,7 +43,8 @@ typedef struct pal_surface_scene {
     int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
     pal_material material; /* young_Pa 0: the default material                 */
     bool largest_only;     /* keep only the largest of several pieces             */
-    bool gravity; /* add the effect; a shape as scanned carries its own weight already, so the default is none */
+    bool gravity;      /* add the effect; a shape as scanned carries its own weight already, so the default is none */
+    bool area_springs; /* add the row face_area; without it edges and volumes bear its share */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
 } pal_surface_scene;
@@ -56,7 +57,8 @@ typedef struct pal_surface_scene_report {
     bool unit_guessed;     /* nobody said it: taken from the size */
     double read_s;
     int resolution;
-    int label; /* of a label volume, -1: a surface */
+    int label;   /* of a label volume, -1: a surface                */
+    int n_label; /* labels it holds beside 0, at most 64 are counted */
 } pal_surface_scene_report;
 
 /* any surface file or label volume -> default scene: material, lowest 5 % held, three tools. report may be NULL */

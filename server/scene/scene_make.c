@@ -23,7 +23,6 @@
 #include <sys/stat.h>
 
 enum { WANTED_VOXELS = 2600, WANTED_TRI = 50000, LABELS = 64 };
-static const double weld = 1e-6;         /* relative tolerance of surface files   */
 static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
 
 static void say(const pal_surface_scene *options, const char *what, double fraction)
@@ -128,27 +127,30 @@ static pal_err choose_resolution(const pal_surface *surface, bool largest_only, 
 
 /* the label asked for, or the most frequent one */
 static pal_err read_volume(const char *path, const pal_surface_scene *options, pal_surface *out,
-                           pal_surface_report *report, int *label, pal_note *note)
+                           pal_surface_scene_report *report, pal_note *note)
 {
     pal_label_volume volume;
     pal_label_count count[LABELS];
     PAL_TRY(pal_label_volume_read(path, &volume, note));
     say(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
-    pal_err err =
-        n == 0 ? pal_note_set(note, PAL_ERR_REFUSED, "%s: the volume holds no label but 0", path) : PAL_ERR_OK;
+    snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
+    pal_err err = n == 0 ? pal_note_set(note, PAL_ERR_REFUSED, "%s: %s: the volume holds no label but 0", path,
+                                        report->surface.place)
+                         : PAL_ERR_OK;
     if (!err) {
         pal_label_surface_options surface = {
             .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : WANTED_TRI};
         pal_note why = {""};
-        *label = options->label >= 0 ? options->label : count[0].label;
-        err = pal_label_volume_surface(&volume, *label, &surface, out, &why);
-        if (err) pal_note_set(note, err, "%s: %s", path, why.text);
+        report->n_label = n;
+        report->label = options->label >= 0 ? options->label : count[0].label;
+        err = pal_label_volume_surface(&volume, report->label, &surface, out, &why);
+        if (err) pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
     }
     if (!err) {
-        snprintf(report->format, sizeof report->format, "%s", volume.format);
-        report->n_vertex_read = out->n_vertex;
-        report->n_tri_read = out->n_tri;
+        snprintf(report->surface.format, sizeof report->surface.format, "%s", volume.format);
+        report->surface.n_vertex_read = out->n_vertex;
+        report->surface.n_tri_read = out->n_tri;
     }
     pal_label_volume_free(&volume);
     return err;
@@ -170,12 +172,12 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
             return pal_note_set(note, PAL_ERR_REFUSED, "%s: a scan is in mm, no other unit can be given", path);
         report->unit_m = 1e-3;
         report->unit_name = "mm";
-        err = read_volume(path, options, out, &report->surface, &report->label, note);
+        err = read_volume(path, options, out, report, note);
     } else if (options->label > 0) {
         err = pal_note_set(note, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
                            options->label);
     } else {
-        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = weld};
+        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD};
         report->unit_guessed = options->unit_m == 0;
         err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, note);
     }
@@ -196,7 +198,8 @@ static pal_err make(const char *name, const pal_surface *surface, const pal_surf
     say(options, "split and skin", 0);
     if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
     report->resolution = voxel.resolution;
-    return err ? pal_note_set(note, err, "%s: %s", name, why.text) : PAL_ERR_OK;
+    const char *place = report->surface.place;
+    return err ? pal_note_set(note, err, "%s: %s%s%s", name, place, *place ? ": " : "", why.text) : PAL_ERR_OK;
 }
 
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
@@ -234,6 +237,8 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(&scene->body[0]);
+    /* edges and volumes alone have the same moduli and cost half (README, tables) */
+    if (!options->area_springs) PAL_TRY(pal_item_put_number(&scene->body[0].model, "k_area_J", 0, note));
     for (int k = 0; k < scene->body[0].n_effect; k++)
         snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;

@@ -89,10 +89,11 @@ run prepare box.obj -o scene2 --json --resolution 12 --units mm
 check "exit code $code" code_is 0
 check "stderr is not empty" is_empty err
 check "not one JSON object" is_json out
-for key in triangles voxels tets nodes components method volume_m3 volume_error degenerate duplicate nonfinite \
+for key in triangles voxels tets nodes components method volume_m3 volume_error degenerate duplicate nonfinite folded \
     read tree fill split skin write total; do
     check "no $key" has out "\"$key\":"
 done
+check "open or not" has out '"open":false,'
 check "12 triangles" has out '"triangles":12,'
 check "one component" has out '"components":1,'
 check "units given, not guessed" has out '"units":{"name":"mm","m":0.001,"guessed":false}'
@@ -325,9 +326,15 @@ for file in h_*; do
     begin "hostile $file"
     run prepare "$file" -o hostile
     refused 1 "$file"
+    [ "$file" = h_pipe.stl ] || check "stderr names no line or byte" has err "$file: \(line\|byte\) [0-9]"
     check "a folder was made" no_such hostile
     end
 done
+
+begin "the unit of a scan cannot be given"
+run prepare h_zeros.nii.gz -o hostile --units m
+refused 1 "h_zeros.nii.gz: a scan is in mm"
+end
 
 # a file that grows a thousandfold when unpacked costs no more than its header says
 begin "a bomb of zeros is refused"

@@ -386,6 +386,31 @@ static void flat_thin_and_long_shapes_also_get_about_13000_tets(void)
     }
 }
 
+static void overlapping_shapes_also_get_about_13000_tets(void)
+{
+    /* nearly the same ball eight times: volume and area eight times too large for a first guess */
+    pal_surface ball;
+    FILE *file = fopen(in_folder("balls.obj"), "w");
+    REQUIRE(file && small_ball(&ball, 50, 20));
+    for (int copy = 0; copy < 8; copy++) {
+        for (int k = 0; k < ball.n_vertex; k++)
+            fprintf(file, "v %.9g %.9g %.9g\n", ball.x[3 * k] + 0.5 * copy, ball.x[3 * k + 1], ball.x[3 * k + 2]);
+        for (int k = 0; k < ball.n_tri; k++)
+            fprintf(file, "f %d %d %d\n", ball.tri[3 * k] - ball.n_vertex, ball.tri[3 * k + 1] - ball.n_vertex,
+                    ball.tri[3 * k + 2] - ball.n_vertex);
+    }
+    pal_surface_free(&ball);
+    fclose(file);
+    pal_surface_scene options = {.label = -1};
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""};
+    pal_err err = pal_scene_from_surface(in_folder("balls.obj"), &options, &loaded, NULL, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    CHECK_NEAR(loaded->scene.body[0].mesh->tets.n_tet, 13000, 2600);
+    pal_scene_free(loaded);
+}
+
 static void a_scene_may_name_a_surface(void)
 {
     const char *text = "{\"bodies\": [{\"surface\": \"b.obj\", \"units\": \"cm\", \"resolution\": 9}]}";
@@ -474,6 +499,7 @@ int main(void)
     RUN(a_save_that_fails_leaves_nothing);
     RUN(a_bare_surface_becomes_a_scene_of_about_13000_tets);
     RUN(flat_thin_and_long_shapes_also_get_about_13000_tets);
+    RUN(overlapping_shapes_also_get_about_13000_tets);
     RUN(a_scene_may_name_a_surface);
     RUN(what_is_no_surface_is_refused_and_names_the_file);
     RUN(the_procedural_organ_is_a_scene);
