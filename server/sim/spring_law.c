@@ -6,28 +6,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-void pal_spring_factors(double poisson, double factor[3])
+void pal_spring_factors(double poisson, bool without_area, double factor[3])
 {
     double nu = poisson < 0.26 ? 0.26 : poisson;
     double shear = 1 / (2 * (1 + nu)), bulk = 1 / (3 * (1 - 2 * nu));
-    double share = fmin(0.5, (bulk / shear - 5.0 / 3) / 10);
+    double share = without_area ? 0 : fmin(0.5, (bulk / shear - 5.0 / 3) / 10);
     factor[PAL_SPRING_DISTANCE] = (1 - share) * shear * 3 / 2;
     factor[PAL_SPRING_AREA] = share * shear * 9 / 4;
     factor[PAL_SPRING_VOLUME] = bulk - (5.0 / 3 + 5 * share) * shear;
 }
 
-static double derived_J(pal_spring_kind kind, const pal_material *material, double h_m)
+static double derived_J(const pal_spring *spring, const pal_material *material, double h_m)
 {
     double factor[3];
-    pal_spring_factors(material->poisson, factor);
-    return factor[kind] * material->young_Pa * h_m * h_m * h_m;
+    pal_spring_factors(material->poisson, spring->without_area, factor);
+    return factor[spring->kind] * material->young_Pa * h_m * h_m * h_m;
 }
 
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out)
 {
-    *out = (pal_spring){.kind = kind,
-                        .k_J = derived_J(kind, &build->def->material, build->body->h_m),
-                        .given = pal_item_has(item, "k_J")};
+    *out = (pal_spring){.kind = kind, .given = pal_item_has(item, "k_J")};
+    PAL_TRY(pal_item_bool(item, "without_area", &out->without_area, build->note));
+    out->k_J = derived_J(out, &build->def->material, build->body->h_m);
     PAL_TRY(pal_item_number(item, "k_J", 0, 1e60, &out->k_J, build->note));
     PAL_TRY(pal_item_number(item, "c_Js", 0, 1e60, &out->c_Js, build->note));
     PAL_TRY(pal_item_done(item, build->note));
@@ -39,7 +39,7 @@ pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *b
 
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material)
 {
-    if (!spring->given) spring->k_J = derived_J(spring->kind, material, body->h_m);
+    if (!spring->given) spring->k_J = derived_J(spring, material, body->h_m);
 }
 
 static double tet_volume(const pal_tets *tets, int t)

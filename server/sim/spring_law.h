@@ -7,8 +7,8 @@
  * count for the volume they have, so that thin bodies are not too stiff. Moduli of the lattice, per E, derived by
  * summing the springs of a periodic cell: shear  G = 2/3 f_d + 4/9 f_a        bulk  K = 10/9 f_d + 80/27 f_a + f_v f_a
  * takes half of the bulk modulus that edges alone lack (they have K = 5/3 G, nu = 0.25), at most half of the shear
- * modulus; f_v the rest. A Poisson ratio below 0.26 is simulated as 0.26.
- * Thread: [load], pal_spring_material [sim]. */
+ * modulus; f_v the rest. A body without area springs takes f_a = 0: the same moduli from two rows. A Poisson ratio
+ * below 0.26 is simulated as 0.26. Thread: [load], pal_spring_material [sim]. */
 #ifndef PAL_SIM_SPRING_LAW_H
 #define PAL_SIM_SPRING_LAW_H
 #include "server/sim/effect.h"
@@ -20,12 +20,13 @@ typedef enum pal_spring_kind { PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_
 typedef struct pal_spring {
     pal_spring_kind kind;
     double k_J, c_Js;
-    bool given; /* k_J stands in the scene: a material edit leaves it */
+    bool given;        /* k_J stands in the scene: a material edit leaves it          */
+    bool without_area; /* the body has no area springs: the others bear their share   */
 } pal_spring;
 
 /* the factors f_d, f_a, f_v above for a Poisson ratio; all positive */
-void pal_spring_factors(double poisson, double factor[3]);
-/* keys k_J (absent: derived), c_Js (0); no other key is allowed */
+void pal_spring_factors(double poisson, bool without_area, double factor[3]);
+/* keys k_J (absent: derived), c_Js (0), without_area (false); no other key is allowed */
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out);
 /* the weights q_i of springs between the corners item [n_item][n_corner] -> out [n_item]; MEMORY */
 pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const int32_t *item, int n_item,

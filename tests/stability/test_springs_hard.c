@@ -6,6 +6,7 @@
 #include "tests/sim/boxes.h"
 
 static pal_note note;
+static bool without_area; /* tests run with and without the row face_area */
 static uint64_t seed;
 
 static double uniform(void) /* in [0, 1) */
@@ -27,6 +28,7 @@ static bool bench_make(bench *b, bool held)
     if (box_make(4, 3, 3, 0.01, &b->box)) return false;
     b->scene = box_scene(&b->box, held, false);
     b->scene->body[0].n_effect = 0;
+    if (without_area) pal_item_put_number(&b->scene->body[0].model, "k_area_J", 0, NULL);
     return true;
 }
 
@@ -133,7 +135,9 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bound
 {
     static const char *const names[] = {"plane", "point", "mirror", "shuffle", "x 100"};
     for (int held = 0; held < 2; held++)
-        for (int kind = 0; kind < 5; kind++) {
+        /* x 100 needs the area row, which is the only one that still pulls together what volume forces fold; without
+         * it the guard has to step in, see the next test */
+        for (int kind = 0; kind < (without_area ? 4 : 5); kind++) {
             bench b;
             REQUIRE(bench_make(&b, held));
             REQUIRE(bench_start(&b));
@@ -149,6 +153,26 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bound
             if (held && (kind <= 1 || kind == 4)) CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
             bench_close(&b);
         }
+}
+
+static void blown_up_without_area_springs_the_guard_freezes_the_last_good_state(void)
+{
+    bench b;
+    REQUIRE(bench_make(&b, true));
+    pal_body_def *def = &b.scene->body[0];
+    if (!without_area) pal_item_put_number(&def->model, "k_area_J", 0, NULL);
+    pal_item_init(&def->effect[def->n_effect++], "effects[0]", "finite_guard");
+    REQUIRE(bench_start(&b));
+    REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    insult(&b, 4);
+    CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_FROZEN);
+    CHECK(b.body->frozen);
+    for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
+    pal_world_reset(b.world);
+    CHECK(!b.body->frozen);
+    CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_OK);
+    bench_close(&b);
 }
 
 static void a_meganewton_on_a_vertex_is_shortened_and_forgotten(void)
@@ -354,14 +378,19 @@ static void a_body_that_is_no_number_freezes_and_the_other_goes_on(void)
 int main(void)
 {
     RUN(a_body_that_is_no_number_freezes_and_the_other_goes_on);
-    RUN(an_inverted_corner_turns_back);
-    RUN(flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bounded);
-    RUN(a_meganewton_on_a_vertex_is_shortened_and_forgotten);
-    RUN(a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused);
-    RUN(a_material_beyond_the_budget_is_refused_and_changes_nothing);
-    RUN(any_scale_of_length_and_stiffness_gives_the_same_scaled_answer);
-    RUN(huge_drag_creeps_and_no_drag_keeps_moving);
-    RUN(constraint_damping_far_beyond_critical_stays_stable);
-    RUN(held_and_single_element_bodies_step);
+    for (int turn = 0; turn < 2; turn++) {
+        without_area = turn == 1;
+        printf("%s the row face_area\n", turn ? "without" : "with");
+        RUN(an_inverted_corner_turns_back);
+        RUN(flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bounded);
+        RUN(blown_up_without_area_springs_the_guard_freezes_the_last_good_state);
+        RUN(a_meganewton_on_a_vertex_is_shortened_and_forgotten);
+        RUN(a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused);
+        RUN(a_material_beyond_the_budget_is_refused_and_changes_nothing);
+        RUN(any_scale_of_length_and_stiffness_gives_the_same_scaled_answer);
+        RUN(huge_drag_creeps_and_no_drag_keeps_moving);
+        RUN(constraint_damping_far_beyond_critical_stays_stable);
+        RUN(held_and_single_element_bodies_step);
+    }
     return check_report();
 }
