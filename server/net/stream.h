@@ -12,8 +12,8 @@
 #include "server/session/members.h"
 #include "server/session/session.h"
 
-enum { PAL_STREAM_TIER = 3 };   /* 0: error_m; then 2 and 5 times that */
-#define PAL_STREAM_RATE_HZ 60.0 /* cycles per second at most */
+enum { PAL_STREAM_TIER = 3 };    /* 0: error_m; then 2 and 5 times that */
+#define PAL_STREAM_RATE_HZ 120.0 /* cycles per second at most */
 
 typedef struct pal_stream_part {
     pal_wire_part_info info;

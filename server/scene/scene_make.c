@@ -216,6 +216,9 @@ pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *option
 
 /* ---- scenes ---- */
 
+/* short steps: a pose waits for one on its way into the picture */
+#define LIVE_STEP_S (1.0 / 120)
+
 /* A shape that was scanned, or drawn as it lies, is in balance with its weight: pulling it down once more would count
  * gravity twice (and let 5 kPa tissue sag by a third of its height). */
 static void leave_gravity_out(pal_body_def *body)
@@ -234,6 +237,7 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     pal_scene_plain_name(name, plain);
     loaded->n_mesh = 1;
     pal_scene_default(scene);
+    scene->step_s = LIVE_STEP_S;
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(&scene->body[0]);
