@@ -224,7 +224,10 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
            1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
-    if (r->unit_guessed) printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
+    if (r->unit_guessed && !strcmp(r->unit_name, "scaled"))
+        printf(", no unit fits the size in the file: scaled to an organ's (--units says otherwise)");
+    else if (r->unit_guessed)
+        printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
     if (r->n_label > 1 && wish->scene.label < 0)
         printf(", the most frequent of %d labels (--list-labels shows them)", r->n_label);
     printf("\n%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",

@@ -303,7 +303,9 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     const char *slash = strrchr(path, '/');
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, note);
-    if (!err) err = dress(loaded, stem, options, note);
+    pal_note why = {""};
+    if (!err && (err = dress(loaded, stem, options, &why)))
+        pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
     if (err) {
         pal_scene_free(loaded);
         return err;

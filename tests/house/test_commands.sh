@@ -115,6 +115,20 @@ else
 fi
 end
 
+begin "the unit is said, guessed or not"
+scaled_by() { awk -v k="$1" '$1 == "v" { $2 *= k; $3 *= k; $4 *= k } { print }' box.obj; }
+scaled_by 1e8 >far.obj
+run prepare box.obj -o scene4 --no-tetgen
+check "no guess in the text" has out "unit mm guessed from the size"
+run prepare far.obj -o scene4 --no-tetgen
+check "no scale in the text" has out "scaled to an organ's"
+run prepare far.obj -o scene4 --no-tetgen --units m --name far
+check "a given unit is called a guess" test "$(grep -c guessed out)" -eq 0
+scaled_by 1e25 >huge.obj
+run prepare huge.obj -o scene5 --no-tetgen --units m
+refused 1 "huge.obj: line 9: tools"
+end
+
 begin "--quiet says nothing"
 run prepare box.obj -o scene3 --quiet
 check "exit code $code" code_is 0
