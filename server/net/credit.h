@@ -1,5 +1,9 @@
 /* Credit: how many cycles a client may have unacknowledged (streaming.md 2.3; protocol/README.md, "Cycles and credit"),
- * and the rate limit of what it says. Plain structs without a clock of their own. Thread: [net]. */
+ * and the rate limit of what it says. Plain structs without a clock of their own. Thread: [net].
+ *
+ * A round trip counts for K only when the cycle was sent with none before it in flight: a client slower than the
+ * cycles lets them wait, and a K taken from that wait makes it longer still, up to the clamp. So that there is always
+ * such a cycle, one is sent alone at intervals. */
 #ifndef PAL_NET_CREDIT_H
 #define PAL_NET_CREDIT_H
 #include <stdbool.h>
@@ -17,7 +21,9 @@ typedef struct pal_credit {
     uint64_t heard_ns;     /* last acknowledgement, or the first cycle sent      */
     double rtt_s;          /* smoothed; 0: none yet                              */
     double least_s[2];     /* smallest round trip of the last and this window    */
-    uint64_t window_ns;
+    uint64_t window_ns;    /* end of this window; 0: before the first            */
+    bool probing;          /* a cycle goes alone: nothing else until it is back  */
+    bool first_alone;      /* cycle[0] was sent with none before it in flight    */
 } pal_credit;
 
 void pal_credit_begin(pal_credit *credit, double rate_hz);

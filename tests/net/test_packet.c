@@ -64,6 +64,35 @@ static void credit_runs_out_and_comes_back(void)
     CHECK_INT(c.n_flight, 1);
 }
 
+/* a client on loopback that takes 16 ms for a cycle while 120 a second are made: what waits at the client is no round
+ * trip, so K stays at 1 + ceil(120 x 0.017) = 4 (a K taken from every acknowledgement runs away to 12) */
+static void credit_does_not_grow_from_its_own_queue(void)
+{
+    pal_credit c;
+    uint64_t ready[PAL_CREDIT_MOST] = {0}, busy = 0; /* when the client acknowledges what is in flight */
+    uint32_t sent[PAL_CREDIT_MOST] = {0}, cycle = 0;
+    int n = 0, most = 0, n_acknowledged = 0;
+    pal_credit_begin(&c, 120);
+    for (uint64_t now = 1 * MS; now < 60000 * MS; now += MS) {
+        for (; n > 0 && ready[0] <= now; n--, n_acknowledged++) {
+            CHECK(pal_credit_acknowledge(&c, sent[0], now));
+            memmove(ready, ready + 1, sizeof ready - sizeof *ready);
+            memmove(sent, sent + 1, sizeof sent - sizeof *sent);
+        }
+        if (c.most > most) most = c.most;
+        if (now % (8 * MS) || !pal_credit_free(&c)) continue;
+        pal_credit_sent(&c, ++cycle, now);
+        /* the first cycle waits for the asset: 400 ms */
+        busy = (now + 1 * MS > busy ? now + 1 * MS : busy) + (cycle == 1 ? 400 : 16) * MS;
+        sent[n] = cycle;
+        ready[n++] = busy;
+        REQUIRE(n < PAL_CREDIT_MOST || now < 3000 * MS);
+    }
+    CHECK_INT(most, PAL_CREDIT_MOST); /* after the asset, for a second */
+    CHECK_INT(c.most, 4);
+    CHECK(n_acknowledged > 3600); /* of the 3750 that it could take in a minute */
+}
+
 static void acknowledging_nothing_is_a_stall(void)
 {
     pal_credit c;
@@ -175,6 +204,7 @@ int main(void)
     RUN(packet_lives_as_long_as_its_last_user);
     RUN(credit_follows_the_smallest_round_trip);
     RUN(credit_runs_out_and_comes_back);
+    RUN(credit_does_not_grow_from_its_own_queue);
     RUN(acknowledging_nothing_is_a_stall);
     RUN(bucket_lets_the_rate_through_and_no_more);
     RUN(text_becomes_valid_without_control_characters);
