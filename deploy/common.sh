@@ -60,7 +60,8 @@ fetch_viewer() {
     if [ -e "$to/node_modules/three/build/three.module.js" ] && cmp -s "$from/package-lock.json" "$to/package-lock.json"; then
         return 0
     fi
+    say "getting the viewer's packages"
     mkdir -p "$to"
     cp "$from/package.json" "$from/package-lock.json" "$to/" || return 1
-    (cd "$to" && npm ci --no-audit --no-fund --loglevel=error) >"$build/npm.log" 2>&1
+    (cd "$to" && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-timeout=60000) >"$build/npm.log" 2>&1
 }
