@@ -173,17 +173,21 @@ static void relaxing_never_leaves_its_reach(void)
     for (int i = 0; i < s.n_vertex; i++) reach[i] = 2e-4;
     /* without the reach this many rounds would shrink the ball by far more */
     REQUIRE(pal_surface_relax(&s, 500, reach) == PAL_ERR_OK);
-    double worst = 0;
+    double worst = 0, farthest = 0;
     for (int i = 0; i < s.n_vertex; i++) {
-        double p[3], q[3];
+        double p[3], q[3], moved2 = 0;
         for (int a = 0; a < 3; a++) {
             p[a] = s.x[3 * i + a] + s.origin_m[a];
             q[a] = start.x[3 * i + a] + start.origin_m[a];
+            moved2 += (p[a] - q[a]) * (p[a] - q[a]);
         }
         worst = fmax(worst, fabs(ball(NULL, p) - ball(NULL, q)));
+        farthest = fmax(farthest, sqrt(moved2));
     }
     CHECK_LE(worst, 2.4e-4);
     CHECK(worst > 1.9e-4);
+    /* the reach along the normal and twice that across it */
+    CHECK_LE(farthest, sqrt(5) * 2e-4 * (1 + 1e-9));
     free(reach);
     pal_surface_free(&s);
     pal_surface_free(&start);
