@@ -27,6 +27,9 @@ const FINAL = new Map([
 
 export { BEAT_MS };
 
+/** of a close: at most 123 bytes @param {unknown} error */
+const reason = (error) => String(error).replace(/[^ -~]/g, "?").slice(0, 100);
+
 export class Link {
   /** @type {WebSocket | null} */
   socket = null;
@@ -43,6 +46,8 @@ export class Link {
   figuresAt = 0;
   /** @type {Map<number, Part>} */
   parts = new Map();
+  /** @type {Map<number, number>} epoch that was asked for last */
+  wanted = new Map();
   /** @type {Map<number, Uint8Array>} newest frame of a part whose asset is not here yet */
   kept = new Map();
   decodeUs = 0;
@@ -63,6 +68,7 @@ export class Link {
   fresh() {
     this.held = null;
     this.parts.clear();
+    this.wanted.clear();
     this.kept.clear();
     this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
     this.latency = this.rtt = this.echo = 0;
@@ -96,7 +102,7 @@ export class Link {
         this.received(event.data);
       } catch (error) {
         // a message we cannot read is the server's mistake: say so and start over
-        socket.close(4900, String(error).slice(0, 100));
+        socket.close(4900, reason(error));
       }
     };
     socket.onclose = (event) => {
@@ -168,7 +174,6 @@ export class Link {
   /** @param {any} message */
   control(message) {
     if (message.type === "hello") {
-      this.tries = 0;
       this.myTool = message.you.tool ?? -1;
       message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
       this.say("live", "live");
@@ -186,17 +191,21 @@ export class Link {
 
   /** @param {number} index @param {{epoch: number, asset: string}} info */
   async loadPart(index, info) {
-    if (this.parts.get(index)?.epoch === info.epoch) return;
+    if (this.wanted.get(index) === info.epoch) return;
+    this.wanted.set(index, info.epoch);
     const generation = this.generation;
     const address = new URL(info.asset, this.want.url.replace(/^ws/, "http")).href;
     try {
       const asset = await decodeAsset(new Uint8Array(await this.around.get(address)));
-      if (generation !== this.generation) return;
+      // answers may overtake one another: only the newest epoch's counts
+      if (generation !== this.generation || this.wanted.get(index) !== info.epoch) return;
+      // a server whose assets cannot be read is asked again ever more slowly
+      this.tries = 0;
       const n = asset.rest.length / 3;
       this.parts.set(index, { decoder: new FrameDecoder(asset), triangles: asset.triangles, epoch: info.epoch, n, spare: [] });
       this.around.post({ type: "part", part: index, rest: asset.rest.slice(), triangles: asset.triangles.slice() });
     } catch (error) {
-      if (generation === this.generation) this.socket?.close(4900, `asset: ${error}`.slice(0, 100));
+      if (generation === this.generation && this.wanted.get(index) === info.epoch) this.socket?.close(4900, reason(error));
       return;
     }
     const kept = this.kept.get(index);

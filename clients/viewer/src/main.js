@@ -1,6 +1,7 @@
 // The page: joins the worker's messages to stage, tools and panel. The socket lives in the worker; what it sends is kept
 // here and applied once per drawn picture.
 import { BodyMesh } from "./body_mesh.js";
+import { keyMap } from "./keys.js";
 import { PlanPanel } from "./plan_panel.js";
 import { Stage } from "./stage.js";
 import { ToolInput } from "./tool_input.js";
@@ -9,10 +10,13 @@ import { ToolMarks } from "./tool_marks.js";
 /** @param {string} id @returns {any} */
 const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const POSE_MS = 16; // poses while a tool moves
-const GRAB_MS = 1500; // longest wait for the server to take hold
 const HOLD_MS = 50; // and while it rests: a silent tool is let go by the server
+const GRAB_MS = 1500; // longest wait for the server to take hold
+const TOLD_MS = 4000; // how long the server's answer to a refused wish is shown
+/** timer of a notice that goes by itself, 0: none */
+let told = 0;
 
-const stage = new Stage(byId("view"));
+const stage = makeStage();
 const marks = new ToolMarks(stage, byId("labels"));
 const panel = new PlanPanel(document);
 const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
@@ -90,10 +94,35 @@ function showState(word, text) {
   byId("state-text").textContent = text;
 }
 
-/** @param {string} text empty hides it */
-function notice(text) {
-  byId("notice").textContent = text;
+/** @param {string} text empty hides it @param {number} ms goes by itself after this, 0: stays */
+function notice(text, ms = 0) {
+  clearTimeout(told);
+  told = ms ? window.setTimeout(() => notice(""), ms) : 0;
+  // written anew only when it changes: it is read aloud each time
+  if (byId("notice").textContent !== text) byId("notice").textContent = text;
   byId("notice").hidden = !text;
+}
+
+/** @returns {Stage} */
+function makeStage() {
+  try {
+    return new Stage(byId("view"));
+  } catch (error) {
+    showState("refused", "cannot draw");
+    notice("This browser gives the page no WebGL 2, so the organ cannot be drawn.");
+    throw error;
+  }
+}
+
+/** parts beyond the session's are gone @param {number} n */
+function keepParts(n) {
+  for (const [part, body] of state.bodies) {
+    if (part < n) continue;
+    body.dispose();
+    state.bodies.delete(part);
+    state.frames.delete(part);
+  }
+  stage.dirty = true;
 }
 
 function showTitle() {
@@ -115,7 +144,8 @@ function showTool() {
 /** @type {Record<string, (m: any) => void>} */
 const control = {
   hello(m) {
-    const again = state.hello && state.hello.session === m.session;
+    const place = (/** @type {any} */ h) => [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
+    const again = place(state.hello) === place(m);
     state.hello = m;
     state.me = m.you.id;
     state.myTool = m.you.tool ?? -1;
@@ -123,16 +153,21 @@ const control = {
     state.colourTop = stage.size / 15;
     byId("scale-top").textContent = (1000 * state.colourTop).toFixed(0) + " mm";
     input.radius = m.tools[Math.max(0, state.myTool)]?.radius_m ?? 0.02 * stage.size;
+    keepParts(m.parts.length);
     panel.plan(m.rows);
     showTitle();
     showTool();
+  },
+  topology(m) {
+    keepParts(m.parts.length);
   },
   status(m) {
     state.status = m;
     byId("pause").textContent = m.paused ? "Go on" : "Pause";
     byId("pause").setAttribute("aria-pressed", String(m.paused));
     byId("step").hidden = !m.paused;
-    notice(m.frozen ? "The body diverged and was frozen. Reset brings it back." : "");
+    if (m.frozen) notice("The body diverged and was frozen. Reset brings it back.");
+    else if (!told) notice("");
     const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
     showState(m.frozen ? "lost" : "live", slow);
     if (!byId("panel").hidden) panel.status(m, state.here);
@@ -149,8 +184,7 @@ const control = {
   },
   error(m) {
     if (m.code === "tool_taken") return;
-    notice(m.text);
-    setTimeout(() => notice(""), 4000);
+    notice(m.text, TOLD_MS);
   },
 };
 
@@ -159,8 +193,11 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
     case "state":
       showState(data.state, data.text);
       if (data.state !== "live") {
+        // nobody's tools are known until the server speaks again
         input.letGo();
         input.enabled = false;
+        state.tools = [];
+        stage.dirty = true;
       }
       break;
     case "control":
@@ -204,6 +241,7 @@ function picture() {
   requestAnimationFrame(picture);
   input.tick();
   sendPose(false);
+  let fresh = false;
   for (const [part, frame] of state.frames) {
     const body = state.bodies.get(part);
     if (!body || body.rest.length !== frame.positions.length) continue;
@@ -211,8 +249,9 @@ function picture() {
     worker.postMessage({ type: "reuse", part, ...old }, [old.positions.buffer, old.normals.buffer]);
     state.frames.delete(part);
     stage.dirty = true;
-    state.drawn++;
+    fresh = true;
   }
+  if (fresh) state.drawn++;
   if (stage.dirty) {
     marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
     stage.draw();
@@ -230,8 +269,11 @@ function picture() {
 /** @param {"pull" | "press"} mode */
 function setMode(mode) {
   input.mode = mode;
-  byId("mode-pull").setAttribute("aria-checked", String(mode === "pull"));
-  byId("mode-press").setAttribute("aria-checked", String(mode === "press"));
+  for (const name of ["pull", "press"]) {
+    const button = byId("mode-" + name);
+    button.setAttribute("aria-checked", String(mode === name));
+    button.tabIndex = mode === name ? 0 : -1;
+  }
 }
 
 /** @param {string} verb */
@@ -244,6 +286,14 @@ const togglePanel = () => {
 };
 byId("mode-pull").onclick = () => setMode("pull");
 byId("mode-press").onclick = () => setMode("press");
+// within a radio group the arrow keys choose
+byId("modes").addEventListener("keydown", (/** @type {KeyboardEvent} */ e) => {
+  if (!e.key.startsWith("Arrow")) return;
+  e.preventDefault();
+  e.stopPropagation();
+  setMode(input.mode === "pull" ? "press" : "pull");
+  byId("mode-" + input.mode).focus();
+});
 byId("pause").onclick = togglePause;
 byId("step").onclick = () => command("step");
 byId("reset").onclick = () => command("reset");
@@ -257,11 +307,9 @@ byId("wireframe").onchange = () => {
   for (const body of state.bodies.values()) body.wireframe(byId("wireframe").checked);
   stage.dirty = true;
 };
-/** @type {Record<string, () => void>} */
-const keys = { "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel };
+const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel }, stage);
 window.addEventListener("keydown", (e) => {
-  if (e.target instanceof HTMLInputElement || e.ctrlKey || e.metaKey || e.altKey) return;
-  const action = keys[e.key.toLowerCase()];
+  const action = actionOf(e);
   if (action) {
     e.preventDefault();
     action();

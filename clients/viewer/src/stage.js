@@ -23,6 +23,10 @@ function makeStudio(renderer) {
   const generator = new THREE.PMREMGenerator(renderer);
   const texture = generator.fromScene(studio, 0.035).texture;
   generator.dispose();
+  for (const { geometry, material } of /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.Material>[]} */ (studio.children)) {
+    geometry.dispose();
+    material.dispose();
+  }
   return texture;
 }
 
@@ -49,9 +53,17 @@ export class Stage {
     this.scene.environment = makeStudio(this.renderer);
     this.scene.environmentIntensity = 0.8;
     this.dirty = true;
-    this.pixelRatio = Math.min(window.devicePixelRatio || 1, 2);
+    this.sharpness = 1; // of the screen's pixels; less where drawing is slow
     this.slowFrames = 0;
     new ResizeObserver(() => this.resize()).observe(canvas);
+    // a window that moves to a screen of other pixels keeps its size
+    window.addEventListener("resize", () => this.resize());
+    // three.js brings back what it was given; what was drawn into a texture is lost with the context
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.scene.environment?.dispose();
+      this.scene.environment = makeStudio(this.renderer);
+      this.dirty = true;
+    });
     this.resize();
   }
 
@@ -72,9 +84,13 @@ export class Stage {
     this.dirty = true;
   }
 
+  pixelRatio() {
+    return Math.max(0.75, this.sharpness * Math.min(window.devicePixelRatio || 1, 2));
+  }
+
   resize() {
     const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1;
-    this.renderer.setPixelRatio(this.pixelRatio);
+    this.renderer.setPixelRatio(this.pixelRatio());
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -144,8 +160,8 @@ export class Stage {
     const begin = performance.now();
     this.renderer.render(this.scene, this.camera);
     this.slowFrames = performance.now() - begin > 30 ? this.slowFrames + 1 : 0;
-    if (this.slowFrames > 20 && this.pixelRatio > 0.75) {
-      this.pixelRatio = Math.max(0.75, this.pixelRatio / 1.5);
+    if (this.slowFrames > 20 && this.pixelRatio() > 0.75) {
+      this.sharpness /= 1.5;
       this.slowFrames = 0;
       this.resize();
     }

@@ -32,6 +32,7 @@ export class ToolInput {
     c.addEventListener("pointermove", (e) => this.move(e));
     c.addEventListener("pointerup", (e) => this.up(e));
     c.addEventListener("pointercancel", (e) => this.up(e));
+    c.addEventListener("lostpointercapture", (e) => this.up(e));
     c.addEventListener("contextmenu", (e) => e.preventDefault());
     c.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     c.addEventListener("dblclick", (e) => {

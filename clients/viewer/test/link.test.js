@@ -172,6 +172,38 @@ test("reconnects with growing pauses after a lost connection", () => {
   assert.equal(s.of("state").at(-1).state, "connecting");
 });
 
+test("a server whose asset cannot be read is asked again ever more slowly", async () => {
+  const s = stand();
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+  const pauses = [];
+  for (let i = 0; i < 4; i++) {
+    s.sockets[i].accept();
+    s.sockets[i].say(HELLO);
+    s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
+    await turn();
+    assert.equal(s.sockets[i].closed, 4900);
+    s.waiting.length = 0;
+    /** @type {any} */ (s.sockets[i]).onclose({ code: 4900, reason: "" });
+    pauses.push(s.waiting[0].ms);
+    s.waiting[0].call();
+  }
+  assert.deepEqual(pauses, [500, 1000, 2000, 4000]);
+});
+
+test("an asset that arrives after a newer one was asked for is not shown", async () => {
+  const { s, part } = await joined();
+  const first = s.giveAsset, epoch = s.link.wanted.get(part);
+  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch: epoch + 1, asset: "/asset/cd" })) });
+  const second = s.giveAsset;
+  second(load("asset.bin").buffer);
+  await turn();
+  first(load("asset.bin").buffer);
+  await turn();
+  await turn();
+  assert.equal(s.link.parts.get(part).epoch, epoch + 1);
+  assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
+});
+
 test("says why and stays away after a refusal", () => {
   const s = stand();
   s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
