@@ -1,6 +1,8 @@
 # Shared by run.sh and test.sh: where things are, what is missing, how to build. Sourced, not run.
 tree=$(cd "$(dirname "$0")/.." && pwd) || exit 1
 build=${PALPATE_BUILD:-$tree/build}
+tests=${PALPATE_TESTS:-OFF}
+unset PALPATE_BUILD PALPATE_TESTS # the server takes PALPATE_* for its configuration
 
 say() { echo "palpate: $*" >&2; }
 fail() {

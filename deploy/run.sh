@@ -26,7 +26,7 @@ esac
 install_missing run || fail "could not install: $(missing run | tr '\n' ' ')- see $build/install.log"
 fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
 say "building (the first time takes a minute)"
-build_release -D PAL_BUILD_TESTS="${PALPATE_TESTS:-OFF}"
+build_release -D PAL_BUILD_TESTS="$tests"
 palpate=$build/release/bin/palpate
 
 # the scan: a labelled abdominal CT that a Debian package carries (CC0-1.0)

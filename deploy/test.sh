@@ -60,8 +60,8 @@ say "building release"
 build_release -D PAL_BUILD_TESTS=ON
 tests_of release -j 2
 step "sources are formatted" sh "$tree/tests/house/check_format.sh" "$tree"
-step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types
-step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test
+step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types "$build"
+step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test "$build"
 if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"

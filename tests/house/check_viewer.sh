@@ -1,9 +1,9 @@
 #!/bin/sh
 # The viewer's checks: `types` runs tsc over the JSDoc types, `test` runs node --test. Packages come from the lock file
-# into the build folder (deploy/common.sh). usage: check_viewer.sh types|test
+# into the build folder (deploy/common.sh). usage: check_viewer.sh types|test [BUILD]
 set -u
 tree=$(cd "$(dirname "$0")/../.." && pwd)
-build=${PALPATE_BUILD:-$tree/build}
+build=${2:-$tree/build}
 packages=$build/viewer_packages
 case ${1-} in
 types)
@@ -21,7 +21,7 @@ JSON
     ;;
 test) cd "$tree/clients/viewer" && exec node --test test/ ;;
 *)
-    echo "usage: check_viewer.sh types|test" >&2
+    echo "usage: check_viewer.sh types|test [BUILD]" >&2
     exit 2
     ;;
 esac
