@@ -45,11 +45,11 @@ tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its te
     failed=$((failed + n_fail))
     say "$preset: $n_pass passed, $n_fail failed"
 }
-build_preset() { # PRESET [cmake options]
-    preset=$1
-    shift
+build_preset() { # PRESET TARGET [cmake options]
+    preset=$1 target=$2
+    shift 2
     cmake -S "$tree" -B "$build/$preset" -G Ninja -D PAL_PRESET="$preset" "$@" >"$build/build_$preset.log" 2>&1 &&
-        cmake --build "$build/$preset" >>"$build/build_$preset.log" 2>&1 && return 0
+        cmake --build "$build/$preset" --target "$target" >>"$build/build_$preset.log" 2>&1 && return 0
     tail -n 40 "$build/build_$preset.log"
     say "FAIL  build of $preset"
     failed=$((failed + 1))
@@ -66,11 +66,11 @@ if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
-    build_preset asan && tests_of asan -j 2 -LE "accuracy|bench"
+    build_preset asan all && tests_of asan -j 2 -LE "accuracy|bench"
     say "building with thread sanitizer"
-    build_preset tsan && tests_of tsan -j 2 -R '^(base|session|net|clients)/'
+    build_preset tsan all && tests_of tsan -j 2 -R '^(base|session|net|clients)/'
     say "building fuzzers"
-    if build_preset fuzz -D CMAKE_C_COMPILER=clang; then
+    if build_preset fuzz fuzzers -D CMAKE_C_COMPILER=clang; then
         for fuzzer in "$build"/fuzz/tests/fuzz/fuzz_*; do
             [ -x "$fuzzer" ] && [ -f "$fuzzer" ] || continue
             thing=$(basename "$fuzzer" | sed 's/^fuzz_//')
