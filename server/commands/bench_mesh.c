@@ -5,6 +5,7 @@
 #include "server/commands/commands.h"
 
 #include "server/base/clock.h"
+#include "server/commands/median.h"
 #include "server/mesh/mesh_file.h"
 #include "server/mesh/voxels.h"
 
@@ -82,18 +83,6 @@ static void forget_peak(void)
     fclose(file);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double s = *(const double *)a, t = *(const double *)b;
-    return s < t ? -1 : s > t;
-}
-
-static double median(double *value, int n)
-{
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
-    return value[n / 2];
-}
-
 static pal_err run_case(const pal_surface *surface, int resolution, result *out, pal_note *note)
 {
     double fill[N_RUN], split[N_RUN], total[N_RUN];
@@ -117,9 +106,9 @@ static pal_err run_case(const pal_surface *surface, int resolution, result *out,
         memcpy(out->method, report.method, sizeof out->method);
         pal_tets_free(&tets);
     }
-    out->fill_ms = median(fill, N_RUN);
-    out->split_ms = median(split, N_RUN);
-    out->total_ms = median(total, N_RUN);
+    out->fill_ms = pal_median(fill, N_RUN);
+    out->split_ms = pal_median(split, N_RUN);
+    out->total_ms = pal_median(total, N_RUN);
     return PAL_ERR_OK;
 }
 

@@ -6,6 +6,7 @@
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
 #include "server/commands/commands.h"
+#include "server/commands/median.h"
 #include "server/commands/report.h"
 
 #include <math.h>
@@ -45,18 +46,6 @@ static double thread_s(void)
     struct timespec t;
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *v, int n)
-{
-    qsort(v, (size_t)n, sizeof *v, compare);
-    return v[n / 2];
 }
 
 /* vertex at a point of the cube's lattice, pushed out to a bumpy sphere */
@@ -172,8 +161,8 @@ static int measure_motion(bench *b, int motion)
         }
     }
     for (int e = 0; e < BOUNDS; e++) {
-        b->encode_s[motion][e] = median(encode[e], FRAMES);
-        b->decode_s[motion][e] = median(decode[e], FRAMES);
+        b->encode_s[motion][e] = pal_median(encode[e], FRAMES);
+        b->decode_s[motion][e] = pal_median(decode[e], FRAMES);
         if (b->error_m[motion][e] > bound_m[e]) return PAL_REFUSAL_RANGE;
     }
     return 0;

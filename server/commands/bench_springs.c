@@ -8,6 +8,7 @@
 #include "server/commands/commands.h"
 
 #include "server/base/clock.h"
+#include "server/commands/median.h"
 #include "server/mesh/organ.h"
 #include "server/sim/world.h"
 
@@ -24,18 +25,6 @@ typedef struct result {
     double step_ms, row_ms[3], solve_ms, skin_ms; /* a sub-step; its three spring rows; verlet; a frame */
     double limit_ms, flop, byte;
 } result;
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double s = *(const double *)a, t = *(const double *)b;
-    return s < t ? -1 : s > t;
-}
-
-static double median(double *value, int n)
-{
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
-    return value[n / 2];
-}
 
 /* GB/s of a = b + s c, far beyond the caches */
 static double measure_triad(void)
@@ -163,9 +152,9 @@ static pal_err run_world(const pal_scene *scene, result *out, pal_note *note)
     }
     pal_world_destroy(world);
     if (err) return pal_note_set(note, err, "the step failed: %s", pal_err_text(err));
-    out->step_ms = median(step, N_STEP), out->solve_ms = median(solve, N_STEP);
-    out->skin_ms = 1e-6 * median(skin, N_STEP);
-    for (int k = 0; k < 3; k++) out->row_ms[k] = median(row[k], N_STEP);
+    out->step_ms = pal_median(step, N_STEP), out->solve_ms = pal_median(solve, N_STEP);
+    out->skin_ms = 1e-6 * pal_median(skin, N_STEP);
+    for (int k = 0; k < 3; k++) out->row_ms[k] = pal_median(row[k], N_STEP);
     return PAL_ERR_OK;
 }
 

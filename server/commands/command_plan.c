@@ -2,6 +2,7 @@
  * at rest, or as many as fit into two seconds. */
 #include "server/base/clock.h"
 #include "server/commands/commands.h"
+#include "server/commands/median.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
 #include "server/sim/effect.h"
@@ -16,20 +17,8 @@ enum { STEPS = 60, MOST_S = 2 };
 
 typedef struct cost {
     int n_step;
-    uint64_t row_ns[PAL_FRAME_ROWS][STEPS], step_ns[STEPS];
+    double row_ms[PAL_FRAME_ROWS][STEPS], step_ms[STEPS];
 } cost;
-
-static int by_size(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-static double median_ms(uint64_t *ns, int n)
-{
-    qsort(ns, (size_t)n, sizeof *ns, by_size);
-    return n ? 1e-6 * (double)ns[n / 2] : 0;
-}
 
 static pal_err measure(pal_world *world, double step_s, cost *out)
 {
@@ -38,11 +27,11 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
     for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MOST_S); k++, out->n_step++) {
         uint64_t before = pal_clock_thread_ns();
         PAL_TRY(pal_world_step(world, step_s));
-        out->step_ns[k] = pal_clock_thread_ns() - before;
+        out->step_ms[k] = 1e-6 * (double)(pal_clock_thread_ns() - before);
         for (int r = 0; r < n_row && r < PAL_FRAME_ROWS; r++) {
             pal_row_info row;
             pal_world_row(world, r, &row);
-            out->row_ns[r][k] = row.spent_ns;
+            out->row_ms[r][k] = 1e-6 * (double)row.spent_ns;
         }
     }
     return PAL_ERR_OK;
@@ -51,7 +40,7 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
 static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
 {
     cJSON *o = cJSON_CreateObject();
-    double step_ms = median_ms(c->step_ns, c->n_step);
+    double step_ms = pal_median(c->step_ms, c->n_step);
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddStringToObject(o, "name", scene->name);
     cJSON_AddNumberToObject(o, "step_s", scene->step_s);
@@ -80,7 +69,7 @@ static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
         cJSON_AddStringToObject(entry, "body", row.body);
         cJSON_AddStringToObject(entry, "stage", row.stage);
         cJSON_AddNumberToObject(entry, "bytes", (double)row.n_byte);
-        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_ROWS ? median_ms(c->row_ns[r], c->n_step) : 0);
+        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0);
     }
     return o;
 }
@@ -95,9 +84,9 @@ static void print(const pal_scene *scene, const pal_world *world, cost *c)
         pal_row_info row;
         pal_world_row(world, r, &row);
         printf("%-9s %-16s %-16s %10.1f %10.4f\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
-               r < PAL_FRAME_ROWS ? median_ms(c->row_ns[r], c->n_step) : 0);
+               r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0);
     }
-    double step_ms = median_ms(c->step_ns, c->n_step), limit_s = pal_world_limit_s(world);
+    double step_ms = pal_median(c->step_ms, c->n_step), limit_s = pal_world_limit_s(world);
     printf("\na step of %.3f ms in %d sub-step%s", 1e3 * scene->step_s, pal_world_substeps(world),
            pal_world_substeps(world) == 1 ? "" : "s");
     if (isfinite(limit_s)) printf(" (stable up to %.3f ms each)", 1e3 * limit_s);

@@ -208,7 +208,7 @@ static void become_lcm(const serve_run *run, const lcm_child *child)
     signal(SIGPIPE, SIG_DFL);
     /* stdout is the parent's announcement; sockets are not his */
     dup2(STDERR_FILENO, STDOUT_FILENO);
-    for (int fd = 3; fd < 1024; fd++) close(fd);
+    close_range(3, ~0u, 0);
     execv(run->lcm_program, argv);
     _exit(127);
 }
