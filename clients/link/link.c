@@ -342,12 +342,12 @@ static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, 
         link->n_in = 0;
         link->in_drop = false;
     }
-    const size_t rest = n_byte + lws_remaining_packet_payload(wsi);
-    if (!link->in_drop && link->n_in + rest > link->in_cap) {
-        const size_t wanted = link->n_in + rest;
-        uint8_t *grown = wanted <= LINK_MESSAGE_MAX ? realloc(link->in, wanted) : NULL;
+    const size_t wanted = link->n_in + n_byte;
+    if (!link->in_drop && wanted > link->in_cap) {
+        const size_t cap = wanted > 2 * link->in_cap ? wanted : 2 * link->in_cap;
+        uint8_t *grown = wanted <= LINK_MESSAGE_MAX ? realloc(link->in, cap) : NULL;
         link->in_drop = grown == NULL;
-        if (grown) link->in = grown, link->in_cap = wanted;
+        if (grown) link->in = grown, link->in_cap = cap;
     }
     if (!link->in_drop) {
         memcpy(link->in + link->n_in, bytes, n_byte);
