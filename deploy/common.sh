@@ -29,21 +29,28 @@ missing() { # WHO...: packages that are not there
     return 0
 }
 
-install_missing() { # WHO...: installs, or says in one line what to do
+install_missing() { # WHO...: installs; when that cannot be done, says why in one line and returns 1
     list=$(missing "$@" | tr '\n' ' ')
     [ -z "$list" ] && return 0
-    command -v apt-get >/dev/null 2>&1 || fail "missing: ${list}- install them with your system's package manager (this script knows apt-get)"
-    say "installing: $list"
-    as_root=
-    if [ "$(id -u)" -ne 0 ]; then
-        command -v sudo >/dev/null 2>&1 || fail "missing: ${list}- run as root: apt-get install $list"
-        as_root=sudo
-    fi
-    mkdir -p "$build"
-    if ! { $as_root apt-get update -q && $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $list; } >"$build/install.log" 2>&1; then
+    if ! command -v apt-get >/dev/null 2>&1; then
+        say "missing: ${list}- install them with your system's package manager (this script knows apt-get)"
         return 1
     fi
-    [ -z "$(missing "$@")" ]
+    as_root=
+    if [ "$(id -u)" -ne 0 ]; then
+        if ! command -v sudo >/dev/null 2>&1; then
+            say "missing: ${list}- run as root: apt-get install $list"
+            return 1
+        fi
+        as_root=sudo
+    fi
+    say "installing: $list"
+    mkdir -p "$build"
+    if ! { $as_root apt-get update -q && $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $list; } >"$build/install.log" 2>&1 ||
+        [ -n "$(missing "$@")" ]; then
+        say "could not install: $(missing "$@" | tr '\n' ' ')- see $build/install.log"
+        return 1
+    fi
 }
 
 build_release() { # [cmake options]: quiet unless it fails

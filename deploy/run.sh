@@ -23,7 +23,7 @@ case ${1-} in
     ;;
 esac
 
-install_missing run || fail "could not install: $(missing run | tr '\n' ' ')- see $build/install.log"
+install_missing run || exit 1
 fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
 say "building (the first time takes a minute)"
 build_release -D PAL_BUILD_TESTS="$tests"
@@ -34,7 +34,7 @@ find_scan() {
     scan=$build/scan/data/images/liver.inr.gz
     [ -e "$scan" ] && return 0
     mkdir -p "$build/scan"
-    install_missing scan || say "libcgal-demo could not be installed"
+    install_missing scan
     archive=/usr/share/doc/libcgal-dev/data.tar.gz
     if [ ! -e "$archive" ]; then # slim systems leave documentation out: unpack the package itself
         (cd "$build/scan" && apt-get download -q libcgal-demo && dpkg-deb -x libcgal-demo_*.deb .) >>"$build/install.log" 2>&1
