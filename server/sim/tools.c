@@ -39,6 +39,7 @@ void pal_tool_take(pal_tool *tool, const pal_pose *pose)
     }
     tool->present = pose != NULL;
     tool->grab = tool->present && (tool->next.buttons & 1);
+    tool->gripping = tool->holding;
     tool->touching = tool->holding = false;
     tool->n_patch = 0;
     tool->has_grip = false;

@@ -44,6 +44,7 @@ typedef struct pal_tool {
     bool grab;              /* bit 0 of next.buttons while present                                          */
     double force_N[3];      /* on the tool, this sub-step; CONTACT rows add                                 */
     double mean_force_N[3]; /* mean over the step's sub-steps                                               */
+    bool gripping;          /* held tissue in the step before: what it holds it does not push as well */
     bool touching, holding; /* pressed tissue, grabbed tissue in this step                                  */
     int n_patch;
     pal_patch patch[PAL_PATCH_MAX]; /* written by CONTACT rows in the last sub-step                           */

@@ -92,6 +92,27 @@ static void lets_go_when_the_button_goes_up(void)
     tool_scene_close(&s);
 }
 
+/* the ball of a tool that holds stays inside the tissue it holds: no push may work against the grip */
+static void a_tool_that_holds_does_not_push_as_well(void)
+{
+    tool_scene s;
+    REQUIRE(grab_ball(&s, 1, true, 15));
+    move_tool(&s, 0, 0, 0, 0.052, false);
+    REQUIRE(step_world(&s, 12));
+    move_tool(&s, 0, 0, 0, 0.052, true);
+    REQUIRE(step_world(&s, 2));
+    for (int i = 1; i <= 40; i++) {
+        move_tool(&s, 0, 0.0003 * i, 0, 0.052, true);
+        REQUIRE(step_world(&s, 1));
+        CHECK(tool_of(&s, 0)->holding && !tool_of(&s, 0)->touching);
+    }
+    /* let go, it pushes again */
+    move_tool(&s, 0, 0, 0, 0.044, false);
+    REQUIRE(step_world(&s, 20));
+    CHECK(!tool_of(&s, 0)->holding && tool_of(&s, 0)->touching);
+    tool_scene_close(&s);
+}
+
 static void fades_when_its_holder_is_gone(void)
 {
     tool_scene s;
@@ -193,6 +214,7 @@ int main(void)
     RUN(begins_without_a_jump_and_pulls_tissue_along);
     RUN(moves_a_free_body_as_a_mass_on_a_spring);
     RUN(lets_go_when_the_button_goes_up);
+    RUN(a_tool_that_holds_does_not_push_as_well);
     RUN(fades_when_its_holder_is_gone);
     RUN(takes_nothing_out_of_reach_and_the_nearest_just_beyond);
     RUN(never_exceeds_its_cap);

@@ -10,6 +10,7 @@
  * the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the tool's cap, and in its
  * first and last 10 steps by its ramp. The opposite force acts on the tool.
  *
+ * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
@@ -168,7 +169,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     double next[3], step_s = step->dt_s * step->n_sub;
     h->n_list = 0;
     h->nearest_m = INFINITY;
-    if (!tool->present && tool->ramp <= 0) {
+    if ((!tool->present && tool->ramp <= 0) || tool->gripping) {
         h->active = false;
         pal_patches_reset(&h->patches, push->body_index * 1024);
         return;
