@@ -50,9 +50,10 @@ stale() { [ ! -e "$1" ] || [ "$palpate" -nt "$1" ]; }
 if [ -z "$input" ]; then
     input=$build/scene/liver/scene.json
     if stale "$input"; then
+        # the patient lay on the back: up is -y, and the organ is held where it grows on, at the back
         if find_scan; then
             say "preparing the liver of an abdominal CT"
-            "$palpate" prepare "$scan" --label 255 --name liver --title "Liver, from an abdominal CT" \
+            "$palpate" prepare "$scan" --label 255 --name liver --up -y --hold 12 --title "Liver, from an abdominal CT" \
                 --source "labelled CT of the Debian package libcgal-demo, CC0-1.0" -o "$build/scene/liver" \
                 --quiet || fail "the scene could not be prepared"
         else

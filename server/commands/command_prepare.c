@@ -2,6 +2,7 @@
  * written into a hidden folder inside DIR first and then moved, scene.json last, so that DIR never holds half a scene.
  */
 #include "server/base/clock.h"
+#include "server/base/vec3.h"
 #include "server/commands/commands.h"
 #include "server/commands/report.h"
 #include "server/mesh/label_volume.h"
@@ -29,7 +30,7 @@ static const char about[] =
 
 typedef struct wishes {
     pal_surface_scene scene;
-    const char *folder, *units, *name, *title, *source;
+    const char *folder, *units, *up, *name, *title, *source;
     bool procedural, list_labels, tetgen, no_tetgen;
 } wishes;
 
@@ -282,10 +283,22 @@ static int run(pal_flag_common *common, const char *in, wishes *wish)
     return code;
 }
 
+/* "-y" -> (0, -1, 0) */
+static bool read_axis(const char *word, double axis[3])
+{
+    double sign = word[0] == '-' ? -1 : 1;
+    word += word[0] == '-';
+    if (strlen(word) != 1 || word[0] < 'x' || word[0] > 'z') return false;
+    pal_set3(axis, 0, 0, 0);
+    axis[word[0] - 'x'] = sign;
+    return true;
+}
+
 int command_prepare(int argc, char **argv)
 {
     wishes wish = {.scene = {.label = -1, .material = {5000, 0.45, 1000, 4}}};
     pal_material *m = &wish.scene.material;
+    double hold = 5;
     const pal_flag flag[] = {
         {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
         {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
@@ -303,6 +316,8 @@ int command_prepare(int argc, char **argv)
         {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.5, "its Poisson ratio (0.45)"},
         {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},
         {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
+        {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
+        {"--hold", "PERCENT", PAL_FLAG_NUMBER, &hold, 0.1, 100, "lowest part of the height that is held in place (5)"},
         {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
          "let it hang (a scanned shape carries its weight already)"},
         {"--area-springs", NULL, PAL_FLAG_SWITCH, &wish.scene.area_springs, 0, 0,
@@ -327,6 +342,8 @@ int command_prepare(int argc, char **argv)
     if (wish.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
     if (!wish.folder || !*wish.folder) return usage(&common, "needs -o DIR");
     if (wish.tetgen && wish.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
+    if (wish.up && !read_axis(wish.up, wish.scene.up)) return usage(&common, "--up: is not x, y, z, -x, -y or -z");
+    wish.scene.hold = hold / 100;
     if (wish.units && !(wish.scene.unit_m = pal_mesh_unit_named(wish.units)))
         return usage(&common, "--units: is not m, cm, mm, um or in");
     return run(&common, in[0], &wish);

@@ -247,6 +247,8 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
         snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;
     scene->n_body = 1;
+    if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
+    if (options->hold > 0) scene->body[0].support[0].fraction = options->hold;
     pal_tools_default(scene, 3);
     double low[3], high[3];
     pal_surface_box(&loaded->mesh[0].surface, low, high);

@@ -32,7 +32,7 @@ export function prepare() {
   const folder = join(scratch, "organ"), size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
   if (existsSync(SCAN)) {
     execFileSync("tar", ["-xzf", SCAN, "-C", scratch, LIVER]);
-    execFileSync(palpate, ["prepare", join(scratch, LIVER), "--label", "255", "--title", "Liver, from an abdominal CT", ...size]);
+    execFileSync(palpate, ["prepare", join(scratch, LIVER), "--label", "255", "--up", "-y", "--hold", "12", "--title", "Liver, from an abdominal CT", ...size]);
   } else {
     console.log("     the scan is not there: our own organ serves");
     execFileSync(palpate, ["prepare", "--procedural", ...size]);

@@ -474,10 +474,14 @@ static bool has_effect(const pal_body_def *body, const char *name)
 static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
 {
     for (int asked = 0; asked < 2; asked++) {
-        pal_surface_scene options = {.target_tri = 2000, .resolution = 8, .gravity = asked};
+        pal_surface_scene options = {
+            .target_tri = 2000, .resolution = 8, .gravity = asked, .up = {0, -asked, 0}, .hold = 0.12 * asked};
         pal_loaded_scene *loaded = NULL;
         REQUIRE(!pal_scene_procedural(&options, &loaded, NULL, NULL));
         CHECK_INT(has_effect(&loaded->scene.body[0], "gravity"), asked);
+        CHECK_NEAR(loaded->scene.up[1], -asked, 0);
+        CHECK_NEAR(loaded->scene.up[2], !asked, 0);
+        CHECK_NEAR(loaded->scene.body[0].support[0].fraction, asked ? 0.12 : 0.05, 1e-12);
         CHECK(has_effect(&loaded->scene.body[0], "tool_push") && has_effect(&loaded->scene.body[0], "tool_grab"));
         pal_scene_free(loaded);
     }
