@@ -64,11 +64,12 @@ step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types "$build"
 step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test "$build"
 if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
+    step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
     build_preset asan all && tests_of asan -j 2 -LE "accuracy|bench"
     say "building with thread sanitizer"
-    build_preset tsan all && tests_of tsan -j 2 -R '^(base|session|net|clients)/'
+    build_preset tsan all && tests_of tsan -j 2 -R '^(base|num|session|net|clients)/'
     say "building fuzzers"
     if build_preset fuzz fuzzers -D CMAKE_C_COMPILER=clang; then
         for fuzzer in "$build"/fuzz/tests/fuzz/fuzz_*; do

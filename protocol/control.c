@@ -53,6 +53,8 @@ static const field part_fields[] = {
     {"n_triangle", U32, true, AT(pal_wire_part_info, n_triangle), 0, 0, 0, NULL},
     {"asset", TEXT, true, AT(pal_wire_part_info, asset), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
     {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
+    {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
+     PAL_WIRE_FIELDS_MAX, NULL},
     END};
 static const field tool_fields[] = {{"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
                                     {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
@@ -95,6 +97,8 @@ static const field status_fields[] = {
     {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
     {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
     {"row_ms", NUMBERS, true, AT(pal_wire_status, row_ms), 0, AT(pal_wire_status, n_row), PAL_WIRE_ROW_MAX, NULL},
+    {"rows", TEXTS, false, AT(pal_wire_status, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_status, n_row_name),
+     PAL_WIRE_ROW_MAX, NULL},
     {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
     {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
     {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
@@ -126,6 +130,9 @@ static const field command_fields[] = {
     END};
 static const field take_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, END};
 static const field leave_fields[] = {END};
+static const field view_fields[] = {{"part", U32, true, AT(pal_wire_view, part), 0, 0, 0, NULL},
+                                    {"field", TEXT, true, AT(pal_wire_view, field), PAL_WIRE_FIELD_BYTES, 0, 0, NULL},
+                                    END};
 static const field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
 
 static const struct {
@@ -144,6 +151,7 @@ static const struct {
 #define FIELDS_TAKE                take_fields
 #define FIELDS_LEAVE               leave_fields
 #define FIELDS_PING                stamp_fields
+#define FIELDS_VIEW                view_fields
 #define X(name, text, from_server) {text, from_server, FIELDS_##name},
     PAL_CONTROL_TABLE(X)
 #undef X

@@ -22,6 +22,8 @@
 #define PAL_WIRE_MEMBER_MAX  256
 #define PAL_WIRE_MEMBER_NAME 32
 #define PAL_WIRE_ARG_MAX     8
+#define PAL_WIRE_FIELDS_MAX  8 /* fields that a part may offer */
+#define PAL_WIRE_FIELD_BYTES 24
 #define PAL_WIRE_TOOL_ANY    (-1)
 #define PAL_WIRE_TOOL_NONE   (-2)
 
@@ -37,7 +39,8 @@
     X(COMMAND, "command", false)  /* pause, resume, step, reset, material ...                        */                \
     X(TAKE, "take", false)        /* take a tool                                                     */                \
     X(LEAVE, "leave", false)      /* give the own tool back                                          */                \
-    X(PING, "ping", false)        /* round trip                                                      */
+    X(PING, "ping", false)        /* round trip                                                      */                \
+    X(VIEW, "view", false)        /* which field of a part to be sent, instead of the last one asked */
 
 typedef enum pal_control_type {
 #define X(name, text, from_server) PAL_CONTROL_##name,
@@ -61,7 +64,9 @@ typedef struct pal_wire_part_info {
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
     double error_m;                  /* bound per axis of its frames in normal use */
-} pal_wire_part_info;                /* its place in the array is its part index   */
+    uint32_t n_field;                /* what `view` may ask for; 0 also from servers that know no fields */
+    char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
+} pal_wire_part_info;                                      /* its place in the array is its part index   */
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
@@ -99,7 +104,9 @@ typedef struct pal_wire_status {
     uint32_t substeps;
     double step_ms; /* mean time of one step                                          */
     uint32_t n_row;
-    double row_ms[PAL_WIRE_ROW_MAX]; /* mean time of each row of the plan in one step           */
+    double row_ms[PAL_WIRE_ROW_MAX];                 /* mean time of each row of the plan in one step           */
+    uint32_t n_row_name;                             /* 0: the rows are those of hello                          */
+    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
     uint32_t n_member;
     double bytes_s;                 /* sent by the server to this member, bytes per second            */
     double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
@@ -143,6 +150,11 @@ typedef struct pal_wire_order {       /* an order to the session */
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
 } pal_wire_order;
 
+typedef struct pal_wire_view {
+    uint32_t part;
+    char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
+} pal_wire_view;
+
 typedef struct pal_control {
     pal_control_type type;
     union {
@@ -155,6 +167,7 @@ typedef struct pal_control {
         pal_wire_order order; /* command               */
         int tool;             /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
         double stamp_ms;      /* ping, pong: the pinger's own clock         */
+        pal_wire_view view;
     };
 } pal_control;
 

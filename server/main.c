@@ -10,6 +10,7 @@ static const pal_command_entry command[] = {
     {"prepare", "turn a surface or a segmented scan into a scene that serve can run", command_prepare},
     {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
     {"replay", "run a recorded input log again and compare the world's hashes", command_replay},
+    {"solve", "solve a load case with finite elements and compare it with a reference", command_solve},
     {"bench", "measure mesh preparation, springs and protocol on this machine", command_bench},
 };
 enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };

@@ -1,6 +1,7 @@
 /* palpate-trainee: scripted headless trainees against a server; load, latency, frame checks (trainee.h). */
 #include "clients/link/client_flags.h"
 #include "clients/trainee/trainee.h"
+#include "protocol/field_codec.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
 
@@ -44,9 +45,10 @@ static void main_watch(void *user)
 
 typedef struct totals {
     pal_samples latency, decode, gap;
-    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fault[PAL_FAULT_COUNT];
+    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fields, field_bytes, fault[PAL_FAULT_COUNT];
     int joined, with_tool, reconnects, old_after_stall, stalls_done, silent, unanswered;
-    double seconds, moved_m, force_N;
+    int without_field, ungiven;
+    double seconds, moved_m, force_N, field_low, field_high, field_s;
     const char *first_fault, *closed;
 } totals;
 
@@ -58,6 +60,11 @@ static void main_add(totals *sum, const pal_trainee_result *r)
     sum->frames += r->n_frame, sum->coarse += r->n_coarse, sum->cycles += r->n_cycle, sum->poses += r->n_pose,
         sum->bytes += r->bytes_in;
     sum->asset_bytes += r->asset_bytes;
+    if (r->n_field) sum->field_low = sum->fields ? fmin(sum->field_low, r->field_low) : r->field_low;
+    sum->field_high = fmax(sum->field_high, r->field_high);
+    sum->fields += r->n_field, sum->field_bytes += r->field_bytes, sum->field_s += r->field_s;
+    sum->without_field += r->joined && r->n_field == 0;
+    sum->ungiven += r->joined && !r->field_given;
     for (int i = 0; i < PAL_FAULT_COUNT; i++) sum->fault[i] += r->fault[i];
     sum->joined += r->joined, sum->with_tool += r->tool >= 0;
     sum->reconnects += r->joins > 1 ? (int)r->joins - 1 : 0;
@@ -80,6 +87,14 @@ static void main_put_samples(cJSON *object, const char *name, pal_samples *s)
     cJSON_AddNumberToObject(o, "max", s->max);
 }
 
+/* fields a second that one client got */
+static double main_field_rate(const totals *sum, int n_client)
+{
+    return sum->field_s > 0 && sum->fields > (uint64_t)n_client
+               ? (double)(sum->fields - (uint64_t)n_client) / sum->field_s
+               : 0;
+}
+
 static void main_json(totals *sum, int n_client, bool ok, const char *reason)
 {
     cJSON *o = cJSON_CreateObject();
@@ -100,6 +115,14 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
     cJSON_AddNumberToObject(o, "asset_bytes", (double)sum->asset_bytes);
     cJSON_AddNumberToObject(o, "moved_mm", sum->moved_m * 1e3);
     cJSON_AddNumberToObject(o, "force_max_N", sum->force_N);
+    if (sum->fields) {
+        cJSON *field = cJSON_AddObjectToObject(o, "field");
+        cJSON_AddNumberToObject(field, "n", (double)sum->fields);
+        cJSON_AddNumberToObject(field, "per_s", main_field_rate(sum, n_client));
+        cJSON_AddNumberToObject(field, "low", sum->field_low);
+        cJSON_AddNumberToObject(field, "high", sum->field_high);
+        cJSON_AddNumberToObject(field, "bytes_mean", (double)sum->field_bytes / (double)sum->fields);
+    }
     main_put_samples(o, "latency_ms", &sum->latency);
     main_put_samples(o, "decode_ms", &sum->decode);
     main_put_samples(o, "gap_ms", &sum->gap);
@@ -127,12 +150,16 @@ static void main_table(totals *sum, int n_client)
            (unsigned long long)sum->latency.n);
     printf("decode ms:        p50 %.2f  p99 %.2f  max %.2f\n", pal_samples_at(&sum->decode, 0.5),
            pal_samples_at(&sum->decode, 0.99), sum->decode.max);
+    if (sum->fields)
+        printf("field:            %.1f/s each, values from %.4g to %.4g, %.0f bytes each\n",
+               main_field_rate(sum, n_client), sum->field_low, sum->field_high,
+               (double)sum->field_bytes / (double)sum->fields);
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         if (sum->fault[i]) printf("%s: %llu\n", pal_fault_name((pal_fault)i), (unsigned long long)sum->fault[i]);
 }
 
 /* the verdict: what failed first, or NULL */
-static const char *main_verdict(const totals *sum, int n_client)
+static const char *main_verdict(const totals *sum, int n_client, const char *field)
 {
     static char reason[400];
     if (sum->first_fault) return sum->first_fault;
@@ -144,7 +171,12 @@ static const char *main_verdict(const totals *sum, int n_client)
     if (sum->silent) return "a client saw no cycle";
     if (sum->frames == 0) return "no frame came";
     if (sum->unanswered) return "poses were never echoed";
-    return NULL;
+    if (!field || !sum->without_field) return NULL;
+    if (sum->ungiven)
+        snprintf(reason, sizeof reason, "no body of the session gives the field %.64s", field);
+    else
+        snprintf(reason, sizeof reason, "no %.64s came to %d of %d clients", field, sum->without_field, n_client);
+    return reason;
 }
 
 static int main_run(crowd *c, const pal_trainee_options *base, double seconds, bool json, bool quiet)
@@ -169,7 +201,7 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
     totals sum = {0};
     for (int i = 0; i < c->n; i++) main_add(&sum, pal_trainee_look(c->trainee[i]));
     pal_link_loop_destroy(c->loop);
-    const char *reason = err ? (note.text[0] ? note.text : pal_err_text(err)) : main_verdict(&sum, wanted);
+    const char *reason = err ? (note.text[0] ? note.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field);
     if (json) main_json(&sum, wanted, !reason, reason);
     if (!json && !quiet && !err) main_table(&sum, wanted);
     if (reason) fprintf(stderr, "palpate-trainee: %s\n", reason);
@@ -181,7 +213,8 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
 
 int main(int argc, char **argv)
 {
-    const char *url = NULL, *name = "trainee", *script = "press", *tool = "any", *up = "0,0,1", *stall = NULL;
+    const char *url = NULL, *name = "trainee", *script = "press", *tool = "any", *up = "0,0,1", *stall = NULL,
+               *field = NULL;
     double seconds = 5, rate = 120, clients = 1, slow = 0, depth = 0;
     bool json = false, quiet = false;
     int n_operand;
@@ -194,6 +227,7 @@ int main(int argc, char **argv)
         {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MOST, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
+        {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL, "ask for displacement | von_mises | energy, check it"},
         {"--slow", "BYTES_S", PAL_CLIENT_NUMBER, &slow, 1, 1e9, NULL, "read no faster than this"},
         {"--stall", "S", PAL_CLIENT_TEXT, &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
         {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "one JSON object on stdout"},
@@ -213,6 +247,7 @@ int main(int argc, char **argv)
     pal_trainee_options base = {.url = url,
                                 .name = name,
                                 .script = script,
+                                .field = field,
                                 .tool = PAL_WIRE_TOOL_ANY,
                                 .rate_hz = rate,
                                 .depth_m = depth,
@@ -222,6 +257,10 @@ int main(int argc, char **argv)
     if (strcmp(tool, "any")) base.tool = atoi(tool);
     if (!pal_client_triple(up, base.up) || !pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX) {
         fprintf(stderr, "palpate-trainee: --up wants three numbers, --tool an index or any\n");
+        return 2;
+    }
+    if (field && (pal_wire_field_find(field) == PAL_WIRE_FIELD_COUNT || !strcmp(field, "none"))) {
+        fprintf(stderr, "palpate-trainee: --field wants displacement, von_mises or energy, not \"%s\"\n", field);
         return 2;
     }
     signal(SIGINT, main_on_signal);

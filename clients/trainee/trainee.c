@@ -1,4 +1,5 @@
 #include "clients/trainee/trainee.h"
+#include "protocol/field_codec.h"
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 
@@ -13,7 +14,7 @@
 typedef struct trainee_part {
     pal_stored_asset *asset; /* of the current epoch, perhaps not ready */
     uint32_t epoch, seq, n_vertex;
-    bool seen;
+    bool seen, looks;       /* looks: a field was asked for  */
     float *now_m, *first_m; /* [n_vertex][3]; first: of the first frame   */
     uint8_t *kept;          /* newest frame that came before its asset   */
     size_t n_kept;
@@ -31,7 +32,7 @@ struct pal_trainee {
     double box_low[3], box_high[3], error_m[PAL_WIRE_PART_MAX];
     uint32_t n_part, cycle, frame_cycle, echo_seq, pose_seq;
     bool cycle_seen;
-    uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns;
+    uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns, first_field_ns;
     double decode_s;
     trainee_part part[PAL_WIRE_PART_MAX];
     uint16_t id;
@@ -212,6 +213,48 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     pal_link_send_ack(t->link, &ack);
 }
 
+static void trainee_field(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
+{
+    pal_field_head head;
+    int refusal = pal_field_get_head(bytes, n_byte, &head);
+    if (!refusal && (head.part >= t->n_part || !t->part[head.part].looks)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && t->options.field && head.field != pal_wire_field_find(t->options.field)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
+    if (!refusal && head.low < 0) refusal = PAL_REFUSAL_RANGE;
+    uint8_t *level = refusal ? NULL : malloc((size_t)t->part[head.part].n_vertex + 1);
+    if (level) refusal = pal_field_get(bytes, n_byte, t->part[head.part].n_vertex, &head, level);
+    free(level);
+    if (refusal) {
+        trainee_fault(t, PAL_FAULT_FIELD, "%s", pal_refusal_text(refusal));
+        return;
+    }
+    pal_trainee_result *r = &t->result;
+    const uint64_t now = pal_clock_ns();
+    if (r->n_field++ == 0) {
+        t->first_field_ns = now;
+        r->field_low = (double)head.low;
+    }
+    r->field_low = fmin(r->field_low, (double)head.low);
+    r->field_high = fmax(r->field_high, (double)head.high);
+    r->field_bytes += n_byte;
+    r->field_s = (double)(now - t->first_field_ns) * 1e-9;
+}
+
+/* asks for the field of every part that gives it; a server of before fields is asked for nothing */
+static void trainee_look(pal_trainee *t, const pal_wire_part_info *info, uint32_t n_part)
+{
+    for (uint32_t i = 0; i < n_part && t->options.field; i++) {
+        t->part[i].looks = false;
+        for (uint32_t k = 0; k < info[i].n_field; k++)
+            t->part[i].looks = t->part[i].looks || !strcmp(info[i].field[k], t->options.field);
+        if (!t->part[i].looks) continue;
+        pal_control view = {.type = PAL_CONTROL_VIEW, .view = {.part = i}};
+        snprintf(view.view.field, sizeof view.view.field, "%s", t->options.field);
+        t->result.field_given = true;
+        if (pal_link_send_control(t->link, &view)) trainee_fault(t, PAL_FAULT_FIELD, "it cannot be asked for");
+    }
+}
+
 static void trainee_on_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes,
                                size_t n_byte)
 {
@@ -220,6 +263,7 @@ static void trainee_on_message(void *user, pal_link *link, const pal_wire_head *
     pal_wire_haptic haptic;
     if (head->kind == PAL_WIRE_FRAME) trainee_frame(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) trainee_tools(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_FIELD) trainee_field(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_HAPTIC && pal_wire_get_haptic(bytes, n_byte, &haptic))
         trainee_fault(t, PAL_FAULT_MALFORMED, "HAPTIC");
 }
@@ -273,6 +317,7 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
         t->script_made = true;
     }
     trainee_parts(t, hello->part, hello->n_part);
+    trainee_look(t, hello->part, t->n_part);
 }
 
 static void trainee_on_control(void *user, pal_link *link, const pal_control *c)

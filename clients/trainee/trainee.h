@@ -3,8 +3,9 @@
  * Checked: every FRAME decodes, belongs to a known part and epoch, its seq grows, its positions are finite and within
  * the scene's box grown by its own size, its quantisation keeps the stated error (coarser steps for a client that does
  * not keep up are counted); cycles never go back, no frame comes before its cycle; assets have the hash of their name;
- * nothing malformed. A wish broken is counted under its name. Measured: pose to frame = own clock now minus the own
- * stamp echoed in TOOLS, once per new pose. Thread: [net]. */
+ * nothing malformed. A field that was asked for is of a known part, of its number of vertices, of the kind asked for,
+ * in a range of no negative numbers, and no other field comes. A wish broken is counted under its name. Measured: pose
+ * to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
 #ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
 #define PAL_CLIENTS_TRAINEE_TRAINEE_H
 #include "clients/link/asset_store.h"
@@ -21,6 +22,7 @@
     X(CYCLE, "a cycle number goes back or a frame comes before its cycle")                                             \
     X(BOUND, "a frame's step is too coarse for the stated error")                                                      \
     X(PLACE, "a vertex lies far outside the scene or is not finite")                                                   \
+    X(FIELD, "a field is not what was asked for")                                                                      \
     X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \
     X(CLOSED, "the server closed the connection for a fault of ours")
 typedef enum pal_fault {
@@ -35,6 +37,7 @@ typedef struct pal_trainee pal_trainee;
 
 typedef struct pal_trainee_options {
     const char *url, *name, *script; /* borrowed                                                */
+    const char *field;               /* to ask for, of every part that gives it; NULL: none     */
     int tool;                        /* index or PAL_WIRE_TOOL_ANY                              */
     double rate_hz;                  /* of poses                                                */
     double depth_m;                  /* of press and pull; 0: 8 % of the box, at most 10 mm     */
@@ -55,6 +58,10 @@ typedef struct pal_trainee_result {
     double moved_m; /* largest distance of a vertex from its place in the first frame */
     double force_N; /* largest force on the own tool              */
     uint64_t asset_bytes;
+    uint64_t n_field, field_bytes;
+    double field_low, field_high;              /* of all values that came, SI                */
+    double field_s;                            /* from the first field to the last           */
+    bool field_given;                          /* a part of the session gives what was asked for */
     pal_samples latency_ms, decode_ms, gap_ms; /* owned by the trainee */
 } pal_trainee_result;
 

@@ -7,11 +7,12 @@
 
 int command_bench(int argc, char **argv)
 {
-    const pal_flag_table table = {.usage = "bench mesh [SURFACE.ply] | springs | protocol | latency [flags]",
+    const pal_flag_table table = {.usage = "bench mesh [SURFACE.ply] | springs | fem | protocol | latency [flags]",
                                   .about = "Measures this machine, medians of several runs:\n"
                                            "  mesh      preparation of tetrahedra at several resolutions (of a "
                                            "procedural organ without SURFACE)\n"
                                            "  springs   forces, integration and skinning against the machine's limits\n"
+                                           "  fem       live steps and static solves of finite elements\n"
                                            "  protocol  encoding and decoding of frames\n"
                                            "  latency   from a pose put into a session to the frame that shows it\n",
                                   .least_operand = 1,
@@ -29,6 +30,7 @@ int command_bench(int argc, char **argv)
     if (common.quiet && !common.json && !freopen("/dev/null", "w", stdout)) return 3;
     if (mesh) return bench_mesh(word[1], common.json);
     if (!strcmp(word[0], "springs")) return bench_springs(common.json);
+    if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);
     fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);

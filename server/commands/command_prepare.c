@@ -30,7 +30,7 @@ static const char about[] =
 
 typedef struct wishes {
     pal_surface_scene scene;
-    const char *folder, *units, *up, *name, *title, *source;
+    const char *folder, *units, *up, *name, *title, *source, *model;
     bool procedural, list_labels, tetgen, no_tetgen;
 } wishes;
 
@@ -283,6 +283,33 @@ static int run(pal_flag_common *common, const char *in, wishes *wish)
     return code;
 }
 
+/* is a word one of a NULL-terminated list, or not given? */
+static bool is_one(const char *word, const char *const *list)
+{
+    for (int k = 0; word && list[k]; k++)
+        if (!strcmp(word, list[k])) return true;
+    return !word;
+}
+
+/* model, element, law and solver; NULL: all fine, else the sentence */
+static const char *check_model(wishes *wish)
+{
+    pal_surface_scene *s = &wish->scene;
+    if (!is_one(wish->model, (const char *const[]){"springs", "fem", NULL})) return "--model: is not springs or fem";
+    s->fem = wish->model && !strcmp(wish->model, "fem");
+    if (s->fem && s->area_springs) return "--area-springs: model fem has no springs";
+    if (!s->fem && s->element) return "--element: only goes with --model fem";
+    if (!s->fem && s->law) return "--law: only goes with --model fem";
+    if (!s->fem && s->solver) return "--solver: only goes with --model fem";
+    if (!is_one(s->element, (const char *const[]){"hex8_bbar", "hex8", "tet4", "tet10", NULL}))
+        return "--element: is not hex8_bbar, hex8, tet4 or tet10";
+    if (!is_one(s->law, (const char *const[]){"corotational", "neo_hookean", "linear", NULL}))
+        return "--law: is not corotational, neo_hookean or linear";
+    if (!is_one(s->solver, (const char *const[]){"implicit_euler", "sdirk2", "static_newton", NULL}))
+        return "--solver: is not implicit_euler, sdirk2 or static_newton";
+    return NULL;
+}
+
 /* "-y" -> (0, -1, 0) */
 static bool read_axis(const char *word, double axis[3])
 {
@@ -299,10 +326,19 @@ int command_prepare(int argc, char **argv)
     wishes wish = {.scene = {.label = -1, .material = {5000, 0.45, 1000, 4}}};
     pal_material *m = &wish.scene.material;
     double hold = 5;
+    pal_surface_scene *scene = &wish.scene;
     const pal_flag flag[] = {
         {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
         {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
-         "voxels on the longest axis (as many as give about 13,000 tetrahedra)"},
+         "voxels on the longest axis (as many as give about 13,000 tetrahedra, or 2,500 nodes for fem)"},
+        {"--model", "WORD", PAL_FLAG_TEXT, &wish.model, 0, 0,
+         "springs (paper B), or fem: finite elements that are accurate and implicit (springs)"},
+        {"--element", "WORD", PAL_FLAG_TEXT, &scene->element, 0, 0,
+         "of fem: hex8_bbar, hex8, tet4 or tet10 (hex8_bbar)"},
+        {"--law", "WORD", PAL_FLAG_TEXT, &scene->law, 0, 0,
+         "of fem: corotational, neo_hookean or linear (corotational)"},
+        {"--solver", "WORD", PAL_FLAG_TEXT, &scene->solver, 0, 0,
+         "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
         {"--label", "N", PAL_FLAG_COUNT, &wish.scene.label, 1, INT32_MAX,
          "label of a segmented scan (the most frequent one)"},
         {"--list-labels", NULL, PAL_FLAG_SWITCH, &wish.list_labels, 0, 0, "only list the labels of a segmented scan"},
@@ -313,7 +349,7 @@ int command_prepare(int argc, char **argv)
         {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
          "keep only the largest of several pieces that do not hang together"},
         {"--young-Pa", "E", PAL_FLAG_NUMBER, &m->young_Pa, 1e-6, 1e12, "stiffness of the tissue (5000)"},
-        {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.5, "its Poisson ratio (0.45)"},
+        {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},
         {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},
         {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
         {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
@@ -341,6 +377,8 @@ int command_prepare(int argc, char **argv)
     if (wish.procedural == (n_in > 0)) return usage(&common, "needs either a file or --procedural");
     if (wish.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
     if (!wish.folder || !*wish.folder) return usage(&common, "needs -o DIR");
+    const char *sentence = check_model(&wish);
+    if (sentence) return usage(&common, sentence);
     if (wish.tetgen && wish.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
     if (wish.up && !read_axis(wish.up, wish.scene.up)) return usage(&common, "--up: is not x, y, z, -x, -y or -z");
     wish.scene.hold = hold / 100;

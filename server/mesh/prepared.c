@@ -1,9 +1,10 @@
 /* The prepared mesh: made from a surface, saved, loaded.
  *
  * File, little-endian: "PALPREP1", u32 version, u32 sections, u64 bytes of the file, u64 checksum of all that follows;
- * then seven u64 counts and four doubles (origin, h); then per section u32 number, u32 item bytes, u64 items, u64
+ * then eight u64 counts and four doubles (origin, h); then per section u32 number, u32 item bytes, u64 items, u64
  * offset (a multiple of 64); then the sections. The counts alone fix every section's size, so a file is either whole or
- * refused, and no more is taken from the heap than the file has bytes. */
+ * refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only a measured fill is kept:
+ * their corners follow from the tetrahedra. Version 2 has no fill, hence one count and one section less. */
 #include "server/mesh/prepared.h"
 
 #include "server/base/clock.h"
@@ -17,8 +18,21 @@
 #error "the prepared file is copied from memory: a big-endian machine needs a swap here"
 #endif
 
-enum { VERSION = 2, N_COUNT = 7, N_SECTION = 14, HEAD = 32, TABLE = HEAD + 8 * N_COUNT + 8 * 4, ENTRY = 24 };
+enum { VERSION = 3, N_COUNT = 8, N_SECTION = 15, HEAD = 32, ENTRY = 24 };
+enum { VERSION_2 = 2, N_COUNT_2 = 7, N_SECTION_2 = 14 };
 static const char MAGIC[8] = "PALPREP1";
+
+/* what differs between versions */
+typedef struct layout {
+    int n_count, n_section;
+    size_t table; /* where the table of sections begins, behind the counts and four doubles */
+} layout;
+
+static layout layout_of(uint32_t version)
+{
+    int n_count = version == VERSION_2 ? N_COUNT_2 : N_COUNT;
+    return (layout){n_count, version == VERSION_2 ? N_SECTION_2 : N_SECTION, (size_t)HEAD + 8 * (size_t)n_count + 32};
+}
 
 /* one array of a prepared mesh: where it is kept, its item size and how many items the counts call for */
 typedef struct section {
@@ -30,7 +44,7 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6];
+             n_frame = count[5], n_fan = count[6], n_fill = count[7];
     const section all[N_SECTION] = {
         {&p->surface.x, 8, 3 * n_vertex},
         {&p->surface.tri, 4, 3 * n_tri},
@@ -46,6 +60,7 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
         {&p->skin.fan, 4, 2 * n_fan},
         {&p->skin.near, 4, PAL_SKIN_NEAR * n_vertex},
         {&p->skin.coef, 4, 4 * PAL_SKIN_NEAR * n_vertex},
+        {&p->hexes.fill, 4, n_fill},
     };
     memcpy(out, all, sizeof all);
 }
@@ -59,7 +74,8 @@ static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
                             p->tets.n_tet,
                             p->tets.n_face,
                             p->skin.n_frame,
-                            fan_start ? fan_start[p->skin.n_frame] : 0};
+                            fan_start ? fan_start[p->skin.n_frame] : 0,
+                            p->hexes.measured ? p->hexes.n_hex : 0};
     for (int k = 0; k < N_COUNT; k++) count[k] = (uint64_t)n[k];
 }
 
@@ -78,6 +94,15 @@ void pal_prepared_free(pal_prepared *prepared)
     pal_surface_free(&prepared->surface);
     pal_tets_free(&prepared->tets);
     pal_skin_free(&prepared->skin);
+    pal_hexes_free(&prepared->hexes);
+}
+
+/* the hexahedra of a split, their fill when it is asked for or decided what was kept */
+static pal_err make_hexes(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *p, pal_note *note)
+{
+    PAL_TRY(pal_hexes_find(&p->tets, &p->hexes, note));
+    if (!options->fill && !(options->least_fill > 0)) return PAL_ERR_OK;
+    return pal_hexes_fill(&p->hexes, &p->tets, surface, 0, note);
 }
 
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
@@ -94,6 +119,12 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
     if (err) return pal_note_set(note, err, "cannot split %lld voxels into tetrahedra", (long long)told.n_voxel);
     double split = pal_clock_s();
     told.split_s = split - began;
+    if ((err = make_hexes(surface, options, &p, note))) {
+        pal_prepared_free(&p);
+        return err;
+    }
+    told.hexes_s = pal_clock_s() - split;
+    split += told.hexes_s;
     err = pal_skin_bind(&p.tets, surface->x, surface->n_vertex, &p.skin);
     told.skin_s = pal_clock_s() - split;
     if (!err) err = pal_surface_copy(surface, &p.surface);
@@ -161,11 +192,12 @@ static uint64_t get_u64(const uint8_t *from)
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, size_t *n_byte_out)
 {
     pal_prepared p = *prepared;
+    layout l = layout_of(VERSION);
     uint64_t count[N_COUNT];
     section s[N_SECTION];
     get_counts(&p, count);
     list_sections(&p, count, s);
-    size_t n_byte = round_up(TABLE + ENTRY * N_SECTION);
+    size_t n_byte = round_up(l.table + ENTRY * N_SECTION);
     for (int k = 0; k < N_SECTION; k++) n_byte += round_up(s[k].n * s[k].n_byte);
     uint8_t *bytes = calloc(n_byte, 1);
     if (!bytes) return PAL_ERR_MEMORY;
@@ -177,9 +209,9 @@ pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, si
     for (int k = 0; k < N_COUNT; k++) put_u64(bytes + HEAD + 8 * k, count[k]);
     memcpy(bytes + HEAD + 8 * N_COUNT, p.tets.origin_m, 24);
     memcpy(bytes + HEAD + 8 * N_COUNT + 24, &p.tets.h_m, 8);
-    size_t at = round_up(TABLE + ENTRY * N_SECTION);
+    size_t at = round_up(l.table + ENTRY * N_SECTION);
     for (int k = 0; k < N_SECTION; k++) {
-        uint8_t *entry = bytes + TABLE + ENTRY * k;
+        uint8_t *entry = bytes + l.table + (size_t)ENTRY * (size_t)k;
         put_u32(entry, (uint32_t)k + 1);
         put_u32(entry + 4, (uint32_t)s[k].n_byte);
         put_u64(entry + 8, s[k].n);
@@ -274,23 +306,29 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         return "a skin weight is not finite";
     for (uint64_t i = 0; i < n_node; i++)
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";
+    for (uint64_t i = 0; i < count[7]; i++)
+        if (!(p->hexes.fill[i] >= 0 && p->hexes.fill[i] <= 1)) return "a voxel's fill is not within 0..1";
     return NULL;
 }
 
-static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, uint64_t count[N_COUNT], pal_note *note)
+static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, layout *l, uint64_t count[N_COUNT],
+                         pal_note *note)
 {
-    if (n_byte < TABLE + ENTRY * N_SECTION || memcmp(bytes, MAGIC, 8))
+    if (n_byte < HEAD || memcmp(bytes, MAGIC, 8))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 0: not a prepared mesh", name);
-    if (get_u32(bytes + 8) != VERSION || get_u32(bytes + 12) != N_SECTION)
+    uint32_t version = get_u32(bytes + 8);
+    *l = layout_of(version);
+    if ((version != VERSION && version != VERSION_2) || get_u32(bytes + 12) != (uint32_t)l->n_section)
         return pal_note_set(note, PAL_ERR_REFUSED,
-                            "%s: byte 8: version %u with %u sections, this program reads %d with %d", name,
-                            get_u32(bytes + 8), get_u32(bytes + 12), VERSION, N_SECTION);
-    if (get_u64(bytes + 16) != n_byte)
+                            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d",
+                            name, version, get_u32(bytes + 12), VERSION, N_SECTION, VERSION_2, N_SECTION_2);
+    if (get_u64(bytes + 16) != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 16: %llu bytes announced, %zu are there", name,
                             (unsigned long long)get_u64(bytes + 16), n_byte);
     if (get_u64(bytes + 24) != pal_prepared_checksum(bytes, n_byte))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 24: the checksum does not fit the content", name);
-    for (int k = 0; k < N_COUNT; k++) {
+    for (int k = 0; k < N_COUNT; k++) count[k] = 0;
+    for (int k = 0; k < l->n_count; k++) {
         count[k] = get_u64(bytes + HEAD + 8 * k);
         if (count[k] > INT32_MAX / 8)
             return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
@@ -300,17 +338,17 @@ static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, 
 }
 
 /* copies the sections to the heap after checking that each lies in the file with the size the counts call for */
-static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_byte, section s[N_SECTION],
-                             pal_note *note)
+static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_byte, const layout *l,
+                             section s[N_SECTION], pal_note *note)
 {
-    uint64_t end = TABLE + ENTRY * N_SECTION;
-    for (int k = 0; k < N_SECTION; k++) {
-        const uint8_t *entry = bytes + TABLE + ENTRY * k;
+    uint64_t end = l->table + ENTRY * (size_t)l->n_section;
+    for (int k = 0; k < l->n_section; k++) {
+        const uint8_t *entry = bytes + l->table + (size_t)ENTRY * (size_t)k;
         uint64_t at = get_u64(entry + 16), size = s[k].n * s[k].n_byte;
         if (get_u32(entry) != (uint32_t)k + 1 || get_u32(entry + 4) != s[k].n_byte || get_u64(entry + 8) != s[k].n ||
             at < end || at % 64 || at > n_byte || size > n_byte - at)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %d: section %d does not fit the counts or the file",
-                                name, TABLE + ENTRY * k, k + 1);
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: section %d does not fit the counts or the file",
+                                name, l->table + (size_t)ENTRY * (size_t)k, k + 1);
         end = at + size;
         void *array = malloc(size ? size : 1);
         memcpy(s[k].pointer, &array, sizeof array);
@@ -320,19 +358,42 @@ static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_by
     return PAL_ERR_OK;
 }
 
+/* the hexahedra of the checked tetrahedra; with the fill the file has, which must be theirs */
+static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pal_note *note)
+{
+    float *fill = p->hexes.fill;
+    p->hexes.fill = NULL;
+    pal_err err = pal_hexes_find(&p->tets, &p->hexes, NULL);
+    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "%s: out of memory for the voxels", name);
+    if (err == PAL_ERR_REFUSED && n_fill == 0) err = PAL_ERR_OK;
+    if (err == PAL_ERR_REFUSED || (!err && n_fill > 0 && n_fill != (uint64_t)p->hexes.n_hex))
+        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: fill of %llu voxels, the mesh has %d", name,
+                           (unsigned long long)n_fill, p->hexes.n_hex);
+    if (err || n_fill == 0) {
+        free(fill);
+        return err;
+    }
+    free(p->hexes.fill);
+    p->hexes.fill = fill;
+    p->hexes.measured = true;
+    return PAL_ERR_OK;
+}
+
 pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out, pal_note *note)
 {
     pal_prepared p = {0};
     uint64_t count[N_COUNT];
     section s[N_SECTION];
-    PAL_TRY(read_head(name, bytes, n_byte, count, note));
+    layout l = layout_of(VERSION);
+    PAL_TRY(read_head(name, bytes, n_byte, &l, count, note));
     list_sections(&p, count, s);
-    pal_err err = read_sections(name, bytes, n_byte, s, note);
+    pal_err err = read_sections(name, bytes, n_byte, &l, s, note);
     if (!err) {
+        const uint8_t *place = bytes + l.table - 32;
         put_counts(&p, count);
-        memcpy(p.tets.origin_m, bytes + HEAD + 8 * N_COUNT, 24);
+        memcpy(p.tets.origin_m, place, 24);
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);
-        memcpy(&p.tets.h_m, bytes + HEAD + 8 * N_COUNT + 24, 8);
+        memcpy(&p.tets.h_m, place + 24, 8);
         const char *fault = find_fault(&p, count);
         if (fault) err = pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", name, fault);
     }
@@ -341,6 +402,7 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
         pal_tets_check(&p.tets, &inner);
         pal_note_set(note, err, "%s: %.400s", name, inner.text);
     }
+    if (!err) err = read_hexes(name, count[7], &p, note);
     if (err)
         pal_prepared_free(&p);
     else

@@ -10,7 +10,7 @@
 #include <sys/mman.h>
 
 /* corner bits x = 1, y = 2, z = 4; every tetrahedron has positive volume */
-static const uint8_t FIVE[2][5][4] = {
+const uint8_t pal_voxel_five[2][5][4] = {
     {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}},
     {{1, 3, 0, 5}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}, {0, 3, 6, 5}},
 };
@@ -31,14 +31,14 @@ static void find_sides(side_table *table)
             for (int t = 0; t < 5; t++)
                 for (int f = 0; f < 4; f++) {
                     int on = 0;
-                    for (int k = 0; k < 3; k++) on += (FIVE[parity][t][FACE[f][k]] >> (side / 2) & 1) == (side & 1);
-                    for (int k = 0; on == 3 && k < 3; k++) *to++ = FIVE[parity][t][FACE[f][k]];
+                    for (int k = 0; k < 3; k++)
+                        on += (pal_voxel_five[parity][t][FACE[f][k]] >> (side / 2) & 1) == (side & 1);
+                    for (int k = 0; on == 3 && k < 3; k++) *to++ = pal_voxel_five[parity][t][FACE[f][k]];
                 }
         }
 }
 
-/* large arrays in large pages where the kernel gives them: first touch is most of the cost of writing them */
-static void *take_array(size_t n_byte)
+void *pal_voxels_array(size_t n_byte)
 {
     size_t page = (size_t)2 << 20;
     if (n_byte < 2 * page) return malloc(n_byte ? n_byte : 1);
@@ -180,7 +180,7 @@ static void write_tets(splitter *s, int y, int z)
     for (int w = 0; w < s->kept.n_word; w++)
         for (uint64_t left = row[w]; left; left &= left - 1) {
             int x = 64 * w + __builtin_ctzll(left);
-            const uint8_t *pattern = &FIVE[(x + y + z) & 1][0][0];
+            const uint8_t *pattern = &pal_voxel_five[(x + y + z) & 1][0][0];
             corners(s, x, y, z, node);
             for (int k = 0; k < 20; k++) to[k] = node[pattern[k]];
             to += 20;
@@ -217,9 +217,9 @@ static pal_err split(splitter *s)
     pal_tets *t = s->tets;
     *t = (pal_tets){.n_node = (int)s->n_node, .n_tet = (int)s->n_tet, .n_face = (int)s->n_face, .h_m = v->h_m};
     memcpy(t->origin_m, v->origin_m, sizeof t->origin_m);
-    t->x = take_array((size_t)s->n_node * 3 * sizeof *t->x);
-    t->tet = take_array((size_t)s->n_tet * 4 * sizeof *t->tet);
-    t->face = take_array((size_t)s->n_face * 3 * sizeof *t->face);
+    t->x = pal_voxels_array((size_t)s->n_node * 3 * sizeof *t->x);
+    t->tet = pal_voxels_array((size_t)s->n_tet * 4 * sizeof *t->tet);
+    t->face = pal_voxels_array((size_t)s->n_face * 3 * sizeof *t->face);
     t->on_surface = calloc(s->n_node ? (size_t)s->n_node : 1, 1);
     for (int k = 0; k < 2; k++) s->plane[k] = malloc(n_plane * sizeof *s->plane[k]);
     if (!t->x || !t->tet || !t->face || !t->on_surface || !s->plane[0] || !s->plane[1]) return PAL_ERR_MEMORY;

@@ -6,6 +6,7 @@
 
 #include "server/base/clock.h"
 #include "server/mesh/voxel_scan.h"
+#include "server/mesh/voxel_share.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -55,9 +56,10 @@ static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *opt
                             high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     grid->h_m = longest / options->resolution;
     for (int k = 0; k < 3; k++) {
-        int n = (int)ceil((high[k] - low[k]) / grid->h_m - 1e-6);
+        double ahead = fmin(fmax(options->ahead[k], 0), 1);
+        int n = (int)ceil((high[k] - low[k]) / grid->h_m + ahead - 1e-6);
         grid->n[k] = (n < 1 ? 1 : n) + 2;
-        grid->low_m[k] = low[k] - grid->h_m;
+        grid->low_m[k] = low[k] - (1 + ahead) * grid->h_m;
         grid->origin_m[k] = surface->origin_m[k];
     }
     return PAL_ERR_OK;
@@ -125,14 +127,17 @@ static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_com
     return err;
 }
 
-/* border, pieces, counts, budget, bytes */
-static pal_err keep_voxels(const pal_bits *inside, const pal_voxel_options *options, pal_voxels *voxels,
-                           int *n_component, pal_note *note)
+/* border, what of it is dropped, pieces, counts, budget, bytes */
+static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_voxel_options *options,
+                           pal_voxels *voxels, pal_voxel_report *report, pal_note *note)
 {
     pal_bits border;
+    pal_err err = PAL_ERR_OK;
     PAL_TRY(pal_bits_create(inside->n, &border));
     if (options->border) find_border(inside, &border);
-    pal_err err = count_pieces(inside, &border, n_component);
+    if (options->border && options->least_fill > 0)
+        err = pal_voxels_drop(surface, options, voxels, inside, &border, report, note);
+    if (!err) err = count_pieces(inside, &border, &report->n_component);
     if (err) {
         pal_bits_free(&border);
         return err;
@@ -163,7 +168,7 @@ pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *opt
     if (!err) err = pal_voxels_decide(surface, options, &voxels, &inside, &told, note);
     int n_before;
     if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
-    if (!err) err = keep_voxels(&inside, options, &voxels, &told.n_component, note);
+    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &told, note);
     pal_bits_free(&inside);
     if (err == PAL_ERR_MEMORY)
         pal_note_set(note, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);

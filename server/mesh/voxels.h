@@ -19,6 +19,10 @@ typedef struct pal_voxel_options {
     bool border;        /* keep the one layer of border voxels outside (paper B); false: inside only      */
     bool largest_only;  /* keep only the largest face-connected component of inside voxels, and its border */
     int64_t most_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
+    double least_fill; /* border voxels with a smaller share inside the surface are dropped; 0: none, as in the paper */
+    bool fill;         /* pal_prepared_make only: measure the share of every voxel (least_fill > 0 does so too) */
+    double ahead[3];   /* 0..1 per axis: the grid begins this share of a voxel before the box of the surface, so that
+                        * its planes go through a place that matters (a support's border); 0: at the box */
     const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
 } pal_voxel_options;
 
@@ -35,6 +39,8 @@ typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
     int n_component;          /* face-connected components of the kept voxels, the border included */
     int64_t n_disagree;       /* voxels that no two axes settle unopposed                          */
+    int64_t n_dropped;        /* border voxels that least_fill dropped                          */
+    int64_t n_edge_only;      /* with least_fill: voxel edges where two kept voxels meet and no third joins them */
     bool open;                /* some edge has an odd number of triangles                           */
     double surface_volume_m3; /* by the divergence theorem, cavities off, holes closed by fans from the middle of
                                * their rims; 0: not known (open, and flood was asked for)           */

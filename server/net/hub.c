@@ -40,6 +40,7 @@ static void leave_room(pal_hub *hub, pal_client *c)
     pal_hub_room *room = c->room;
     empty(c);
     if (!c->id) return;
+    pal_hub_look_away(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
     pal_members_leave(&room->members, c->id);
@@ -141,7 +142,8 @@ static bool client_waiting(void *user, const pal_peer *peer)
     const pal_client *c = peer->client;
     (void)user;
     if (!c || peer->drop_code) return false;
-    return c->n_queue || c->members_due || c->status_due || c->haptic || c->out_begin < c->n_out || wants_cycle(c);
+    return c->n_queue || c->members_due || c->status_due || c->haptic || c->out_begin < c->n_out ||
+           pal_hub_wants_field(c) || wants_cycle(c);
 }
 
 static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
@@ -192,6 +194,9 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->substeps = f->n_substep > 0 ? (uint32_t)f->n_substep : 0;
         w->n_row = (uint32_t)f->n_row;
         for (int r = 0; r < f->n_row; r++) w->row_ms[r] = s->row_ms[r];
+        /* rows of fields have come: the plan is no longer that of hello */
+        for (int r = 0; r < f->n_row && f->n_row != pal_session_rows(s->session); r++)
+            pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->row_name[r]);
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }
@@ -241,6 +246,7 @@ static pal_packet *take_next(pal_hub *hub, pal_client *c)
         c->haptic = NULL;
         return p;
     }
+    if ((p = pal_hub_next_field(hub, c))) return p;
     if (c->out_begin == c->n_out && wants_cycle(c)) begin_cycle(hub, c);
     if (c->out_begin == c->n_out) return NULL;
     p = c->out[c->out_begin++];
@@ -337,10 +343,12 @@ static void hub_wake(void *user)
         uint64_t next = room->stream->cycle ? room->stream->cycle_ns + apart : now;
         if (now < next) {
             if (!due || next < due) due = next;
-            continue;
+        } else {
+            for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = t == 0 || room->tier_users[t] > 0;
+            if (pal_stream_turn(room->stream, now, used, room->tool)) offer_cycle(hub, room);
         }
-        for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = t == 0 || room->tier_users[t] > 0;
-        if (pal_stream_turn(room->stream, now, used, room->tool)) offer_cycle(hub, room);
+        next = pal_hub_make_fields(hub, room, now);
+        if (next && (!due || next < due)) due = next;
     }
     if (due) pal_loop_due(hub->loop, due);
 }
@@ -369,7 +377,10 @@ static void hub_tick(void *user)
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop);
     hub_wake(hub);
-    for (int r = 0; r < hub->n_room; r++) pal_stream_measure(hub->room[r].stream, now);
+    for (int r = 0; r < hub->n_room; r++) {
+        pal_stream_measure(hub->room[r].stream, now);
+        pal_hub_tell_fields(&hub->room[r]);
+    }
     for (int i = 0; i < hub->most_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->peer->drop_code) continue;

@@ -1,8 +1,9 @@
 /* The hub: peers to sessions. It knows what messages mean, who may do what, and what each peer is to be sent next.
  *
- * Sending, in this order: control (hello, errors, pongs, members, status), contact models, then cycles as far as credit
- * goes. Per client there wait at most 32 queued control messages, one contact model and the cycle that is being sent;
- * all else is made when the road asks for it from the newest that the session's stream holds. Thread: [net]. */
+ * Sending, in this order: control (hello, errors, pongs, members, status), contact models, then fields and cycles as
+ * far as credit goes. Per client there wait at most 32 queued control messages, one contact model and the cycle that is
+ * being sent; all else is made when the road asks for it from the newest that the session's stream holds. Thread:
+ * [net]. */
 #ifndef PAL_NET_HUB_H
 #define PAL_NET_HUB_H
 #include "server/net/site.h"

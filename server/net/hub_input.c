@@ -141,13 +141,13 @@ static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_order *ord
 
 static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 {
-    static const char *const verbs[PAL_COMMAND_COUNT] = {"pause", "resume", "step", "reset", "material"};
+    static const char *const verbs[PAL_COMMAND_FIELD] = {"pause", "resume", "step", "reset", "material"};
     pal_command command = {.kind = PAL_COMMAND_COUNT};
     if (!pal_members_may_command(&c->room->members, c->id)) {
         pal_hub_complain(hub, c, "role", "a viewer gives no commands");
         return;
     }
-    for (int i = 0; i < PAL_COMMAND_COUNT; i++)
+    for (int i = 0; i < PAL_COMMAND_FIELD; i++) /* fields are asked for with `view` */
         if (!strcmp(order->verb, verbs[i])) command.kind = (pal_command_kind)i;
     if (command.kind == PAL_COMMAND_COUNT) {
         pal_hub_complain(hub, c, "verb", "there is no command %s", order->verb);
@@ -187,6 +187,9 @@ static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_
         break;
     case PAL_CONTROL_COMMAND:
         command(hub, c, &in.order);
+        break;
+    case PAL_CONTROL_VIEW:
+        pal_hub_view(hub, c, &in.view);
         break;
     case PAL_CONTROL_PING:
         memset(hub->control, 0, sizeof *hub->control);

@@ -124,6 +124,7 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
     add(&p, "palpate_build_info{version=\"%s\"} 1\n", PAL_VERSION);
     add_sessions(&p, hub);
     one(&p, "palpate_frames_sent_total", "counter", "Frames handed to clients.", (double)n->n_frame);
+    one(&p, "palpate_fields_sent_total", "counter", "Fields in colour handed to clients.", (double)n->n_field);
     help(&p, "palpate_frames_skipped_total", "counter", "Cycles that clients have not been sent.");
     add(&p, "palpate_frames_skipped_total{reason=\"credit\"} %llu\n", (unsigned long long)n->n_skipped);
     one(&p, "palpate_send_bytes_total", "counter", "Bytes of messages handed to clients.", (double)n->n_byte);

@@ -1,4 +1,4 @@
-/* What hub.c, hub_input.c and hub_pages.c share: the hub's records. Private to these three. Thread: [net]. */
+/* What hub.c, hub_input.c, hub_fields.c and hub_pages.c share: the hub's records. Private to these. Thread: [net]. */
 #ifndef PAL_NET_HUB_PARTS_H
 #define PAL_NET_HUB_PARTS_H
 #include "server/net/credit.h"
@@ -27,6 +27,8 @@ typedef struct pal_client {
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
     uint32_t sent_frame[PAL_BODY_MAX]; /* cycle of the frame of each part sent last */
+    uint8_t view[PAL_BODY_MAX];        /* pal_field looked at, of each part         */
+    uint64_t sent_field[PAL_BODY_MAX]; /* number of the values sent last            */
     /* figures */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status                   */
@@ -42,10 +44,12 @@ typedef struct pal_hub_room {
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last asked for */
     int tier_users[PAL_STREAM_TIER];
+    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients that look at a field   */
+    bool told[PAL_BODY_MAX][PAL_FIELD_COUNT];  /* the session knows that some do */
 } pal_hub_room;
 
 typedef struct pal_hub_count {
-    uint64_t n_frame, n_skipped, n_byte, n_joined, n_refused_join;
+    uint64_t n_frame, n_field, n_skipped, n_byte, n_joined, n_refused_join;
     uint64_t n_pose, n_ack, n_control;
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;
@@ -74,6 +78,14 @@ uint32_t pal_hub_colour(int id);
 /* hub_input.c */
 void pal_hub_received(void *hub, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
 void pal_hub_release_tool(pal_hub_room *room, int tool); /* nobody holds it any more: it is lifted out */
+/* hub_fields.c */
+void pal_hub_view(pal_hub *hub, pal_client *client, const pal_wire_view *view); /* what a client asks to see */
+void pal_hub_look_away(pal_client *client);                                     /* it goes */
+void pal_hub_tell_fields(pal_hub_room *room);                                   /* what the session does not know yet */
+bool pal_hub_wants_field(const pal_client *client);
+pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *client); /* NULL: none to be sent now */
+/* encodes what is new; the result is when to come again, 0: nothing waits */
+uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
 /* hub_pages.c */
 void pal_hub_get(void *hub, const char *path, pal_reply *reply);
 #endif

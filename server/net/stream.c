@@ -2,6 +2,7 @@
 #include "server/net/stream.h"
 
 #include "protocol/asset.h"
+#include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
@@ -22,7 +23,9 @@ struct pal_stream_coder {
     uint8_t *buffer;            /* [cap] */
     size_t cap;
     uint32_t haptic_seq;
+    uint64_t field_seq;
     uint64_t rate_tick, rate_ns;
+    int n_row; /* of the last frame */
 };
 
 static pal_err refuse(pal_note *note, int refusal, const char *part, const char *what)
@@ -58,6 +61,10 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
+        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
+            if (pal_session_gives(s->session, index, (pal_field)k))
+                pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
+                               pal_field_name((pal_field)k));
     }
     free(bytes);
     pal_frame_order_destroy(order);
@@ -92,6 +99,7 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_note *note)
     s->error_m = error_m > 0 ? error_m : side > 0 ? fmin(5e-5, side / 3000) : 5e-5;
     for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
     s->coder->cap = pal_frame_bound(most);
+    if (s->coder->cap < pal_field_bound(most)) s->coder->cap = pal_field_bound(most);
     if (s->coder->cap < PAL_WIRE_TOOLS_MAX) s->coder->cap = PAL_WIRE_TOOLS_MAX;
     s->coder->buffer = malloc(s->coder->cap);
     return s->coder->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -121,6 +129,7 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; stream->part && p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
         for (int t = 0; t < PAL_STREAM_TIER; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
             if (stream->coder && p < PAL_BODY_MAX) pal_frame_encoder_destroy(stream->coder->encoder[p][t]);
@@ -308,9 +317,68 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
             if (used[t]) encode_part(stream, p, t);
     put_tools(stream, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
+    /* rows have come or gone, so the places mean others */
+    if (frame->n_row != stream->coder->n_row) memset(stream->row_ms, 0, sizeof stream->row_ms);
+    stream->coder->n_row = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) stream->row_ms[r] += 0.2 * (frame->row_ns[r] * 1e-6 - stream->row_ms[r]);
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
     return true;
+}
+
+/* one message of the newest values; work is scratch that is taken for the call */
+static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
+{
+    pal_stream_part *part = &s->part[p];
+    const pal_frame_field *from = &s->frame->part[p].field[k];
+    pal_field_head head = {.part = (uint16_t)p,
+                           .field = (pal_wire_field)k,
+                           .epoch = part->info.epoch,
+                           .sim_time_us = from->time_s > 0 ? (uint64_t)(from->time_s * 1e6) : 0,
+                           .n_vertex = part->info.n_vertex};
+    uint8_t *work = malloc(part->info.n_vertex);
+    size_t n_byte = 0;
+    int refusal =
+        work ? pal_field_put(from->value, &head, work, s->coder->buffer, s->coder->cap, &n_byte) : PAL_REFUSAL_MEMORY;
+    free(work);
+    pal_packet *packet = refusal ? NULL : pal_packet_create(s->coder->buffer, n_byte, false);
+    /* a message a little late does not put the next one off, so that the rate is kept and never exceeded for long */
+    uint64_t *due = &part->field_due_ns[k], apart = (uint64_t)(1e9 / PAL_STREAM_FIELD_HZ), slack = apart / 10;
+    *due = now_ns > *due + slack ? now_ns + apart - slack : *due + apart;
+    part->field_revision[k] = from->revision;
+    if (!packet) return false;
+    pal_packet_replace(&part->field[k], packet);
+    part->field_made[k] = ++s->coder->field_seq;
+    s->count.n_field++;
+    s->count.n_field_byte += n_byte;
+    return true;
+}
+
+static void forget_field(pal_stream_part *part, int k)
+{
+    pal_packet_replace(&part->field[k], NULL);
+    part->field_made[k] = part->field_revision[k] = 0;
+}
+
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT], uint64_t *due_ns)
+{
+    bool any = false;
+    *due_ns = 0;
+    for (int p = 0; p < stream->n_part; p++)
+        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
+            pal_stream_part *part = &stream->part[p];
+            const pal_frame_field *from = stream->frame ? &stream->frame->part[p].field[k] : NULL;
+            if (n_look[p][k] == 0) {
+                if (part->field_revision[k]) forget_field(part, k);
+                continue;
+            }
+            if (!from || !from->value || !from->revision || from->revision == part->field_revision[k]) continue;
+            uint64_t due = part->field_due_ns[k];
+            if (now_ns >= due)
+                any = encode_field(stream, p, k, now_ns) || any;
+            else if (!*due_ns || due < *due_ns)
+                *due_ns = due;
+        }
+    return any;
 }
 
 void pal_stream_begin_tier(pal_stream *stream, int tier)

@@ -12,18 +12,24 @@
 #include "server/session/members.h"
 #include "server/session/session.h"
 
-enum { PAL_STREAM_TIER = 3 };    /* 0: error_m; then 2 and 5 times that */
-#define PAL_STREAM_RATE_HZ 120.0 /* cycles per second at most */
+enum { PAL_STREAM_TIER = 3 };     /* 0: error_m; then 2 and 5 times that */
+#define PAL_STREAM_RATE_HZ  120.0 /* cycles per second at most */
+#define PAL_STREAM_FIELD_HZ 10.0  /* values of a field per second at most */
 
 typedef struct pal_stream_part {
     pal_wire_part_info info;
     pal_packet *asset;
-    pal_packet *frame[PAL_STREAM_TIER];    /* newest, NULL before the first          */
-    uint32_t frame_cycle[PAL_STREAM_TIER]; /* cycle that made it                     */
+    pal_packet *frame[PAL_STREAM_TIER];       /* newest, NULL before the first          */
+    uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that made it                     */
+    pal_packet *field[PAL_FIELD_COUNT];       /* newest values, NULL: nobody looks or none yet */
+    uint64_t field_made[PAL_FIELD_COUNT];     /* another number for every message       */
+    uint64_t field_revision[PAL_FIELD_COUNT]; /* of what was encoded last            */
+    uint64_t field_due_ns[PAL_FIELD_COUNT];   /* not before then again               */
 } pal_stream_part;
 
 typedef struct pal_stream_count { /* totals for metrics */
     uint64_t n_encode, encode_ns, n_frame_byte, n_refused_frame;
+    uint64_t n_field, n_field_byte;
 } pal_stream_count;
 
 typedef struct pal_stream {
@@ -62,6 +68,10 @@ uint16_t pal_stream_wire_id(int member);
  * is true, tools, contact models. false: nothing new. */
 bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
                      const pal_stream_tool tool[PAL_TOOL_MAX]);
+/* encodes the newest values of every field that n_look clients look at, drops those of the others. true: there is
+ * something new; *due_ns: when values that came too soon may be encoded, 0: none wait */
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT],
+                       uint64_t *due_ns);
 /* a tier begins to be used: its newest frames are encoded from the newest positions (same cycle) */
 void pal_stream_begin_tier(pal_stream *stream, int tier);
 double pal_stream_tier_error_m(const pal_stream *stream, int tier);

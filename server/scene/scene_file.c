@@ -4,6 +4,7 @@
 
 #include "server/mesh/mesh_file.h"
 #include "server/scene/json_reader.h"
+#include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
 
 #include <math.h>
@@ -101,7 +102,7 @@ static pal_err place_of(const pal_json *json, const char *path, const char *fold
     return n < 0 || (size_t)n >= n_byte ? pal_json_bad(json, path, "the path is too long") : PAL_ERR_OK;
 }
 
-static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder,
+static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder, bool fem,
                          pal_prepared *out)
 {
     char name[FOLDER / 2] = "", units[16] = "", at[PAL_JSON_PATH], file[FOLDER + FOLDER / 2];
@@ -121,7 +122,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
                 return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
         err = pal_prepared_load(file, out, &why);
     } else {
-        pal_surface_scene options = {.label = -1};
+        pal_surface_scene options = {.label = -1, .fem = fem};
         PAL_TRY(pal_json_count(json, body, path, "resolution", 0, 1024, &options.resolution));
         PAL_TRY(pal_json_count(json, body, path, "label", -1, 1 << 30, &options.label));
         PAL_TRY(pal_json_count(json, body, path, "triangles", 0, 10000000, &options.target_tri));
@@ -158,9 +159,9 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
 static pal_err read_body(const pal_json *json, const cJSON *object, int index, const char *folder,
                          pal_loaded_scene *scene)
 {
-    static const char *const known[] = {"name",       "largest", "mesh",      "surface",  "units",
-                                        "resolution", "label",   "triangles", "material", "model",
-                                        "solver",     "output",  "supports",  "effects",  NULL};
+    static const char *const known[] = {"name",     "largest",   "mesh",     "surface", "units",  "resolution",
+                                        "label",    "triangles", "material", "model",   "solver", "output",
+                                        "supports", "effects",   "regions",  NULL};
     char path[PAL_JSON_PATH], name[PAL_NAME];
     pal_json_entry(path, "bodies", index);
     PAL_TRY(pal_json_object(json, object, path, known));
@@ -173,9 +174,9 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
-    PAL_TRY(read_mesh(json, object, path, folder, &scene->mesh[index]));
+    PAL_TRY(read_mesh(json, object, path, folder, !strcmp(body->model.name, "fem"), &scene->mesh[index]));
     scene->n_mesh = index + 1;
-    return PAL_ERR_OK;
+    return pal_region_read(json, object, path, folder, scene, index);
 }
 
 static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *scene)
@@ -267,6 +268,9 @@ pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note)
 void pal_scene_free(pal_loaded_scene *loaded)
 {
     if (!loaded) return;
-    for (int k = 0; k < PAL_BODY_MAX; k++) pal_prepared_free(&loaded->mesh[k]);
+    for (int k = 0; k < PAL_BODY_MAX; k++) {
+        pal_region_free(loaded, k);
+        pal_prepared_free(&loaded->mesh[k]);
+    }
     free(loaded);
 }

@@ -9,23 +9,42 @@
  *                                                          "units": "mm", "resolution": 24, "label": 2,
  *                                                          "triangles": 50000, "largest": true, prepared at load)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
+ *     "regions": [                                         other materials in parts of the body (model fem), at most
+ * 32; what a region does not give is the body's; later ones win
+ *       {"box": {"low_m": [..], "high_m": [..]}, "young_Pa": 50000, "poisson": 0.3, "density_kg_m3": 1100},
+ *       {"label": {"volume": "liver.nii.gz", "is": 2}, "young_Pa": 50000},    where that scan's voxels have the label;
+ *                                                          the scan lies in the frame of the surface's file
+ *       {"grid": {"n": [3, 2, 2], "low_m": [..], "high_m": [..], "young_Pa": [12 numbers, x fastest], "poisson": [..],
+ *                 "density_kg_m3": [..]}}                  trilinear between its nodes, the border's values beyond
+ *     ],
  *     "model": {"name": "tet_springs", "k_distance_J": ...},
- *     "solver": {"name": "verlet"}, "output": {"name": "skin_out"},
+ *               or {"name": "fem", "element": "hex8_bbar", "law": "corotational", "fill": true} (sim/models/fem.c)
+ *     "solver": {"name": "verlet"},
+ *               or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
+ *     "output": {"name": "skin_out"},
  *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}}],
  *     "effects": [{"name": "gravity"}, {"name": "tool_push", ...}, {"name": "tool_grab"}, {"name": "finite_guard"}]
  *   }],
  *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]
  * }
  * and "gravity_m_s2": 9.81, "most_substep": 2000 beside step_s.
- * Absent keys take the defaults of pal_scene_default and pal_body_default. */
+ * Boxes and grids are in the body's frame: metres from origin_m of the prepared mesh, which is the middle of the
+ * surface's box. Absent keys take the defaults of pal_scene_default and pal_body_default. */
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
 #include "server/sim/def.h"
 
-/* a scene with the meshes it owns; the address of `scene` stays */
+/* what a region borrows */
+typedef struct pal_loaded_region {
+    uint8_t *label;
+    double *grid;
+} pal_loaded_region;
+
+/* a scene with the meshes and regions it owns; the address of `scene` stays */
 typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
+    pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
     int n_mesh;
 } pal_loaded_scene;
 
@@ -38,7 +57,7 @@ void pal_scene_free(pal_loaded_scene *scene);
 /* how a bare surface or label volume is turned into a scene */
 typedef struct pal_surface_scene {
     double unit_m;         /* 0: guess                                            */
-    int resolution;        /* 0: about 13,000 tetrahedra                          */
+    int resolution;        /* 0: about 13,000 tetrahedra; fem: about 2,500 nodes  */
     int label;             /* of a label volume; < 0: the most frequent           */
     int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
     pal_material material; /* young_Pa 0: the default material                 */
@@ -47,6 +66,9 @@ typedef struct pal_surface_scene {
     double hold;           /* lowest part of the height held in place; 0: 0.05        */
     bool gravity;      /* add the effect; a shape as scanned carries its own weight already, so the default is none */
     bool area_springs; /* add the row face_area; without it edges and volumes bear its share */
+    /* model fem in place of springs */
+    bool fem;
+    const char *element, *law, *solver;                              /* NULL: hex8_bbar, corotational, implicit_euler */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
 } pal_surface_scene;
@@ -69,8 +91,8 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
 /* our own procedural organ as a scene, for when nothing else can be had */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note);
-/* writes DIR/scene.json and DIR/NAME.palmesh for every body, scene.json last; makes DIR; IO, and then nothing that this
- * call wrote is left */
+/* writes DIR/scene.json, DIR/NAME.palmesh for every body and NAME_regionK.nii for every label region, scene.json last;
+ * makes DIR; IO, and then nothing that this call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
 /* other texts than those from the file's name; NULL keeps one. name becomes the only body's name as well. REFUSED for
  * characters that a scene may not hold or too many of them, and then nothing changed */

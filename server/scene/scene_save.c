@@ -3,6 +3,7 @@
 #include "server/scene/scene_file.h"
 
 #include "server/mesh/mesh_file.h"
+#include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
 
 #include <cjson/cJSON.h>
@@ -15,8 +16,8 @@
 
 enum { PATH = 1200, MESH_NAME = PAL_NAME + 24 };
 
-/* "liver.palmesh"; a number keeps two bodies of like names apart */
-static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
+/* "liver"; a number keeps two bodies of like names apart */
+static void stem_of(const pal_scene *scene, int body, char out[MESH_NAME])
 {
     char plain[PAL_NAME], other[PAL_NAME];
     bool twice = false;
@@ -26,9 +27,16 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
         twice = twice || (k != body && !strcmp(plain, other));
     }
     if (twice)
-        snprintf(out, MESH_NAME, "%s_%d.palmesh", plain, body);
+        snprintf(out, MESH_NAME, "%s_%d", plain, body);
     else
-        snprintf(out, MESH_NAME, "%s.palmesh", plain);
+        snprintf(out, MESH_NAME, "%s", plain);
+}
+
+static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
+{
+    stem_of(scene, body, out);
+    size_t n = strlen(out);
+    snprintf(out + n, MESH_NAME - n, ".palmesh");
 }
 
 static void add_item(cJSON *parent, const char *key, const pal_item *item)
@@ -86,6 +94,8 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     cJSON_AddNumberToObject(material, "poisson", body->material.poisson);
     cJSON_AddNumberToObject(material, "density_kg_m3", body->material.density_kg_m3);
     cJSON_AddNumberToObject(material, "damping_1_s", body->material.damping_1_s);
+    stem_of(scene, index, name);
+    pal_region_add(object, body, name);
     add_item(object, "model", &body->model);
     if (body->solver.name[0]) add_item(object, "solver", &body->solver);
     add_item(object, "output", &body->output);
@@ -141,27 +151,60 @@ pal_err pal_scene_make_folder(const char *folder, pal_note *note)
     return PAL_ERR_OK;
 }
 
+/* mesh and label volumes of a body; what was written is counted in *n_file */
+static pal_err save_body(const pal_scene *scene, int index, const char *folder, int *n_file, pal_note *note)
+{
+    const pal_body_def *body = &scene->body[index];
+    char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
+    mesh_name(scene, index, name);
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    PAL_TRY(pal_prepared_save(body->mesh, path, note));
+    ++*n_file;
+    stem_of(scene, index, name);
+    for (int k = 0; k < body->n_region; k++) {
+        if (body->region[k].kind != PAL_REGION_LABEL) continue;
+        pal_region_volume(name, k, volume, sizeof volume);
+        snprintf(path, sizeof path, "%s/%s", folder, volume);
+        PAL_TRY(pal_region_write(body, k, path, note));
+        ++*n_file;
+    }
+    return PAL_ERR_OK;
+}
+
+/* takes back the first n_file files that save_body wrote */
+static void remove_files(const pal_scene *scene, const char *folder, int n_file)
+{
+    char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
+    for (int b = 0; b < scene->n_body && n_file > 0; b++) {
+        const pal_body_def *body = &scene->body[b];
+        mesh_name(scene, b, name);
+        snprintf(path, sizeof path, "%s/%s", folder, name);
+        unlink(path);
+        n_file--;
+        stem_of(scene, b, name);
+        for (int k = 0; k < body->n_region && n_file > 0; k++) {
+            if (body->region[k].kind != PAL_REGION_LABEL) continue;
+            pal_region_volume(name, k, volume, sizeof volume);
+            snprintf(path, sizeof path, "%s/%s", folder, volume);
+            unlink(path);
+            n_file--;
+        }
+    }
+}
+
 pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
 {
     const pal_scene *scene = &loaded->scene;
-    char name[MESH_NAME], path[PATH];
-    int done = 0;
+    char path[PATH];
+    int n_file = 0;
     pal_err err = pal_scene_make_folder(folder, note);
     if (err) return err;
-    for (; !err && done < scene->n_body; done += !err) {
-        mesh_name(scene, done, name);
-        snprintf(path, sizeof path, "%s/%s", folder, name);
-        err = pal_prepared_save(scene->body[done].mesh, path, note);
-    }
+    for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, note);
     char *text = err ? NULL : scene_text(scene);
     if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for scene.json", folder);
     snprintf(path, sizeof path, "%s/scene.json", folder);
     if (!err) err = pal_file_write(path, text, strlen(text), note);
     cJSON_free(text);
-    for (int k = 0; err && k < done; k++) {
-        mesh_name(scene, k, name);
-        snprintf(path, sizeof path, "%s/%s", folder, name);
-        unlink(path);
-    }
+    if (err) remove_files(scene, folder, n_file);
     return err;
 }

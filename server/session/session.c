@@ -53,6 +53,7 @@ struct pal_session {
     pal_row_info *row;
     int n_row;
     pal_shown part[PAL_BODY_MAX];
+    bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
     int n_part;
     pthread_t thread;
 
@@ -74,7 +75,8 @@ struct pal_session {
     uint64_t n_late;  /* began late                          */
     uint64_t work_ns; /* processor time of the last step     */
     uint64_t end_ns;
-    mark marks[N_MARK + 2]; /* a ring, oldest at first              */
+    uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* who looks at a field */
+    mark marks[N_MARK + 2];                         /* a ring, oldest at first              */
     int first, n_marks;
 };
 
@@ -121,6 +123,7 @@ static double slowdown(const pal_session *s)
 static void publish(pal_session *s)
 {
     pal_frame *frame = pal_trio_slot(&s->frames);
+    (void)pal_frame_fit(frame, s->world); /* without memory that frame goes without the field */
     pal_world_frame(s->world, frame);
     frame->end_ns = s->end_ns;
     frame->step_ns = s->work_ns;
@@ -173,6 +176,21 @@ static bool take_poses(pal_session *s, uint64_t now)
     return changed;
 }
 
+/* the row comes with the first who looks and goes with the last; one that could not be made is tried again when the
+ * next one asks */
+static void look(pal_session *s, const pal_command *command)
+{
+    uint32_t *n = &s->n_look[command->body][command->field];
+    pal_note note = {""};
+    if (!command->wanted && *n == 0) return;
+    *n = command->wanted ? *n + 1 : *n - 1;
+    if (!command->wanted && *n > 0) return;
+    if (pal_world_field(s->world, command->body, command->field, command->wanted, &note)) {
+        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+        say(s, &note);
+    }
+}
+
 static void obey(pal_session *s, const pal_command *command)
 {
     pal_note note = {""};
@@ -203,6 +221,9 @@ static void obey(pal_session *s, const pal_command *command)
             note.text[0] = 0;
         }
         say(s, &note);
+        break;
+    case PAL_COMMAND_FIELD:
+        look(s, command);
         break;
     case PAL_COMMAND_COUNT:
         break;
@@ -290,6 +311,8 @@ static pal_err copy_plan(pal_session *s)
     }
     s->n_part = pal_world_parts(s->world);
     for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
+    for (int b = 0; b < pal_world_bodies(s->world); b++)
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) s->gives[b][k] = pal_world_gives(s->world, b, (pal_field)k);
     for (int b = 0; b < pal_world_bodies(s->world); b++)
         s->reach_m = fmax(s->reach_m, reach_sizes * pal_world_body(s->world, b)->size_m);
     return PAL_ERR_OK;
@@ -395,6 +418,12 @@ void pal_session_shown(const pal_session *s, int part, pal_shown *out)
     *out = part >= 0 && part < s->n_part ? s->part[part] : (pal_shown){.name = ""};
 }
 
+bool pal_session_gives(const pal_session *s, int body, pal_field field)
+{
+    bool there = body >= 0 && body < PAL_BODY_MAX && (int)field >= 0 && field < PAL_FIELD_COUNT;
+    return there && s->gives[body][field];
+}
+
 static pal_err refuse(pal_session *s)
 {
     atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
@@ -424,6 +453,7 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
     if (command->kind == PAL_COMMAND_MATERIAL &&
         (command->body < 0 || command->body >= s->scene->n_body || !material_ok(&command->material)))
         return refuse(s);
+    if (command->kind == PAL_COMMAND_FIELD && !pal_session_gives(s, command->body, command->field)) return refuse(s);
     return pal_ring_put(s->command, command);
 }
 

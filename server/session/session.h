@@ -7,7 +7,9 @@
  * While paused a frame is published when a command or pose came in; tools are then shown where they are held.
  * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
  * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback; a lock guards only
- * the sentence of pal_session_last_note. No heap or file call after open until close. */
+ * the sentence of pal_session_last_note. No heap or file call after open until close, but when somebody begins or ends
+ * to look at a field: then its row and its place in frames come and go, between two steps. Fields are no input: they
+ * are not in the input log and change no hash. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/sim/effect.h"
@@ -21,6 +23,7 @@ typedef enum pal_command_kind {
     PAL_COMMAND_STEP, /* one step while paused, nothing else */
     PAL_COMMAND_RESET,
     PAL_COMMAND_MATERIAL, /* body, material        */
+    PAL_COMMAND_FIELD,    /* body, field, wanted: one more or one less who looks; the row is there while anybody does */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 
@@ -28,6 +31,8 @@ typedef struct pal_command {
     pal_command_kind kind;
     int body;
     pal_material material;
+    pal_field field;
+    bool wanted;
 } pal_command;
 
 typedef struct pal_session_options {
@@ -44,16 +49,18 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
 
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
-/* the plan and the shown parts: constant while the session lives (this release). [any] */
+/* the plan at open and the shown parts: constant while the session lives (this release); frames name the rows that are
+ * there now, with those of fields. [any] */
 int pal_session_rows(const pal_session *session);
 void pal_session_row(const pal_session *session, int row, pal_row_info *out); /* spent_ns is 0: see frames */
 int pal_session_parts(const pal_session *session);
 void pal_session_shown(const pal_session *session, int part, pal_shown *out);
+bool pal_session_gives(const pal_session *session, int body, pal_field field); /* can it be shown? */
 
 /* newest pose of a tool; latest wins, never waits; NULL lets go. REFUSED: not finite, out of reach, no such tool.
  * One thread at a time per tool. [net] */
 pal_err pal_session_put_pose(pal_session *session, int tool, const pal_pose *pose);
-/* taken between two steps. FULL when 64 are waiting; REFUSED for an unknown kind, body or material. [any] */
+/* taken between two steps. FULL when 64 are waiting; REFUSED for an unknown kind, body, material or field. [any] */
 pal_err pal_session_command(pal_session *session, const pal_command *command);
 /* newest unseen frame or NULL; valid until the next call. One reader. [net] */
 const pal_frame *pal_session_take_frame(pal_session *session);

@@ -2,6 +2,28 @@
 #include "server/sim/body.h"
 
 #include <math.h>
+#include <string.h>
+
+static const char *const field_name[PAL_FIELD_COUNT] = {"none", "displacement", "von_mises", "energy"};
+
+const char *pal_field_name(pal_field field)
+{
+    return field_name[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
+}
+
+pal_field pal_field_find(const char *name)
+{
+    int found = PAL_FIELD_COUNT - 1;
+    while (found > PAL_FIELD_NONE && strcmp(field_name[found], name)) found--;
+    return (pal_field)found;
+}
+
+const char *pal_field_title(pal_field field)
+{
+    static const char *const title[PAL_FIELD_COUNT] = {"no field", "displacement", "von Mises stress",
+                                                       "strain energy density"};
+    return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
+}
 
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
 {

@@ -2,10 +2,40 @@
 #ifndef PAL_SIM_BODY_H
 #define PAL_SIM_BODY_H
 #include "server/base/arena.h"
+#include "server/mesh/hexes.h"
 #include "server/mesh/skin.h"
 #include "server/mesh/surface.h"
 #include "server/mesh/tets.h"
 #include "server/sim/strips.h"
+
+/* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
+ * Published by an implicit solver that holds a static factor; rows stay apart, the body carries the door. */
+struct pal_body;
+typedef struct pal_compliance {
+    void *self;
+    /* displacement [n_node][3] that the forces [n_node][3] (N, 0 at most nodes) would cause once all is at rest again;
+     * false: not known (no supports, no factor). No heap; see sim/compliance.h for its cost. [sim] */
+    bool (*solve)(void *self, const struct pal_body *body, const double *force_N, double *move_m);
+} pal_compliance;
+
+/* what can be shown in colour, computed only while somebody looks (row field_out) */
+typedef enum pal_field {
+    PAL_FIELD_NONE,
+    PAL_FIELD_DISPLACEMENT_M,
+    PAL_FIELD_VON_MISES_PA,
+    PAL_FIELD_ENERGY_J_M3,
+    PAL_FIELD_COUNT
+} pal_field;
+const char *pal_field_name(pal_field field);  /* "displacement", "von_mises", "energy", "none"; never NULL [any] */
+pal_field pal_field_find(const char *name);   /* NONE: there is no field of that name [any] */
+const char *pal_field_title(pal_field field); /* for sentences: "von Mises stress" [any] */
+
+/* a field as it is shown: written by its row, there while the row is */
+typedef struct pal_shown_field {
+    float *value;      /* SI, at shown vertices                   [n_shown] */
+    uint64_t revision; /* another number for every set of values, never twice */
+    double time_s;     /* simulated, when they were taken                     */
+} pal_shown_field;
 
 typedef struct pal_body {
     const char *name;
@@ -18,7 +48,7 @@ typedef struct pal_body {
     double *f;          /* node force N                                            [n_node][3]   */
     double *g;          /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
     double *mass_kg;    /* lumped                                                  [n_dof]       */
-    uint8_t *held;      /* 1: fixed in place                                       [n_dof]       */
+    uint8_t *held;      /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
     double *x_rest;     /* rest position m                                         [n_dof][3]    */
     bool frozen;        /* set by finite_guard or the solver: the body no longer moves           */
     double size_m;      /* box diagonal at rest, S of numerics.md part 3                         */
@@ -29,18 +59,32 @@ typedef struct pal_body {
     uint64_t n_capped;  /* node loads shortened since reset                                        */
     uint64_t n_clamped; /* node moves shortened by the solver since reset                          */
     uint64_t n_heavy;   /* sub-steps since reset in which deformation asked for more than the budget of sub-steps */
+    uint64_t n_tangled; /* times since reset that voxel elements were found turned over and ran on their split  */
+    uint64_t n_split;   /* changes between voxel elements and their split                                        */
+
+    bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
+    bool wants_compliance; /* a CONTACT row asks for it: set in its make; the SOLVE row is made after all others */
+    const pal_compliance *compliance; /* NULL: none */
+    /* the elements of model fem, for evaluation through shape functions; NULL: none. Corners as in num/shape.h, tet10
+     * with its middle nodes [n_element][n_corner] */
+    const int32_t *element;
+    int n_element, n_corner;
+    const float *fill; /* share of material in each element; NULL: 1 [n_element] */
 
     /* geometry at rest, borrowed from the scene's prepared mesh by the model; NULL when the model has none */
-    const pal_tets *tets;
+    const pal_tets *tets;       /* its nodes are the body's first ones */
+    const pal_hexes *hexes;     /* the same nodes as cubes; NULL: none */
     pal_slots *slots;           /* memory order of the nodes for kernels; NULL: none made       */
     const pal_surface *surface; /* shown surface at rest                                       */
     const pal_skin *skin;       /* surface on nodes; NULL: shown vertices are the surface nodes */
     /* what is shown: all of these are set by the OUTPUT row's make; none: n_shown 0 */
-    double *skin_axes;         /* current frames of skin, kept between calls  [n_frame][9]    */
-    int n_shown;               /* shown vertices                                              */
-    float *shown;              /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
-    const int32_t *shown_node; /* node of each shown vertex when skin is NULL [n_shown]       */
-    uint64_t revision;         /* grows whenever the shown topology changes                   */
+    double *skin_axes;                             /* current frames of skin, kept between calls  [n_frame][9]    */
+    int n_shown;                                   /* shown vertices                                              */
+    float *shown;                                  /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
+    const int32_t *shown_node;                     /* node of each shown vertex when skin is NULL [n_shown]       */
+    uint64_t revision;                             /* grows whenever the shown topology changes                   */
+    const pal_shown_field *field[PAL_FIELD_COUNT]; /* NULL: nobody looks                               */
+    uint64_t field_revision;                       /* sets of values taken so far, of all fields       */
 } pal_body;
 
 /* arrays for n points without embed, zeroed, f = g, d = x, dv = v; MEMORY. [load] */

@@ -52,7 +52,7 @@ pal_err pal_material_check(pal_material *material, pal_note *note)
         const char *key;
         double value, low, high;
     } range[] = {{"young_Pa", material->young_Pa, 1e-6, 1e15},
-                 {"poisson", material->poisson, -0.9999, 0.5},
+                 {"poisson", material->poisson, -0.9999, 0.499999},
                  {"density_kg_m3", material->density_kg_m3, 1e-24, 1e24},
                  {"damping_1_s", material->damping_1_s, 0, 1e9}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
@@ -92,7 +92,11 @@ static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
         body->n_effect > PAL_ROW_ITEMS)
         return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": %d supports, %d effects, at most %d and %d",
                             body->name, body->n_support, body->n_effect, PAL_SUPPORT_MAX, PAL_ROW_ITEMS);
+    if (body->n_region < 0 || body->n_region > PAL_REGION_MAX)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": %d regions, at most %d", body->name, body->n_region,
+                            PAL_REGION_MAX);
     for (int i = 0; i < body->n_support; i++) PAL_TRY(check_support(body, i, note));
+    for (int i = 0; i < body->n_region; i++) PAL_TRY(pal_region_check(body, i, note));
     pal_material material = body->material;
     pal_note why = {{0}};
     if (pal_material_check(&material, &why))

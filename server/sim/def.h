@@ -7,7 +7,7 @@
 #include "server/sim/item.h"
 #include "server/sim/tools.h"
 
-enum { PAL_NAME = 48, PAL_BODY_MAX = 8, PAL_ROW_ITEMS = 16, PAL_SUPPORT_MAX = 8 };
+enum { PAL_NAME = 48, PAL_BODY_MAX = 8, PAL_ROW_ITEMS = 16, PAL_SUPPORT_MAX = 8, PAL_REGION_MAX = 32 };
 
 /* isotropic material of a body; defaults: soft abdominal tissue */
 typedef struct pal_material {
@@ -16,6 +16,20 @@ typedef struct pal_material {
     double density_kg_m3; /* 1000           */
     double damping_1_s;   /* 4: viscous damping rate c/m of the row `viscous`; 0: no such row */
 } pal_material;
+
+/* another material in a part of the body; later regions win. Numbers that are NaN keep the body's */
+typedef enum pal_region_kind { PAL_REGION_BOX, PAL_REGION_LABEL, PAL_REGION_GRID } pal_region_kind;
+typedef struct pal_region {
+    pal_region_kind kind;
+    double young_Pa, poisson, density_kg_m3; /* GRID: NaN where the grid gives it                              */
+    double low_m[3], high_m[3];              /* BOX, and the extent of GRID; body frame                        */
+    /* LABEL: voxels of a label volume, GRID: values at nodes, trilinear between; x fastest; borrowed           */
+    int n[3];
+    double spacing_m[3];  /* LABEL: of its voxels; low_m: centre of the first             */
+    const uint8_t *label; /* [n2][n1][n0], material where it equals `is`                  */
+    int is;
+    const double *grid_young_Pa, *grid_poisson, *grid_density_kg_m3; /* NULL: not given                          */
+} pal_region;
 
 /* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), or the lowest
  * fraction of the body's height along `up` */
@@ -29,6 +43,8 @@ typedef struct pal_body_def {
     char name[PAL_NAME];
     const pal_prepared *mesh; /* borrowed                                                        */
     pal_material material;
+    int n_region;
+    pal_region region[PAL_REGION_MAX];
     pal_item model;  /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
     pal_item solver; /* name: "verlet"; empty name: the model's own choice               */
     pal_item output; /* "skin_out" (default) or "surface_out"                            */
@@ -64,8 +80,16 @@ void pal_scene_default(pal_scene *scene);
 void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh);
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
-/* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 is taken as 0.4999 and note says so */
+/* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 and below 0.5 is taken as 0.4999 and
+ * note says so */
 pal_err pal_material_check(pal_material *material, pal_note *note);
+/* the material at x (body frame): the body's, overridden by its regions in order */
+void pal_material_at(const pal_body_def *def, const double x[3], pal_material *out);
+/* the same over another material than the body's; NaN in `base` stays where no region gives the number */
+void pal_material_over(const pal_body_def *def, const pal_material *base, const double x[3], pal_material *out);
+/* REFUSED names body, regions[index], key and number: a box or grid that is none, numbers out of range or not given.
+ * Poisson ratios above 0.4999 and below 0.5 are taken as 0.4999 */
+pal_err pal_region_check(const pal_body_def *def, int index, pal_note *note);
 /* REFUSED names the entry: no body, bad numbers, two bodies of one name, tool radius, step outside [1e-4, 0.1] s */
 pal_err pal_scene_check(const pal_scene *scene, pal_note *note);
 #endif

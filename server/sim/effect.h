@@ -8,6 +8,7 @@
  * Effect files include this header and mesh or num headers, never world.h and never each other. */
 #ifndef PAL_SIM_EFFECT_H
 #define PAL_SIM_EFFECT_H
+#include "server/num/blocks.h"
 #include "server/sim/body.h"
 #include "server/sim/def.h"
 #include "server/sim/item.h"
@@ -25,7 +26,7 @@ typedef enum pal_stage {
 
 typedef struct pal_row pal_row;
 
-/* all that a row may touch in a step */
+/* all that a row may touch in a step; its pointers are those of this step: rows may come and go between steps */
 typedef struct pal_step {
     pal_body *body;
     pal_tools *tools;
@@ -50,7 +51,43 @@ typedef struct pal_build {
     pal_arena *arena;    /* world memory                                                     */
     size_t scratch_byte; /* a row raises it to the scratch it needs in a sub-step            */
     pal_note *note;      /* may be NULL                                                      */
+    const pal_row *made; /* this body's rows made so far: all others when SOLVE is made [n_made] */
+    int n_made;
 } pal_build;
+
+/* What implicit solvers ask of FORCE and CONTACT rows: stiffness K = -df/dx and damping C = -df/dv, symmetric, taken by
+ * `linearise` and held until the next one. K is positive semi-definite, or is made so. [sim] unless said */
+typedef struct pal_tangent {
+    /* nodes that the row couples, for the pattern of an assembled matrix; false: none (the row is applied by multiply
+     * only, as contact is). [load], after make */
+    bool (*couple)(void *self, pal_cliques *out);
+    /* takes K and C at the body's current d (and, for CONTACT rows, the loads they gave in this sub-step) */
+    void (*linearise)(void *self, const pal_body *body);
+    /* out += (k K + c C) p, p and out [n_node][3] */
+    void (*multiply)(void *self, const pal_body *body, double k, double c, const double *p, double *out);
+    /* to += k K + c C, into the pattern made with couple */
+    void (*assemble)(void *self, const pal_body *body, double k, double c, pal_blocks *to);
+    /* adds to turn [n_node][9] the rotation of the material around each node, weighted by volume (the solver takes the
+     * polar part of the sum); NULL: no rotations. At the last linearise */
+    void (*rotate)(void *self, const pal_body *body, double *turn);
+    /* CONTACT, after the solve: it moved the nodes by `moved` [n_node][3], m, since the loads were given (held nodes
+     * too, as they were led). Brings the forces on the tools to those of the end of the sub-step; a solver of several
+     * stages asks after each, the last answer holds. True: contact pulled where it can only push, or forces went beyond
+     * a cap, so the row has changed its loads in body->load and its stiffness: solve the same stage again from where it
+     * began. A solver goes round at most twice more and takes the last answer as it is */
+    bool (*settle)(void *self, pal_step *step, const double *moved);
+} pal_tangent;
+
+/* how a solver is getting on, for status, lab and panel */
+typedef struct pal_solve_report {
+    int n_newton, n_cg; /* iterations of the last step, conjugate gradients summed over its Newton iterations */
+    double residual;    /* of the last Newton iteration, relative to the loads                               */
+    double step_size;   /* last step of the line search, 1: full                                            */
+    bool converged;     /* the tolerance was met                                                            */
+    int64_t factor_nonzeros;
+    int n_factor; /* factorisations since load                                                        */
+    double analyse_s, assemble_s, factor_s, solve_s; /* time spent since load                                     */
+} pal_solve_report;
 
 typedef struct pal_effect {
     const char *name; /* as written in scene files */
@@ -74,6 +111,13 @@ typedef struct pal_effect {
     /* live edit: constants that the scene did not give are derived again. REFUSED: nothing changed */
     pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note);
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
+    /* optional, for implicit solvers; a body with an implicit solver refuses `internal` rows without it */
+    const pal_tangent *tangent;
+    bool implicit; /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
+    /* FORCE: adds to sum [n_node] the row's field times volume and to volume_m3 [n_node] the volume it stands for */
+    void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
+    void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
+    void (*destroy)(void *self); /* what make took beside the arena (threads, factors); NULL: nothing. [load] */
 } pal_effect;
 
 struct pal_row {

@@ -12,14 +12,21 @@
     X(edge_distance)                                                                                                   \
     X(face_area)                                                                                                       \
     X(tet_volume)                                                                                                      \
+    X(tet_elastic)                                                                                                     \
+    X(hex_elastic)                                                                                                     \
+    X(moving_support)                                                                                                  \
     X(verlet)                                                                                                          \
+    X(implicit_euler)                                                                                                  \
+    X(sdirk2)                                                                                                          \
+    X(static_newton)                                                                                                   \
     X(tool_push)                                                                                                       \
     X(tool_grab)                                                                                                       \
     X(finite_guard)                                                                                                    \
     X(surface_out)                                                                                                     \
-    X(skin_out)
+    X(skin_out)                                                                                                        \
+    X(field_out)
 
-#define PAL_MODEL_LIST(X) X(tet_springs)
+#define PAL_MODEL_LIST(X) X(tet_springs) X(fem)
 
 #define X(name) extern const pal_effect pal_effect_##name;
 PAL_EFFECT_LIST(X)

@@ -27,6 +27,27 @@ pal_frame *pal_frame_create(const pal_world *world)
 void pal_frame_destroy(pal_frame *frame)
 {
     if (!frame) return;
-    for (int i = 0; i < frame->n_part; i++) free(frame->part[i].position_m);
+    for (int i = 0; i < frame->n_part; i++) {
+        free(frame->part[i].position_m);
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) free(frame->part[i].field[k].value);
+    }
     free(frame);
+}
+
+pal_err pal_frame_fit(pal_frame *frame, const pal_world *world)
+{
+    pal_err err = PAL_ERR_OK;
+    for (int i = 0; i < frame->n_part; i++) {
+        const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
+        pal_frame_part *part = &frame->part[i];
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) {
+            pal_frame_field *field = &part->field[k];
+            if ((body->field[k] != NULL) == (field->value != NULL)) continue;
+            free(field->value);
+            *field = (pal_frame_field){0};
+            if (body->field[k]) field->value = calloc((size_t)part->n_vertex + 1, sizeof(float));
+            if (body->field[k] && !field->value) err = PAL_ERR_MEMORY;
+        }
+    }
+    return err;
 }

@@ -1,17 +1,27 @@
 /* What a step shows: copied out of the world, float metres in the scene frame, safe to read on another thread.
- * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. */
+ * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. Room for fields comes and
+ * goes with pal_frame_fit, so their pointers hold while nobody fills the frame again. */
 #ifndef PAL_SIM_FRAME_H
 #define PAL_SIM_FRAME_H
+#include "server/sim/body.h"
 #include "server/sim/def.h"
 #include "server/sim/tools.h"
 
 enum { PAL_FRAME_ROWS = 64 };
+
+/* a field in colour; value NULL: not shown */
+typedef struct pal_frame_field {
+    float *value;      /* SI [n_vertex]                                      */
+    uint64_t revision; /* another number for every set of values, never twice */
+    double time_s;     /* simulated, when they were taken                     */
+} pal_frame_field;
 
 typedef struct pal_frame_part {
     int n_vertex;
     float *position_m; /* [n_vertex][3] */
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
+    pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
 } pal_frame_part;
 
 typedef struct pal_frame_tool {
@@ -42,6 +52,7 @@ typedef struct pal_frame {
     int n_tool;
     pal_frame_tool tool[PAL_TOOL_MAX];
     int n_row;
-    uint32_t row_ns[PAL_FRAME_ROWS]; /* of the last step, in the plan's order */
+    uint32_t row_ns[PAL_FRAME_ROWS];      /* of the last step, in the plan's order           */
+    const char *row_name[PAL_FRAME_ROWS]; /* constants; more than at load while fields are shown */
 } pal_frame;
 #endif

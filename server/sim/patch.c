@@ -68,7 +68,8 @@ static void follow(pal_patch_track *track, const pal_patch_rules *rules, const p
     bool touches = blob->force_N > 0;
     if (!touches) {
         track->depth_m = -blob->gap_m;
-        if (track->contact) track->k_prior_N_m = track->slope.k_N_m;
+        if (blob->k_N_m > 0) track->slope.k_N_m = fmin(fmax(blob->k_N_m, rules->k_least_N_m), rules->k_most_N_m);
+        if (track->contact || blob->k_N_m > 0) track->k_prior_N_m = track->slope.k_N_m;
     } else if (!track->contact) {
         /* first touch: the way since the gap was measured, or what the start stiffness makes of the force */
         double depth = moved && track->depth_m < 0 ? track->depth_m - pal_dot3(move, blob->normal) : 0;
@@ -86,6 +87,7 @@ static void follow(pal_patch_track *track, const pal_patch_rules *rules, const p
             double secant = blob->force_N / track->depth_m;
             k = fmin(fmax(k, LEAST_SECANT * secant), MOST_SECANT * secant);
         }
+        if (blob->k_N_m > 0) k = blob->k_N_m;
         track->slope.k_N_m = fmin(fmax(k, rules->k_least_N_m), rules->k_most_N_m);
     }
     track->contact = touches;

@@ -6,7 +6,8 @@
  * not 20: one sphere in one dent touches tissue over its whole cap, and that is one patch; two walls of a fold are two
  * patches in two groups, whose forces add. k1 = dF/dd comes from least squares with forgetting on (d, F), taken only
  * when d has moved by 0.05 mm, started at the stiffness of a flat punch, 2 E a / (1 - nu^2), and clamped. Forgetting is
- * 0.8, not 0.9, which would lag a millimetre behind where tissue stiffens. k2 is 0.
+ * 0.8, not 0.9, which would lag a millimetre behind where tissue stiffens. Where the solver knows the static compliance
+ * (2.3 step 3 a) its answer is k1, and the start value when the next touch begins. k2 is 0.
  * Thread: [sim]. */
 #ifndef PAL_SIM_PATCH_H
 #define PAL_SIM_PATCH_H
@@ -17,6 +18,7 @@ typedef struct pal_blob {
     double normal[3]; /* from tissue to tool, unit                        */
     double force_N;   /* normal force, 0 when only near                   */
     double gap_m;     /* way the tool has to go until it touches, >= 0; 0 in contact */
+    double k_N_m;     /* tangent stiffness as the solver's compliance tells it; 0: not known */
 } pal_blob;
 
 /* least squares of F over d with forgetting and a start value */

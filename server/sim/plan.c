@@ -120,22 +120,35 @@ static pal_err build_body(build_state *s, const pal_scene *scene)
 
     s->n_wish = 0;
     for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
+    /* what is shown comes before the entries, so that a row field_out finds it */
+    PAL_TRY(add_named(s, ++own, &def->output, PAL_STAGE_OUTPUT));
     for (int i = 0; i < def->n_effect; i++) {
         *++own = def->effect[i];
         PAL_TRY(add_wish(s, own, true));
     }
-    PAL_TRY(add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE));
-    return add_named(s, ++own, &def->output, PAL_STAGE_OUTPUT);
+    return add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE);
 }
 
 static pal_err make_rows(build_state *s, pal_row *row, int *n_row)
 {
-    int n_solve = 0;
-    /* the OUTPUT row first: its make says what the body shows, which is what tools touch */
-    for (int pass = 0; pass < 2; pass++)
+    int n_solve = 0, first = *n_row;
+    const char *name = s->build.body->name;
+    for (int i = 0; i < s->n_wish; i++) s->build.body->implicit |= s->wish[i].effect->implicit;
+    for (int i = 0; i < s->n_wish; i++) {
+        const pal_effect *effect = s->wish[i].effect;
+        if (s->build.body->implicit && effect->internal && !effect->tangent)
+            return pal_note_set(s->build.note, PAL_ERR_REFUSED,
+                                "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs", name,
+                                effect->name);
+    }
+    /* the OUTPUT row first: its make says what the body shows, which is what tools touch; the SOLVE row last: the
+     * others have said what they want of it */
+    for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < s->n_wish; i++) {
-            if ((s->wish[i].effect->stage == PAL_STAGE_OUTPUT) != (pass == 0)) continue;
+            pal_stage stage = s->wish[i].effect->stage;
+            if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
             size_t before = pal_arena_used(s->build.arena);
+            s->build.made = row + first, s->build.n_made = *n_row - first;
             pal_row *r = &row[(*n_row)++];
             r->effect = s->wish[i].effect;
             PAL_TRY(r->effect->make(s->wish[i].item, &s->build, &r->self));
@@ -143,8 +156,7 @@ static pal_err make_rows(build_state *s, pal_row *row, int *n_row)
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
     if (n_solve != 1)
-        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": %d solvers, wanted one", s->build.body->name,
-                            n_solve);
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": %d solvers, wanted one", name, n_solve);
     return PAL_ERR_OK;
 }
 
@@ -164,9 +176,9 @@ static void sort_rows(pal_plan *plan, const pal_row *made, const int *made_body)
         }
 }
 
-static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, build_state *s, pal_plan *out)
+static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, build_state *s, pal_row *made,
+                         pal_plan *out)
 {
-    pal_row made[PAL_BODY_MAX * WISH_MAX] = {{0}};
     int made_body[PAL_BODY_MAX * WISH_MAX];
     out->n_body = scene->n_body;
     out->body = PAL_NEW(arena, pal_body, scene->n_body);
@@ -184,6 +196,9 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *not
     out->row_body = PAL_NEW(arena, int, out->n_row);
     if (!out->row || !out->row_body) return PAL_ERR_MEMORY;
     sort_rows(out, made, made_body);
+    out->n_load = out->n_row;
+    out->load_row = out->row;
+    out->load_row_body = out->row_body;
     return PAL_ERR_OK;
 }
 
@@ -192,9 +207,87 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note,
     build_state *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     *out = (pal_plan){0};
-    pal_err err = build_all(scene, arena, note, s, out);
+    pal_row made[PAL_BODY_MAX * WISH_MAX] = {{0}};
+    pal_err err = build_all(scene, arena, note, s, made, out);
+    /* rows that were made before something was refused */
+    for (int i = 0; err && i < out->n_row; i++)
+        if (made[i].self && made[i].effect->destroy) made[i].effect->destroy(made[i].self);
+    if (err) *out = (pal_plan){0};
     free(s);
     return err;
+}
+
+void pal_plan_free(pal_plan *plan)
+{
+    for (int i = 0; i < plan->n_row; i++)
+        if (plan->row[i].self && plan->row[i].effect->destroy) plan->row[i].effect->destroy(plan->row[i].self);
+    plan->n_row = 0;
+    if (plan->row != plan->load_row) free(plan->row);
+    plan->row = plan->load_row = NULL;
+}
+
+/* of heap tables: the rows, then their bodies */
+static size_t table_bytes(int n_row)
+{
+    return (size_t)n_row * (sizeof(pal_row) + sizeof(int));
+}
+
+/* the plan's tables are from now on those at `row`: the arena's own or heap */
+static void change_tables(pal_plan *plan, pal_row *row, int *row_body, int n_row)
+{
+    if (plan->row != plan->load_row) free(plan->row);
+    plan->row = row;
+    plan->row_body = row_body;
+    plan->n_row = n_row;
+}
+
+/* rows of this stage and body grow by `by`, all behind them move */
+static void shift(pal_plan *plan, int stage, int body, int by)
+{
+    plan->n_of[stage][body] += by;
+    for (int s = stage; s < PAL_STAGE_COUNT; s++)
+        for (int b = 0; b < plan->n_body; b++)
+            if (s > stage || b > body) plan->first[s][b] += by;
+}
+
+pal_err pal_plan_insert(pal_plan *plan, int body, const pal_row *row)
+{
+    int stage = row->effect->stage, at = plan->first[stage][body] + plan->n_of[stage][body], n = plan->n_row;
+    pal_row *to = malloc(table_bytes(n + 1));
+    if (!to) return PAL_ERR_MEMORY;
+    int *to_body = (int *)(void *)(to + n + 1);
+    memcpy(to, plan->row, (size_t)at * sizeof *to);
+    memcpy(to + at + 1, plan->row + at, (size_t)(n - at) * sizeof *to);
+    memcpy(to_body, plan->row_body, (size_t)at * sizeof *to_body);
+    memcpy(to_body + at + 1, plan->row_body + at, (size_t)(n - at) * sizeof *to_body);
+    to[at] = *row;
+    to_body[at] = body;
+    change_tables(plan, to, to_body, n + 1);
+    shift(plan, stage, body, 1);
+    return PAL_ERR_OK;
+}
+
+void pal_plan_remove(pal_plan *plan, const void *self)
+{
+    int at = 0;
+    while (at < plan->n_row && plan->row[at].self != self) at++;
+    if (at == plan->n_row || plan->n_row == plan->n_load) return;
+    int stage = plan->row[at].effect->stage, body = plan->row_body[at], n = plan->n_row - 1;
+    if (plan->row[at].effect->destroy) plan->row[at].effect->destroy(plan->row[at].self);
+    memmove(plan->row + at, plan->row + at + 1, (size_t)(n - at) * sizeof *plan->row);
+    memmove(plan->row_body + at, plan->row_body + at + 1, (size_t)(n - at) * sizeof *plan->row_body);
+    plan->n_row = n;
+    shift(plan, stage, body, -1);
+    if (n > plan->n_load) return;
+    /* the rows of load are alone again: back to the arena's tables */
+    memcpy(plan->load_row, plan->row, (size_t)n * sizeof *plan->row);
+    memcpy(plan->load_row_body, plan->row_body, (size_t)n * sizeof *plan->row_body);
+    change_tables(plan, plan->load_row, plan->load_row_body, n);
+}
+
+size_t pal_plan_bytes(const pal_plan *plan)
+{
+    return plan->row == plan->load_row ? 0 : table_bytes(plan->n_row);
 }
 
 size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte)

@@ -80,12 +80,12 @@ pal_err pal_slots_make(const double *x_rest, int n_node, double h_m, pal_arena *
 
 /* a constraint on its way into a block */
 typedef struct entry {
-    int32_t slot[PAL_CORNERS], item;
+    int32_t slot[PAL_STRIP_CORNERS], item;
 } entry;
 
 static int compare_shape(const entry *a, const entry *b)
 {
-    for (int c = 1; c < PAL_CORNERS; c++) {
+    for (int c = 1; c < PAL_STRIP_CORNERS; c++) {
         int32_t da = a->slot[c] - a->slot[0], db = b->slot[c] - b->slot[0];
         if (da != db) return da < db ? -1 : 1;
     }
@@ -152,7 +152,7 @@ static void sort_corners(const int32_t *slot, int32_t *node, int n)
         }
 }
 
-pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n_corner, pal_arena *arena,
+pal_err pal_strips_keep(const pal_slots *slots, const int32_t *item, int n_item, int n_corner, pal_arena *arena,
                         pal_strips *out)
 {
     *out = (pal_strips){.n_corner = n_corner};
@@ -164,8 +164,8 @@ pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n
     }
     for (int i = 0; i < n_item; i++) {
         e[i].item = i;
-        sort_corners(slots->slot, item + n_corner * i, n_corner);
-        for (int c = 0; c < PAL_CORNERS; c++) e[i].slot[c] = slots->slot[item[n_corner * i + (c < n_corner ? c : 0)]];
+        for (int c = 0; c < PAL_STRIP_CORNERS; c++)
+            e[i].slot[c] = slots->slot[item[n_corner * i + (c < n_corner ? c : 0)]];
     }
     qsort(e, (size_t)n_item, sizeof *e, compare_entries);
     /* once to count, once to fill */
@@ -175,6 +175,13 @@ pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n
     if (out->base && out->node) place_all(e, n_item, out);
     free(e);
     return out->base && out->node ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n_corner, pal_arena *arena,
+                        pal_strips *out)
+{
+    for (int i = 0; i < n_item; i++) sort_corners(slots->slot, item + n_corner * i, n_corner);
+    return pal_strips_keep(slots, item, n_item, n_corner, arena, out);
 }
 
 void pal_slots_load(pal_slots *slots, const double *x)

@@ -13,7 +13,7 @@
 #include "server/base/arena.h"
 #include "server/mesh/tets.h"
 
-enum { PAL_LANES = 8, PAL_CORNERS = 4 };
+enum { PAL_LANES = 8, PAL_CORNERS = 4, PAL_STRIP_CORNERS = 8 };
 
 /* slots of a body's nodes and working arrays that its rows share, one after the other */
 typedef struct pal_slots {
@@ -36,6 +36,9 @@ typedef struct pal_strips {
 pal_err pal_slots_make(const double *x_rest, int n_node, double h_m, pal_arena *arena, pal_slots **out);
 /* item [n_item][n_corner] nodes, each item's corners are put in ascending order of their slots here; MEMORY */
 pal_err pal_strips_make(const pal_slots *slots, int32_t *item, int n_item, int n_corner, pal_arena *arena,
+                        pal_strips *out);
+/* the same for up to PAL_STRIP_CORNERS corners, which keep their order */
+pal_err pal_strips_keep(const pal_slots *slots, const int32_t *item, int n_item, int n_corner, pal_arena *arena,
                         pal_strips *out);
 /* positions [n_node][3] into slots->x */
 void pal_slots_load(pal_slots *slots, const double *x);

@@ -6,23 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-/* |sum of normals| over the sum of their lengths (1 when flat, 0.58 at the corner of a voxel): a frame's turning counts
- * in full above the second and not at all below the first, where the fan is folded and turning would be a matter of
- * chance */
-#define FOLDED 0.2
-#define OPEN   0.4
-/* tangential part of a frame's edge over its length */
-#define LEAST_TANGENT 0.3
-
-/* a frame's turning: X unit of N (sum of fan normals), Y unit of e - X (X.e) for one edge e, Z = X x Y */
-typedef struct pal_turn {
-    bool turns; /* false: the fan is too flat or folded to say how the frame turns */
-    int end;    /* other end of e                                                  */
-    double X[3], Z[3];
-    double part;                        /* how much of the turning counts */
-    double per_normal, per_reach, rise; /* 1/|N|, 1/|e - X (X.e)|, X.e / |e - X (X.e)| */
-} pal_turn;
-
 /* passing samples of a step, and parts that an edge is cut into for them */
 enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
 
@@ -414,6 +397,30 @@ static void lever(const pal_body *body, int vertex, int k, double arm[3])
                  (double)coef[2] * (double)axes[8 + c];
 }
 
+int pal_touch_bearers(const pal_touch *touch, const pal_body *body, int point, int32_t *slot, double *weight,
+                      double (*arm)[3])
+{
+    int32_t vertex[3];
+    double share[3];
+    int n = corners(touch, point, vertex, share), m = 0;
+    for (int c = 0; c < n; c++) {
+        int n_slot = slots(body, vertex[c], slot + m, weight + m);
+        for (int k = 0; k < n_slot; k++, m++) {
+            weight[m] *= share[c];
+            pal_set3(arm[m], 0, 0, 0);
+            if (!body->skin) continue;
+            lever(body, vertex[c], k, arm[m]);
+            pal_scale3(arm[m], share[c], arm[m]);
+        }
+    }
+    return m;
+}
+
+int pal_touch_slot_node(const pal_body *body, int slot)
+{
+    return slot_node(body, slot);
+}
+
 void pal_touch_force_begin(pal_touch *touch)
 {
     touch->turn++;
@@ -456,44 +463,12 @@ static void add_force(pal_touch *touch, int node, double scale, const double for
     pal_axpy3(f, scale, force_N);
 }
 
-/* X, Z and the edge of a frame at the present positions; kept for the sub-step */
-static const pal_turn *turning(pal_touch *touch, const pal_body *body, int slot)
+const pal_turn *pal_touch_turning(pal_touch *touch, const pal_body *body, int slot)
 {
     pal_turn *t = &touch->turning[slot];
     if (touch->turning_mark[slot] == touch->sub_step) return t;
     touch->turning_mark[slot] = touch->sub_step;
-    const pal_skin *skin = body->skin;
-    const double *o = body->d + 3 * (size_t)skin->frame[slot];
-    double N[3] = {0}, sum = 0;
-    t->turns = false;
-    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
-        double a[3], b[3];
-        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
-        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
-        pal_cross3(a, a, b);
-        pal_add3(N, N, a);
-        sum += pal_norm3(a);
-    }
-    double length = pal_norm3(N);
-    t->part = fmin(1, (length / sum - FOLDED) / (OPEN - FOLDED));
-    if (!(t->part > 0) || !pal_unit3(t->X, N, 0)) return t;
-    t->per_normal = 1 / length;
-    for (int k = 0; k < 2 && !t->turns; k++) {
-        double edge[3], tangent[3];
-        t->end = skin->frame_edge[2 * (size_t)slot + (size_t)k];
-        if (t->end < 0) break;
-        pal_sub3(edge, body->d + 3 * (size_t)t->end, o);
-        double up = pal_dot3(edge, t->X);
-        pal_copy3(tangent, edge);
-        pal_axpy3(tangent, -up, t->X);
-        double reach = pal_norm3(tangent);
-        if (!(reach > LEAST_TANGENT * pal_norm3(edge))) continue;
-        pal_cross3(t->Z, t->X, tangent);
-        pal_scale3(t->Z, 1 / reach, t->Z);
-        t->per_reach = 1 / reach;
-        t->rise = up / reach;
-        t->turns = true;
-    }
+    pal_turn_find(body, slot, t);
     return t;
 }
 
@@ -502,7 +477,7 @@ static const pal_turn *turning(pal_touch *touch, const pal_body *body, int slot)
  * the torque's work is (t x X).X' + (t.X) Y'.Z. */
 static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const double torque[3])
 {
-    const pal_turn *t = turning(touch, body, slot);
+    const pal_turn *t = pal_touch_turning(touch, body, slot);
     if (!t->turns) return;
     const pal_skin *skin = body->skin;
     int node = skin->frame[slot];
@@ -534,7 +509,7 @@ static void turn_frame(pal_touch *touch, const pal_body *body, int slot, const d
 /* spin of a frame when its nodes move with v = force / mass, held nodes not at all */
 static void spin_frame(pal_touch *touch, const pal_body *body, int slot, const double *v, double spin[3])
 {
-    const pal_turn *t = turning(touch, body, slot);
+    const pal_turn *t = pal_touch_turning(touch, body, slot);
     pal_set3(spin, 0, 0, 0);
     if (!t->turns) return;
     const pal_skin *skin = body->skin;

@@ -15,6 +15,7 @@
 #define PAL_SIM_TOUCH_H
 #include "server/sim/body.h"
 #include "server/sim/tools.h"
+#include "server/sim/turn.h"
 
 typedef struct pal_touch {
     int n_vertex, n_fixed;   /* points [0, n_vertex) are the shown vertices, up to n_fixed fixed samples,     */
@@ -40,7 +41,7 @@ typedef struct pal_touch {
     double *slot_force, *slot_torque; /* N, Nm, by slot [slots][3] each  */
     double *force;                    /* N, by node     [body n_node][3] */
     /* how a slot's frame turns with its fan, at the present sub-step; by slot */
-    struct pal_turn *turning; /* [slots] */
+    pal_turn *turning; /* [slots] */
     uint32_t *turning_mark, sub_step, *tool_mark;
     double dt_s; /* of the sub-step before */
 } pal_touch;
@@ -90,6 +91,15 @@ void pal_touch_push(pal_touch *touch, const pal_body *body, int point, const dou
 /* returns the largest share of the forces that keeps every node within body->load_cap_N (1 when there is no cap) */
 double pal_touch_gather(pal_touch *touch, const pal_body *body);
 void pal_touch_apply(const pal_touch *touch, pal_body *body, double scale);
+
+/* For rows of an implicit solver (contact_tangent.h): the slots that bear a point, at most PAL_TOUCH_BEARERS of them,
+ * some maybe twice: the point's motion is sum weight v_slot + spin_slot x arm; returns how many */
+enum { PAL_TOUCH_BEARERS = 3 * PAL_SKIN_NEAR };
+int pal_touch_bearers(const pal_touch *touch, const pal_body *body, int point, int32_t *slot, double *weight,
+                      double (*arm)[3]);
+int pal_touch_slot_node(const pal_body *body, int slot);
+/* how the slot's frame turns at the state of the last pal_touch_update; body has a skin */
+const pal_turn *pal_touch_turning(pal_touch *touch, const pal_body *body, int slot);
 
 /* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */
 int pal_touch_nodes(const pal_body *body, int vertex, int32_t *node, double *weight);

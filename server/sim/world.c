@@ -3,6 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/field.h"
 #include "server/sim/plan.h"
 
 #include <stdlib.h>
@@ -27,6 +28,7 @@ struct pal_world {
     double step_s, time_s, limit_s, rest_limit_s;
     int most_substep, n_substep;
     uint64_t tick, step_ns, end_ns;
+    pal_field_rows fields; /* put in while the world runs */
 };
 
 /* ---- load ---- */
@@ -166,6 +168,7 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
         PAL_TRY(pal_material_check(&w->material[b], note));
         PAL_TRY(make_part(w, b));
     }
+    PAL_TRY(pal_field_check(&w->plan, note));
     PAL_TRY(check_budget(w, note));
     w->n_substep = count_substeps(w, w->step_s, find_limit(w, 0));
     run_output(w);
@@ -187,6 +190,8 @@ pal_err pal_world_create(const pal_scene *scene, pal_note *note, pal_world **out
 void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
+    pal_plan_free(&world->plan);
+    pal_field_free(&world->fields);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -274,9 +279,35 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
     return err;
 }
 
+bool pal_world_gives(const pal_world *world, int body, pal_field field)
+{
+    return pal_field_given(&world->plan, body, field);
+}
+
+pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note)
+{
+    pal_step step = {.dt_s = 0};
+    if (body >= 0 && body < world->plan.n_body) step = step_of(world, body);
+    if (wanted) return pal_field_add(&world->fields, &world->plan, body, field, &step, note);
+    pal_field_drop(&world->fields, &world->plan, body, field);
+    return PAL_ERR_OK;
+}
+
 /* ---- a step ---- */
 
-/* lasting loads and tool contact of one body, every node's load within the cap */
+static void cap_loads(pal_body *body)
+{
+    double cap2 = body->load_cap_N * body->load_cap_N;
+    for (int i = 0; i < body->n_node; i++) {
+        double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
+        if (load2 <= cap2) continue;
+        pal_scale3(load, body->load_cap_N / sqrt(load2), load);
+        body->n_capped++;
+    }
+}
+
+/* lasting loads and tool contact of one body, every node's load within the cap. Loads that an implicit solver gives
+ * back by the stiffness of the contact are beyond any cap: there the rows themselves keep what is left within it */
 static pal_err run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
@@ -285,20 +316,14 @@ static pal_err run_contact(pal_world *w, pal_step *step, int b)
         memcpy(body->load, body->outer, n3 * sizeof(double));
     else
         memset(body->load, 0, n3 * sizeof(double));
+    if (body->implicit && body->outer) cap_loads(body);
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
         PAL_TRY(row->effect->run(row->self, step));
         row->spent_ns += pal_clock_ns() - before;
     }
-    if (!body->outer && step->n_contact == 0) return PAL_ERR_OK;
-    double cap2 = body->load_cap_N * body->load_cap_N;
-    for (int i = 0; i < body->n_node; i++) {
-        double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
-        if (load2 <= cap2) continue;
-        pal_scale3(load, body->load_cap_N / sqrt(load2), load);
-        body->n_capped++;
-    }
+    if (!body->implicit && (body->outer || step->n_contact > 0)) cap_loads(body);
     return PAL_ERR_OK;
 }
 
@@ -405,8 +430,21 @@ pal_err pal_world_step(pal_world *world, double dt_s)
 
 /* ---- what others see ---- */
 
+static void copy_fields(const pal_body *body, pal_frame_part *to)
+{
+    for (int k = 0; k < PAL_FIELD_COUNT; k++) {
+        const pal_shown_field *from = body->field[k];
+        pal_frame_field *field = &to->field[k];
+        if (!from || !field->value || field->revision == from->revision) continue;
+        memcpy(field->value, from->value, sizeof(float) * (size_t)to->n_vertex);
+        field->revision = from->revision;
+        field->time_s = from->time_s;
+    }
+}
+
 static void copy_part(const pal_body *body, pal_frame_part *to)
 {
+    copy_fields(body, to);
     const double *o = body->offset_m;
     to->revision = body->revision;
     to->frozen = body->frozen;
@@ -449,6 +487,7 @@ void pal_world_frame(const pal_world *world, pal_frame *out)
     out->n_row = w->plan.n_row < PAL_FRAME_ROWS ? w->plan.n_row : PAL_FRAME_ROWS;
     for (int i = 0; i < out->n_row; i++) {
         uint64_t ns = w->plan.row[i].spent_ns;
+        out->row_name[i] = w->plan.row[i].effect->name;
         out->row_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
     }
 }
@@ -531,7 +570,8 @@ double pal_world_energy_J(const pal_world *world)
 
 size_t pal_world_bytes(const pal_world *world)
 {
-    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte;
+    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte + pal_field_bytes(&world->fields) +
+           pal_plan_bytes(&world->plan);
 }
 
 int pal_world_bodies(const pal_world *world)
@@ -554,4 +594,12 @@ void pal_world_moved(pal_world *world, int body)
 const pal_tools *pal_world_tools(const pal_world *world)
 {
     return &world->tools;
+}
+
+bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out)
+{
+    const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    *out = (pal_solve_report){0};
+    if (solve->effect->report) solve->effect->report(solve->self, out);
+    return solve->effect->report != NULL;
 }

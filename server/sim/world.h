@@ -46,7 +46,17 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
  * takes memory. REFUSED: not finite, no such node; MEMORY. [load] */
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
+/* A field of a body in colour (row field_out, 10 times a simulated second): wanted, the row is put into the running
+ * plan with memory of its own and its values are there at once; not wanted, row and memory are gone again. What the
+ * scene asks for itself stays either way. Poses, motion and hash know nothing of it. REFUSED: no such body, or its
+ * model does not give the field (one sentence); MEMORY. Between steps; takes and frees heap memory. [sim] */
+pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note);
+bool pal_world_gives(const pal_world *world, int body, pal_field field); /* would it be refused? */
+
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
+/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
+ * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
+pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
 void pal_frame_destroy(pal_frame *frame);
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t pal_world_hash(const pal_world *world); /* [sim] of tick, x and v of every body (FNV-1a over the bits) */
@@ -65,4 +75,6 @@ pal_body *pal_world_body(pal_world *world, int body);
 void pal_world_moved(pal_world *world, int body); /* after its x was set from outside: limits are taken anew */
 const pal_row *pal_world_effect(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
+/* what the solver of a body says of itself; false: it says nothing */
+bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out);
 #endif

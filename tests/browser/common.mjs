@@ -73,6 +73,17 @@ export async function open(browser, address, name, viewport) {
 /** largest displacement of what a page shows, m */
 export const moved = (page) => page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
 
+/** a pixel on the organ near the middle of the picture */
+export const organPixel = (page) => page.evaluate(() => {
+  const { stage, input } = window.palpate, w = innerWidth, h = innerHeight;
+  for (let r = 0; r < 0.4; r += 0.04)
+    for (let a = 0; a < 6.28; a += 0.5) {
+      const x = w * (0.5 + r * Math.cos(a)), y = h * (0.5 + r * Math.sin(a));
+      if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
+    }
+  return null;
+});
+
 /** waits until test(await read()) or the time is over, gives the last value */
 export async function until(read, test, ms = 20000) {
   const end = Date.now() + ms;

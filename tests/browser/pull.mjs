@@ -1,19 +1,9 @@
 // Real Chromium opens the page, grabs the organ at a pixel, and a second Chromium sees the vertices move.
 // usage: node pull.mjs BUILD PICTURES     ends with "N passed, N failed"
 import { join } from "node:path";
-import { check, finish, launch, moved, open, pictures, prepare, serve, troubles, until } from "./common.mjs";
+import { check, finish, launch, moved, open, organPixel, pictures, prepare, serve, troubles, until } from "./common.mjs";
 
 const ended = (child) => new Promise((resolve) => child.on("exit", (code) => resolve(code)));
-/** a pixel on the organ near the middle of the picture */
-const organPixel = (page) => page.evaluate(() => {
-  const { stage, input } = window.palpate, w = innerWidth, h = innerHeight;
-  for (let r = 0; r < 0.4; r += 0.04)
-    for (let a = 0; a < 6.28; a += 0.5) {
-      const x = w * (0.5 + r * Math.cos(a)), y = h * (0.5 + r * Math.sin(a));
-      if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
-    }
-  return null;
-});
 
 let server;
 const browsers = [];

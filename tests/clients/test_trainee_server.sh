@@ -23,6 +23,15 @@ run pull --script pull --seconds 3
 check "a pull passes every check" $code == 0
 check "it moves the organ by more than 5 mm" "$(json moved_mm "$work/pull")" '>' 5
 
+run field --script press --seconds 3 --field displacement
+check "a field that is asked for passes every check" $code == 0
+check "it comes about ten times a second" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n 's/"per_s"://p')" '<=' 11
+check "and more than once" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n '/"field":/,/high/s/"n"://p')" '>' 3
+check "its values reach what the vertices moved" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n 's/"high"://p')" '>' 0.0015
+run stress --script press --seconds 1.5 --field von_mises 2>/dev/null
+check "a body of springs gives no stress" $code == 1
+check "which is said in one line" "$(grep -c 'von_mises' "$work/stress.err")" == 1
+
 printf '# t x y z buttons\n0 0 0 0.02 0\n1 0 0 0.004 0\n2 0 0 0.02 0\n' >"$work/script"
 run file --script "$work/script" --seconds 2
 check "a script from a file runs" $code == 0
@@ -67,4 +76,6 @@ timeout 5 "$bin/palpate-trainee" ftp://x >/dev/null 2>&1
 check "an address of another kind is refused" $? == 1
 timeout 5 "$bin/palpate-trainee" "$url" --nonsense >/dev/null 2>&1
 check "an unknown flag is wrong usage" $? == 2
+timeout 5 "$bin/palpate-trainee" "$url" --field rainbow >/dev/null 2>&1
+check "so is a field that there is not" $? == 2
 finish

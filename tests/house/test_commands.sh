@@ -4,6 +4,7 @@
 # usage: test_commands.sh PALPATE [MOST_KB]     MOST_KB: address space a command may take (0: no limit, for sanitizers)
 set -u
 palpate=$(realpath "$1")
+problems=$(realpath "$(dirname "$0")/../../deploy/problems")
 most_kb=${2:-0}
 dir=$(mktemp -d) || exit 2
 trap 'rm -rf "$dir"' EXIT
@@ -162,7 +163,7 @@ check "exit code $code for a surface" code_is 0
 end
 
 begin "every command has --help, --version works, no command is usage"
-for command in serve prepare plan replay bench; do
+for command in serve prepare plan replay solve bench; do
     run $command --help
     check "$command --help: exit code $code" code_is 0
     check "$command --help: no usage" has out "usage: palpate $command"
@@ -198,6 +199,142 @@ check "not one JSON object" is_json out
 check "a hash differs" has out '"first_difference":null'
 run replay rec.bin organ
 refused 1 "recorded from another scene"
+end
+
+# ---- finite elements ----
+begin "solve answers the shipped beam within its reference's error, with every figure"
+run solve "$problems/beam.json" --case tip --json
+check "exit code $code" code_is 0
+check "stderr is not empty" is_empty err
+check "not one JSON object" is_json out
+for key in rms_percent max_percent nodes elements dof iterations prepare assemble factor solve total; do
+    check "no $key" has out "\"$key\":[0-9]"
+done
+check "not compared with Timoshenko's beam" has out '"reference":"timoshenko"'
+check "33 x 5 x 5 nodes" has out '"nodes":825,'
+check "RMS not below 1 %" has out '"rms_percent":0\.'
+run solve "$problems/beam.json" --case tip -o solved --quiet
+check "exit code $code with -o" code_is 0
+check "stdout is not empty" is_empty out
+check "no CSV of 825 nodes" test "$(wc -l <solved/solution.csv)" -eq 826
+check "no VTK file" has solved/solution.vtk "^DATASET UNSTRUCTURED_GRID"
+run solve "$problems/beam.json" --case tip --samples solved/solution.csv --json
+check "exit code $code with --samples" code_is 0
+check "not the same as itself" has out '"rms_percent":\(0,\|[0-9.]*e-\)'
+run solve "$problems/beam.json" --case tip_far --kinematics finite --resolution 16
+check "exit code $code for finite kinematics" code_is 0
+check "not neo-Hookean" has out "neo_hookean"
+end
+
+begin "solve gives a table and plots of several resolutions and elements"
+run solve "$problems/beam.json" --case tip --resolution 8,16,32 --element hex8_bbar,tet4:16 --plot error.svg --json
+check "exit code $code" code_is 0
+check "no JSON" is_json out
+for key in rms_percent nodes order change_percent change_order estimate_percent factor total; do
+    check "no $key" has out "\"$key\":"
+done
+check "not 5 rows" test "$(grep -o '"resolution"' out | wc -l)" -eq 5
+check "no files" has out '"files":\["error.svg","error_seconds.svg"\]'
+for file in error.svg error_seconds.svg; do
+    check "no $file" has $file "</svg>"
+    check "no curve of tet4 in $file" has $file ">tet4</text>"
+done
+run solve "$problems/beam.json" --case tip --resolution 8,16
+check "exit code $code" code_is 0
+check "not 4 lines" lines_are out 4
+run solve "$problems/beam.json" --case tip --resolution 8,4
+refused 2 "4 does not come after a coarser one"
+run solve "$problems/beam.json" --case tip --element hex8,hex9
+refused 2 "hex9 is not hex8_bbar, hex8, tet4 or tet10"
+run solve "$problems/beam.json" --case tip --element hex8,tet4 --csv all.csv
+refused 2 "are for one element"
+run solve "$problems/beam.json" --case tip --resolution 8,16 --plot nowhere/error.svg
+refused 1 "nowhere/error.svg"
+end
+
+begin "solve refuses what makes no sense, naming entry and number"
+sed "s|\"beam.obj\"|\"$problems/beam.obj\"|" "$problems/beam.json" >good.json
+cp "$problems/beam_timoshenko.csv" .
+bad() { sed "$1" good.json >bad.json; }
+bad 's/"nu": 0.3/"nu": 0.5/'
+run solve bad.json --case tip
+refused 1 "bad.json: materials\[0\].nu: 0.5 is not a Poisson ratio"
+bad 's/"nu": 0.3/"nu": -1/'
+run solve bad.json --case tip
+refused 1 "bad.json: materials\[0\].nu: -1 is not a Poisson ratio"
+bad 's/"E": 80000/"E": 0/'
+run solve bad.json --case tip
+refused 1 "bad.json: materials\[0\].E: 0 Pa is not a stiffness"
+bad 's/"E": 80000/"E": -5/'
+run solve bad.json --case tip
+refused 1 "bad.json: materials\[0\].E: -5 Pa is not a stiffness"
+bad 's/"E": 80000/"young": 80000/'
+run solve bad.json --case tip
+refused 1 "bad.json: materials\[0\].young: unknown key"
+bad 's/"max": \[1e-6,/"max": [-1e-6,/'
+run solve bad.json --case tip
+refused 1 "bad.json: supports\[0\]: no node of the body lies in (-0.01, -0.03, -0.03)"
+bad 's/"min": \[0.319999,/"min": [0.3201,/'
+run solve bad.json --case tip
+refused 1 "bad.json: load_cases\[0\].loads\[0\]: the region (0.3201, -0.03, -0.03) .. (0.33, 0.03, 0.03) meets no surface"
+run solve good.json --case tipp
+refused 1 'good.json: there is no load case or reference "tipp"; known are tip, tip_far, hang, timoshenko'
+run solve good.json
+refused 1 "good.json: --case is missing; known are tip"
+run solve good.json --case tip --nu 0.5
+refused 1 "nu 0.5 is not a Poisson ratio"
+run solve good.json --case tip --nu -1
+refused 1 "nu -1 is not a Poisson ratio"
+run solve good.json --case tip --young 0
+refused 1 "E 0 Pa is not a stiffness"
+run solve good.json --case tip --young -5
+refused 1 "E -5 Pa is not a stiffness"
+sed '1s/uy/yu/' beam_timoshenko.csv >column.csv
+run solve good.json --case tip --samples column.csv
+refused 1 'column.csv: line 1: column 5 is "yu", wanted "uy"'
+sed '3s/,0,/,,/' beam_timoshenko.csv >column.csv
+run solve good.json --case tip --samples column.csv
+refused 1 'column.csv: line 3: column 2 (y): "" is not a number'
+bad 's|"surface": "[^"]*"|"surface": "gone.obj"|'
+run solve bad.json --case tip
+refused 1 "gone.obj"
+run solve gone.json --case tip
+refused 1 "gone.json"
+run solve good.json --case tip --vtk nowhere/at/all.vtk
+refused 1 "nowhere/at/all.vtk"
+run solve good.json --case tip --law ogden
+refused 2 "--law: is not linear, corotational or neo_hookean"
+run solve good.json --case tip --elements hex8
+refused 2 "unknown flag --elements"
+run solve good.json --case tip --kinematics linear --law corotational
+refused 2 "linear goes with linear only"
+run solve good.json --case tip --resolution 0
+refused 2 "--resolution: 0 is outside"
+end
+
+begin "prepare --model fem writes a scene of finite elements that steps"
+run prepare box.obj -o fem --model fem --no-tetgen --resolution 6 --units mm
+check "exit code $code" code_is 0
+check "no model fem" has fem/scene.json '"fem"'
+check "no implicit solver" has fem/scene.json '"implicit_euler"'
+run plan fem --json
+check "exit code $code of plan" code_is 0
+check "no row of hexahedra" has out '"hex_elastic"'
+check "a row of springs" test "$(grep -c edge_distance out)" -eq 0
+run prepare box.obj -o fem2 --model fem --element tet10 --law neo_hookean --solver sdirk2 --no-tetgen --resolution 4
+check "exit code $code with all words" code_is 0
+run plan fem2 --json
+check "exit code $code of plan" code_is 0
+check "no row of tetrahedra" has out '"tet_elastic"'
+check "no sdirk2" has out '"sdirk2"'
+run prepare box.obj -o x --model fem --area-springs
+refused 2 "--area-springs: model fem has no springs"
+run prepare box.obj -o x --element tet4
+refused 2 "--element: only goes with --model fem"
+run prepare box.obj -o x --model fem --element brick
+refused 2 "--element: is not hex8_bbar"
+run prepare box.obj -o x --model fen
+refused 2 "--model: is not springs or fem"
 end
 
 # ---- wrong usage ----

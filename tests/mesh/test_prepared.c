@@ -8,7 +8,7 @@ static bool make_ball(pal_prepared *p, pal_prepare_report *report)
 {
     pal_surface ball = shape_ball(0.1, 64, 32, 0.2);
     ball.origin_m[1] = 7.5;
-    pal_voxel_options options = {.resolution = 12, .border = true};
+    pal_voxel_options options = {.resolution = 12, .border = true, .fill = true};
     pal_note note;
     pal_err err = pal_prepared_make(&ball, &options, p, report, &note);
     pal_surface_free(&ball);
@@ -30,6 +30,11 @@ static void ball_becomes_a_sound_mesh(void)
     CHECK_TEXT(report.voxel.method, "scanline");
     CHECK_NEAR(p.tets.origin_m[1], 7.5, 0);
     CHECK_INT(p.skin.n_vertex, p.surface.n_vertex);
+    CHECK_INT(p.hexes.n_hex, report.n_voxel);
+    double filled = 0;
+    for (int e = 0; e < p.hexes.n_hex; e++) filled += (double)p.hexes.fill[e];
+    /* less what bulges out of the border layer */
+    CHECK_NEAR(filled * pow(p.tets.h_m, 3) / pal_surface_volume(&p.surface), 1, 2e-3);
     pal_prepared_free(&p);
 }
 
@@ -56,6 +61,10 @@ static void saved_and_loaded_is_the_same_to_the_bit(void)
     CHECK(same(q.surface.x, p.surface.x, (size_t)p.surface.n_vertex * 24));
     CHECK(same(q.tets.tet, p.tets.tet, (size_t)p.tets.n_tet * 16));
     CHECK(same(q.skin.coef, p.skin.coef, (size_t)p.skin.n_vertex * 80));
+    CHECK_INT(q.hexes.n_hex, p.hexes.n_hex);
+    CHECK(p.hexes.measured && q.hexes.measured);
+    CHECK(same(q.hexes.node, p.hexes.node, (size_t)p.hexes.n_hex * 32));
+    CHECK(same(q.hexes.fill, p.hexes.fill, (size_t)p.hexes.n_hex * 4));
     CHECK(same(q.surface.origin_m, p.surface.origin_m, 24) && same(q.tets.origin_m, p.tets.origin_m, 24));
     CHECK_NEAR(q.tets.h_m, p.tets.h_m, 0);
     free(a);
@@ -105,6 +114,78 @@ static void damaged_files_are_refused_with_their_place(void)
     pal_prepared_free(&p);
 }
 
+/* sets bytes at a place and the checksum right, says what the reader makes of it, and sets them back */
+static pal_err parse_with(uint8_t *bytes, size_t n, size_t at, const void *value, size_t n_value, pal_note *note)
+{
+    uint8_t old[64], old_sum[8];
+    pal_prepared q;
+    memcpy(old, bytes + at, n_value);
+    memcpy(old_sum, bytes + 24, 8);
+    memcpy(bytes + at, value, n_value);
+    uint64_t sum = pal_prepared_checksum(bytes, n);
+    memcpy(bytes + 24, &sum, 8);
+    pal_err err = pal_prepared_parse("file", bytes, n, &q, note);
+    if (!err) pal_prepared_free(&q);
+    memcpy(bytes + at, old, n_value);
+    memcpy(bytes + 24, old_sum, 8);
+    return err;
+}
+
+static void fill_that_does_not_fit_is_refused(void)
+{
+    pal_prepared p;
+    pal_note note;
+    uint8_t *bytes;
+    size_t n;
+    REQUIRE(make_ball(&p, NULL));
+    REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
+    /* the entry of section 15 begins behind eight counts, four doubles and fourteen entries */
+    uint64_t at, few = (uint64_t)p.hexes.n_hex - 1, entry = 32 + 64 + 32 + 14 * 24;
+    memcpy(&at, bytes + entry + 16, 8);
+    CHECK_INT(parse_with(bytes, n, at, &(float){0.25F}, 4, &note), PAL_ERR_OK);
+    CHECK_INT(parse_with(bytes, n, at, &(float){-0.25F}, 4, &note), PAL_ERR_REFUSED);
+    CHECK_INT(parse_with(bytes, n, at, &(float){1.001F}, 4, &note), PAL_ERR_REFUSED);
+    CHECK_INT(parse_with(bytes, n, at, &(float){NAN}, 4, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "a voxel's fill is not within 0..1"));
+    memcpy(bytes + entry + 8, &few, 8);
+    CHECK_INT(parse_with(bytes, n, 32 + 7 * 8, &few, 8, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "fill of") && strstr(note.text, "voxels, the mesh has"));
+    free(bytes);
+    pal_prepared_free(&p);
+
+    /* without a measured fill the section is empty and the hexahedra are found again */
+    REQUIRE(make_ball(&p, NULL));
+    p.hexes.measured = false;
+    REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
+    pal_prepared q;
+    REQUIRE(!pal_prepared_parse("whole", bytes, n, &q, &note));
+    CHECK_INT(q.hexes.n_hex, p.hexes.n_hex);
+    CHECK(!q.hexes.measured && q.hexes.fill[0] == 1.0F);
+    free(bytes);
+    pal_prepared_free(&p);
+    pal_prepared_free(&q);
+}
+
+/* written before there were hexahedra */
+static void a_file_of_version_2_is_read_with_its_hexahedra(void)
+{
+    pal_prepared q;
+    pal_note note = {""};
+    uint8_t *bytes;
+    size_t n;
+    REQUIRE(!pal_file_read("tests/data/fuzz/prepared/cube.mesh", 1 << 20, &bytes, &n, &note));
+    CHECK_INT(bytes[8], 2);
+    REQUIRE(!pal_prepared_parse("cube", bytes, n, &q, &note));
+    CHECK(q.hexes.n_hex > 0);
+    CHECK_INT(5 * q.hexes.n_hex, q.tets.n_tet);
+    CHECK(!q.hexes.measured);
+    for (int e = 0; e < q.hexes.n_hex; e++) CHECK(q.hexes.fill[e] == 1.0F);
+    pal_prepared_free(&q);
+    CHECK_INT(parse_with(bytes, n, 8, &(uint32_t){3}, 4, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "version 3 with 14 sections"));
+    free(bytes);
+}
+
 static void a_file_that_is_not_there_is_an_io_error(void)
 {
     pal_prepared q;
@@ -118,6 +199,8 @@ int main(void)
     RUN(ball_becomes_a_sound_mesh);
     RUN(saved_and_loaded_is_the_same_to_the_bit);
     RUN(damaged_files_are_refused_with_their_place);
+    RUN(fill_that_does_not_fit_is_refused);
+    RUN(a_file_of_version_2_is_read_with_its_hexahedra);
     RUN(a_file_that_is_not_there_is_an_io_error);
     return check_report();
 }

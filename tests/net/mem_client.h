@@ -3,6 +3,7 @@
 #define TESTS_NET_MEM_CLIENT_H
 #include "protocol/asset.h"
 #include "protocol/control.h"
+#include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
 #include "server/net/mem_road.h"
 #include "tests/check.h"
@@ -12,10 +13,12 @@ typedef struct mem_client {
     pal_mem_peer *peer;
     pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
     int n_text[PAL_CONTROL_COUNT];
-    int n_frame, n_tools, n_haptic, n_bad;
+    int n_frame, n_tools, n_haptic, n_field, n_bad;
     pal_frame_head frame;
     pal_wire_tools tools;
     pal_wire_haptic haptic;
+    pal_field_head field;
+    uint8_t *level; /* of the newest field [n_vertex] */
     pal_asset *asset;
     pal_frame_decoder *decoder;
     float *position_m; /* [n_vertex][3] */
@@ -56,6 +59,7 @@ static inline void mem_load_asset(mem_client *c)
     CHECK_INT(pal_asset_decode(reply.body->bytes, reply.body->n_byte, &c->asset), 0);
     CHECK_INT(pal_frame_decoder_create(c->asset, &c->decoder), 0);
     c->position_m = calloc(c->asset->order->n_vertex, 3 * sizeof(float));
+    c->level = calloc(c->asset->order->n_vertex, 1);
     pal_packet_drop(reply.body);
 }
 
@@ -89,6 +93,9 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
             pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = c->tools.cycle});
             pal_mem_send(c->peer, ack, sizeof ack, false);
         }
+    } else if (head.kind == PAL_WIRE_FIELD) {
+        c->n_field++;
+        if (!c->level || pal_field_get(p->bytes, p->n_byte, c->asset->order->n_vertex, &c->field, c->level)) c->n_bad++;
     } else {
         c->n_haptic++;
         if (pal_wire_get_haptic(p->bytes, p->n_byte, &c->haptic)) c->n_bad++;
@@ -122,6 +129,7 @@ static inline void mem_end(mem_client *c)
     pal_frame_decoder_destroy(c->decoder);
     pal_asset_destroy(c->asset);
     free(c->position_m);
+    free(c->level);
     memset(c, 0, sizeof *c);
 }
 #endif

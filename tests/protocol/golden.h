@@ -4,6 +4,7 @@
 #ifndef TESTS_PROTOCOL_GOLDEN_H
 #define TESTS_PROTOCOL_GOLDEN_H
 #include "protocol/control.h"
+#include "protocol/field_codec.h"
 #include "protocol/wire.h"
 #include "tests/protocol/shapes.h"
 
@@ -101,6 +102,19 @@ static inline pal_wire_haptic golden_haptic(void)
     return h;
 }
 
+enum { GOLDEN_FIELD_VERTICES = 301 };
+/* head and values of the golden FIELD: a smooth range, its two ends, and the same number many times */
+static inline pal_field_head golden_field(float value[GOLDEN_FIELD_VERTICES])
+{
+    for (int i = 0; i < GOLDEN_FIELD_VERTICES; i++)
+        value[i] = i < 200 ? 0.0617f * (float)(i * (399 - i)) : i < 300 ? 17.25f : 2500.0f;
+    return (pal_field_head){.part = 2,
+                            .field = PAL_WIRE_FIELD_VON_MISES_PA,
+                            .epoch = 4000000000u,
+                            .sim_time_us = 123456789012,
+                            .n_vertex = GOLDEN_FIELD_VERTICES};
+}
+
 static inline void golden_parts(pal_wire_part_info *part, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -110,6 +124,10 @@ static inline void golden_parts(pal_wire_part_info *part, uint32_t n)
         part[i].n_vertex = 25000 + i;
         part[i].n_triangle = 49996 + i;
         part[i].error_m = 5e-5;
+        part[i].n_field = i ? 0 : 2;
+        if (i) continue;
+        snprintf(part[i].field[0], sizeof part[i].field[0], "displacement");
+        snprintf(part[i].field[1], sizeof part[i].field[1], "von_mises");
     }
 }
 
@@ -159,6 +177,8 @@ static inline void golden_control(pal_control_type type, pal_control *c)
                                       .step_ms = 0.41,
                                       .n_row = 3,
                                       .row_ms = {0.001, 1.0 / 3, 0.03},
+                                      .n_row_name = 3,
+                                      .row = {"gravity", "verlet", "field_out"},
                                       .n_member = 2,
                                       .bytes_s = 312000,
                                       .rtt_ms = 0.4,
@@ -183,6 +203,9 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         break;
     case PAL_CONTROL_TAKE:
         c->tool = 2;
+        break;
+    case PAL_CONTROL_VIEW:
+        c->view = (pal_wire_view){1, "von_mises"};
         break;
     case PAL_CONTROL_PING:
     case PAL_CONTROL_PONG:

@@ -120,6 +120,25 @@ static void make_haptic(void)
     fprintf(expected, "]},\n");
 }
 
+static void make_field(void)
+{
+    static float value[GOLDEN_FIELD_VERTICES];
+    static uint8_t level[GOLDEN_FIELD_VERTICES], bytes[4096];
+    pal_field_head head = golden_field(value);
+    size_t n = 0;
+    need(!pal_field_put(value, &head, level, bytes, sizeof bytes, &n), "field");
+    need(!pal_field_get(bytes, n, GOLDEN_FIELD_VERTICES, &head, level), "field back");
+    for (int i = 0; i < GOLDEN_FIELD_VERTICES; i++)
+        need(fabs(pal_field_value(&head, level[i]) - (double)value[i]) <= 0.502 / 255 * (double)(head.high - head.low),
+             "field bound");
+    save("field.bin", bytes, n);
+    fprintf(expected, "\"field\":{\"part\":%u,\"field\":%d,\"epoch\":%u,\"simTimeUs\":%llu,\"low\":%.9g,", head.part,
+            (int)head.field, head.epoch, (unsigned long long)head.sim_time_us, (double)head.low);
+    fprintf(expected, "\"high\":%.9g,\"n\":%u,\"level\":[", (double)head.high, head.n_vertex);
+    for (int i = 0; i < GOLDEN_FIELD_VERTICES; i++) fprintf(expected, "%s%u", i ? "," : "", level[i]);
+    fprintf(expected, "]},\n");
+}
+
 static void make_frame(const pal_asset *asset, pal_frame_encoder *e, int index, bool last)
 {
     static const float affine[12] = {0.8f, -0.6f, 0, 0.5f, 0.6f, 0.8f, 0, -0.25f, 0, 0, 1, 0.125f};
@@ -232,6 +251,7 @@ int main(int argc, char **argv)
     make_pose();
     make_tools();
     make_haptic();
+    make_field();
     make_asset_and_frames();
     make_control();
     need(!fclose(expected), "expected.json not written");

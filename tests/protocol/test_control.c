@@ -35,6 +35,9 @@ static void reads_what_a_client_says(void)
     CHECK_INT(from_client("{\"type\":\"leave\"}"), 0);
     CHECK_INT(from_client("{\"type\":\"ping\",\"stamp_ms\":-1.5}"), 0);
     CHECK_NEAR(c.stamp_ms, -1.5, 0);
+    CHECK_INT(from_client("{\"type\":\"view\",\"part\":2,\"field\":\"energy\",\"later\":1}"), 0);
+    CHECK_INT(c.view.part, 2);
+    CHECK_TEXT(c.view.field, "energy");
 }
 
 static void refuses_what_is_no_message(void)
@@ -69,6 +72,11 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":\"take\",\"tool\":1e400}", PAL_REFUSAL_NAN},
         {"{\"type\":\"ping\",\"stamp_ms\":1e999}", PAL_REFUSAL_NAN},
         {"{\"type\":\"ping\",\"stamp_ms\":\"1\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"view\",\"field\":\"energy\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"view\",\"part\":0}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"view\",\"part\":-1,\"field\":\"none\"}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"view\",\"part\":0,\"field\":3}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"view\",\"part\":0,\"field\":\"a name that is longer than\"}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":[1]}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":\"b\"}}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":1,\"b\":1,\"c\":1,\"d\":1,\"e\":1,\"f\":1,\"g\":1,"
@@ -107,6 +115,24 @@ static void refuses_text_beyond_the_limits_before_parsing_it(void)
     for (int k = 0; k < 1000; k++) n += (size_t)snprintf(text + n, sizeof text - n, ",0");
     n += (size_t)snprintf(text + n, sizeof text - n, "]}");
     CHECK_INT(pal_control_get(text, n, false, &c), PAL_REFUSAL_JSON);
+}
+
+/* what servers and clients of before wrote: parts without fields, status without rows */
+static void reads_messages_of_before_fields(void)
+{
+    static const char hello[] =
+        "{\"type\":\"hello\",\"version\":1,\"session\":\"main\",\"title\":\"\",\"organ\":\"\",\"step_rate_hz\":60,"
+        "\"frame_rate_hz\":60,\"credit\":3,\"box_min_m\":[0,0,0],\"box_max_m\":[1,1,1],\"up\":[0,0,1],\"parts\":[{"
+        "\"name\":\"liver\",\"epoch\":1,\"n_vertex\":4,\"n_triangle\":4,\"asset\":\"/asset/0\",\"error_m\":5e-5}],"
+        "\"tools\":[],\"rows\":[],\"you\":{\"id\":1,\"role\":\"viewer\",\"name\":\"A\",\"tool\":null}}";
+    static const char status[] =
+        "{\"type\":\"status\",\"tick\":1,\"sim_time_s\":0,\"paused\":false,\"frozen\":false,\"step_rate_hz\":60,"
+        "\"slowdown\":1,\"substeps\":1,\"step_ms\":1,\"row_ms\":[1],\"members\":1,\"bytes_s\":0,\"rtt_ms\":0,"
+        "\"skipped\":0,\"late\":0,\"refused\":0}";
+    CHECK_INT(pal_control_get(hello, sizeof hello - 1, true, &c), 0);
+    CHECK_INT(c.hello.part[0].n_field, 0);
+    CHECK_INT(pal_control_get(status, sizeof status - 1, true, &c), 0);
+    CHECK_INT(c.status.n_row_name, 0);
 }
 
 static void refuses_every_prefix(void)
@@ -188,6 +214,7 @@ int main(void)
     RUN(reads_what_a_client_says);
     RUN(refuses_what_is_no_message);
     RUN(refuses_text_beyond_the_limits_before_parsing_it);
+    RUN(reads_messages_of_before_fields);
     RUN(refuses_every_prefix);
     RUN(largest_messages_fit_their_limit);
     RUN(writer_refuses_what_the_reader_would);

@@ -140,6 +140,29 @@ static void haptic_model_is_read_and_written_as_committed(void)
     free(bytes);
 }
 
+static void field_is_read_and_written_as_committed(void)
+{
+    static float value[GOLDEN_FIELD_VERTICES];
+    static uint8_t level[GOLDEN_FIELD_VERTICES], again[4096];
+    size_t n = 0, n_again = 0;
+    uint8_t *bytes = load("field.bin", &n);
+    pal_field_head h, wanted = golden_field(value);
+    REQUIRE(bytes && pal_field_get(bytes, n, GOLDEN_FIELD_VERTICES, &h, level) == 0);
+    const cJSON *e = cJSON_GetObjectItem(expected, "field");
+    CHECK_NEAR(h.part, number(e, "part"), 0);
+    CHECK_NEAR((int)h.field, number(e, "field"), 0);
+    CHECK_NEAR(h.epoch, number(e, "epoch"), 0);
+    CHECK_NEAR((double)h.sim_time_us, number(e, "simTimeUs"), 0);
+    CHECK_NEAR((double)h.low, number(e, "low"), 1e-5);
+    CHECK_NEAR((double)h.high, number(e, "high"), 1e-4);
+    CHECK_INT(h.n_vertex, number(e, "n"));
+    for (int i = 0; i < GOLDEN_FIELD_VERTICES; i++) CHECK_INT(level[i], element(e, "level", i));
+    CHECK_INT(pal_field_put(value, &wanted, level, again, sizeof again, &n_again), 0);
+    CHECK_INT(n_again, n);
+    CHECK(memcmp(again, bytes, n) == 0);
+    free(bytes);
+}
+
 static void asset_and_frames_are_read_to_the_committed_numbers(void)
 {
     size_t n = 0;
@@ -220,6 +243,7 @@ int main(void)
     RUN(pose_and_ack_are_read_and_written_as_committed);
     RUN(tools_are_read_and_written_as_committed);
     RUN(haptic_model_is_read_and_written_as_committed);
+    RUN(field_is_read_and_written_as_committed);
     RUN(asset_and_frames_are_read_to_the_committed_numbers);
     RUN(control_lines_are_read_and_written_as_committed);
     cJSON_Delete(expected);

@@ -109,6 +109,10 @@ static bool tool_gone(const pal_frame *f, uint64_t tool)
 {
     return !f->tool[tool].present;
 }
+static bool shows_displacement(const pal_frame *f, uint64_t yes)
+{
+    return (f->part[0].field[PAL_FIELD_DISPLACEMENT_M].value != NULL) == (yes != 0);
+}
 static bool refused_at_least(const pal_frame *f, uint64_t n)
 {
     return f->n_refused >= n;
@@ -489,6 +493,95 @@ static void rows_and_parts_are_known_to_every_thread(void)
     pal_session_close(s);
 }
 
+static pal_err look(pal_session *s, pal_field field, bool wanted)
+{
+    return pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_FIELD, .field = field, .wanted = wanted});
+}
+
+/* counted: the row comes with the first and goes with the last, even while paused */
+static void a_field_is_there_while_anybody_looks(void)
+{
+    watch *w = make_watch();
+    pal_session *s = open_with((pal_session_options){.start_paused = true}, w);
+    REQUIRE(s != NULL);
+    const pal_frame *f = next_frame(s, w);
+    REQUIRE(f != NULL);
+    int rows = f->n_row;
+    CHECK(shows_displacement(f, 0));
+    CHECK_INT(rows, pal_session_rows(s));
+    CHECK(pal_session_gives(s, 0, PAL_FIELD_DISPLACEMENT_M) && !pal_session_gives(s, 0, PAL_FIELD_ENERGY_J_M3));
+    CHECK(!pal_session_gives(s, 1, PAL_FIELD_DISPLACEMENT_M) && !pal_session_gives(s, -1, PAL_FIELD_DISPLACEMENT_M));
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, true), 0);
+    f = frame_where(s, w, shows_displacement, 1);
+    REQUIRE(f != NULL);
+    CHECK_INT(f->n_row, rows + 1);
+    CHECK_TEXT(f->row_name[rows], "field_out");
+    CHECK_INT(f->tick, 0);
+    const pal_frame_field *field = &f->part[0].field[PAL_FIELD_DISPLACEMENT_M];
+    CHECK(field->revision > 0);
+    for (int i = 0; i < f->part[0].n_vertex; i++) CHECK_LE((double)field->value[i], 1e-7);
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, true), 0);
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, false), 0);
+    CHECK_INT(order(s, PAL_COMMAND_STEP), 0);
+    f = frame_where(s, w, tick_is, 1);
+    REQUIRE(f != NULL);
+    CHECK(shows_displacement(f, 1)); /* one of two still looks */
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, false), 0);
+    f = frame_where(s, w, shows_displacement, 0);
+    REQUIRE(f != NULL);
+    CHECK_INT(f->n_row, rows);
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, false), 0); /* one too many does no harm */
+    CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, true), 0);
+    CHECK(frame_where(s, w, shows_displacement, 1) != NULL);
+    /* what the model does not give, and what does not exist */
+    CHECK_INT(look(s, PAL_FIELD_VON_MISES_PA, true), PAL_ERR_REFUSED);
+    CHECK_INT(look(s, PAL_FIELD_NONE, true), PAL_ERR_REFUSED);
+    CHECK_INT(look(s, PAL_FIELD_COUNT, true), PAL_ERR_REFUSED);
+    CHECK_INT(look(s, (pal_field)-1, true), PAL_ERR_REFUSED);
+    pal_command other = {.kind = PAL_COMMAND_FIELD, .body = 1, .field = PAL_FIELD_DISPLACEMENT_M, .wanted = true};
+    CHECK_INT(pal_session_command(s, &other), PAL_ERR_REFUSED);
+    pal_session_close(s);
+}
+
+/* readers of fields and those who ask for them are different threads, all while the world runs */
+static _Atomic bool enough;
+static void *look_in_and_out(void *user)
+{
+    pal_session *s = user;
+    bool looks = false;
+    /* uneven pauses, so that the two do not fall into step */
+    for (uint64_t k = 1; !atomic_load(&enough) || looks; k++) {
+        if (look(s, PAL_FIELD_DISPLACEMENT_M, !looks) == 0) looks = !looks;
+        pal_clock_sleep_until_ns(pal_clock_ns() + 500000 * (k * k % 11));
+    }
+    return NULL;
+}
+
+static void fields_come_and_go_under_a_reader(void)
+{
+    watch *w = make_watch();
+    pal_session *s = open_with((pal_session_options){.unpaced = true}, w);
+    pthread_t other[2];
+    REQUIRE(s != NULL);
+    for (int t = 0; t < 2; t++) REQUIRE(!pthread_create(&other[t], NULL, look_in_and_out, s));
+    int with = 0, without = 0;
+    double sum = 0;
+    for (int k = 0; k < 2000 && (with < 20 || without < 20); k++) {
+        const pal_frame *f = next_frame(s, w);
+        if (!f) break;
+        const pal_frame_field *field = &f->part[0].field[PAL_FIELD_DISPLACEMENT_M];
+        for (int i = 0; field->value && i < f->part[0].n_vertex; i++) sum += (double)field->value[i];
+        with += field->value != NULL;
+        without += field->value == NULL;
+    }
+    atomic_store(&enough, true);
+    for (int t = 0; t < 2; t++) pthread_join(other[t], NULL);
+    CHECK(with > 0 && without > 0);
+    CHECK(isfinite(sum));
+    REQUIRE(frame_where(s, w, shows_displacement, 0) != NULL); /* as many looked away as had looked */
+    pal_session_close(s);
+}
+
 int main(void)
 {
     if (!small_scene(&scene, &mesh, 6)) return 1;
@@ -506,6 +599,8 @@ int main(void)
     RUN(survives_poses_commands_and_frames_from_many_threads_and_a_close_in_the_middle);
     RUN(a_scene_that_cannot_run_opens_no_session);
     RUN(rows_and_parts_are_known_to_every_thread);
+    RUN(a_field_is_there_while_anybody_looks);
+    RUN(fields_come_and_go_under_a_reader);
     pal_prepared_free(&mesh);
     return check_report();
 }

@@ -98,6 +98,44 @@ static void has_rows_only_for_what_the_scene_calls_for(void)
     box_free(&box);
 }
 
+/* the plan of a spring scene as it was before finite elements came: rows, and their bytes but for a pointer or two */
+static void spring_scenes_pay_nothing_for_finite_elements(void)
+{
+    static const struct {
+        const char *name;
+        size_t n_byte;
+    } was[] = {{"tool_push", 1785152}, {"tool_grab", 5568},  {"edge_distance", 14464}, {"face_area", 22272},
+               {"tet_volume", 11008},  {"viscous", 64},      {"gravity", 64},          {"verlet", 1344},
+               {"finite_guard", 3904}, {"surface_out", 4800}};
+    enum { N_ROW = sizeof was / sizeof was[0], WORLD = 2725000, POINTERS = 256 };
+    pal_prepared box;
+    REQUIRE(!box_make(4, 3, 3, 0.01, &box));
+    pal_scene *scene = calloc(1, sizeof *scene);
+    REQUIRE(scene);
+    pal_scene_default(scene);
+    scene->n_body = 1;
+    pal_body_default(&scene->body[0], "box", &box);
+    pal_item_init(&scene->body[0].output, "output", "surface_out");
+    pal_tools_default(scene, 3);
+    pal_world *world;
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(pal_world_rows(world) == N_ROW);
+    for (int i = 0; i < N_ROW; i++) {
+        pal_row_info info;
+        pal_world_row(world, i, &info);
+        CHECK(!strcmp(info.name, was[i].name));
+        CHECK(info.n_byte <= was[i].n_byte + POINTERS);
+        if (info.n_byte != was[i].n_byte)
+            printf("  %s: %zu bytes, %zu before\n", info.name, info.n_byte, was[i].n_byte);
+    }
+    /* the body's own struct has grown as well */
+    CHECK(pal_world_bytes(world) <= (size_t)WORLD + 2 * POINTERS + sizeof(pal_body));
+    CHECK(!pal_world_body(world, 0)->implicit && !pal_world_body(world, 0)->compliance);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
 /* a held box with every default effect and two tools: one presses, one grabs and pulls */
 static pal_world *open_touched(pal_prepared *box, pal_scene **scene)
 {
@@ -387,5 +425,6 @@ int main(void)
     RUN(shows_two_bodies_in_the_frame_of_the_first);
     RUN(sags_and_comes_to_rest_under_its_weight);
     RUN(has_rows_only_for_what_the_scene_calls_for);
+    RUN(spring_scenes_pay_nothing_for_finite_elements);
     return check_report();
 }

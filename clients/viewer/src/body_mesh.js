@@ -1,32 +1,42 @@
-// One shown part: geometry that takes decoded frames, tissue material, displacement colours, picking.
+// One shown part: geometry that takes decoded frames, tissue material, fields as colours, picking.
+import { COLOURS } from "./legend.js";
 import * as THREE from "./three.js";
 
-// nine stops of a rainbow, as in style.css
-const COLOURS = ["#4a5fc1", "#4682f0", "#35abf8", "#1ae4b6", "#72fe5e", "#c8ef34", "#faba39", "#f66b19", "#ca2a04"];
-
-/** @typedef {{mix: {value: number}, top: {value: number}, stops: {value: THREE.Color[]}}} MapUniforms */
+const BLEND_MS = 100; // from one set of values to the next, which come ten times a second
+const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 }, MATT = { clearcoat: 0.06, sheen: 0.02, specularIntensity: 0.3 };
 
 /**
- * Tissue: a wet layer over a soft, slightly translucent body; the displacement map is mixed in by the shader.
+ * @typedef {{mix: {value: number}, range: {value: THREE.Vector2}, older: {value: THREE.Vector2}, newer: {value: THREE.Vector2},
+ *   blend: {value: number}, stops: {value: THREE.Color[]}}} MapUniforms
+ *   range: of the colours; older, newer: low and high of the two sets of values
+ */
+
+/**
+ * Tissue: a wet layer over a soft, slightly translucent body; the colours of a field are mixed in by the shader, half of
+ * them as light of their own, so that they look as in the legend on every side.
  * @param {MapUniforms} uniforms
  */
 function makeTissue(uniforms) {
   const material = new THREE.MeshPhysicalMaterial({
-    color: 0x82352b, roughness: 0.5, metalness: 0, clearcoat: 0.55, clearcoatRoughness: 0.28,
-    sheen: 0.35, sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd98a7a), specularIntensity: 0.55, side: THREE.DoubleSide,
+    color: 0x82352b, roughness: 0.5, metalness: 0, clearcoatRoughness: 0.28,
+    sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd98a7a), side: THREE.DoubleSide, ...WET,
   });
   material.onBeforeCompile = (shader) => {
     shader.uniforms.mapMix = uniforms.mix;
-    shader.uniforms.mapTop = uniforms.top;
+    shader.uniforms.mapRange = uniforms.range;
+    shader.uniforms.mapOlder = uniforms.older;
+    shader.uniforms.mapNewer = uniforms.newer;
+    shader.uniforms.mapBlend = uniforms.blend;
     shader.uniforms.mapStops = uniforms.stops;
     shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nattribute vec3 rest;\nvarying float vMoved;\nvarying vec3 vRest;")
-      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvMoved = length(position - rest);\nvRest = rest;");
+      .replace("#include <common>", "#include <common>\nattribute vec3 rest;\nattribute float older, newer;\nuniform vec2 mapOlder, mapNewer;\nuniform float mapBlend;\nvarying float vField;\nvarying vec3 vRest;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvField = mix(mix(mapOlder.x, mapOlder.y, older), mix(mapNewer.x, mapNewer.y, newer), mapBlend);\nvRest = rest;");
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", `#include <common>
-varying float vMoved;
+varying float vField;
 varying vec3 vRest;
-uniform float mapMix, mapTop;
+uniform float mapMix;
+uniform vec2 mapRange;
 uniform vec3 mapStops[${COLOURS.length}];
 vec3 mapColour(float t) {
   float s = clamp(t, 0.0, 1.0) * ${(COLOURS.length - 1).toFixed(1)};
@@ -45,7 +55,9 @@ float mottle(vec3 p) {
       .replace("#include <color_fragment>", `#include <color_fragment>
 float shade = 0.86 + 0.14 * mottle(vRest * 160.0) + 0.10 * mottle(vRest * 45.0);
 diffuseColor.rgb *= shade;
-diffuseColor.rgb = mix(diffuseColor.rgb, mapColour(vMoved / mapTop), mapMix);`);
+vec3 shown = mapColour((vField - mapRange.x) / (mapRange.y - mapRange.x));
+diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`)
+      .replace("#include <emissivemap_fragment>", "#include <emissivemap_fragment>\ntotalEmissiveRadiance += 0.48 * mapMix * shown;");
   };
   return material;
 }
@@ -58,13 +70,24 @@ export class BodyMesh {
   constructor(scene, rest, triangles) {
     this.scene = scene;
     this.rest = rest;
-    this.uniforms = { mix: { value: 0 }, top: { value: 0.02 }, stops: { value: COLOURS.map((c) => new THREE.Color(c)) } };
+    /** @type {MapUniforms} */
+    this.uniforms = {
+      mix: { value: 0 }, range: { value: new THREE.Vector2(0, 1) }, older: { value: new THREE.Vector2() }, newer: { value: new THREE.Vector2() },
+      blend: { value: 1 }, stops: { value: COLOURS.map((c) => new THREE.Color(c)) },
+    };
+    /** @type {{low: number, high: number} | null} of the values shown */
+    this.values = null;
+    this.valuesAt = 0;
     this.geometry = new THREE.BufferGeometry();
     this.position = new THREE.BufferAttribute(rest.slice(), 3).setUsage(THREE.DynamicDrawUsage);
     this.normal = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
     this.geometry.setAttribute("position", this.position);
     this.geometry.setAttribute("normal", this.normal);
     this.geometry.setAttribute("rest", new THREE.BufferAttribute(rest, 3));
+    this.older = new THREE.BufferAttribute(new Uint8Array(rest.length / 3), 1, true).setUsage(THREE.DynamicDrawUsage);
+    this.newer = new THREE.BufferAttribute(new Uint8Array(rest.length / 3), 1, true).setUsage(THREE.DynamicDrawUsage);
+    this.geometry.setAttribute("older", this.older);
+    this.geometry.setAttribute("newer", this.newer);
     this.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     this.geometry.computeBoundingSphere();
     this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.uniforms));
@@ -86,10 +109,46 @@ export class BodyMesh {
     return old;
   }
 
-  /** @param {boolean} on @param {number} top displacement of the last colour, m */
-  colourMap(on, top) {
-    this.uniforms.mix.value = on ? 0.92 : 0;
-    this.uniforms.top.value = top;
+  /**
+   * new values of the field, which the colours go over to
+   * @param {Uint8Array} level [n] @param {number} low value of level 0 @param {number} high of level 255 @param {number} now ms
+   */
+  takeField(level, low, high, now) {
+    const u = this.uniforms, first = !this.values;
+    this.older.array = first ? level.slice() : this.newer.array;
+    this.newer.array = level;
+    u.older.value.set(first ? low : u.newer.value.x, first ? high : u.newer.value.y);
+    u.newer.value.set(low, high);
+    u.blend.value = first ? 1 : 0;
+    this.older.needsUpdate = true;
+    this.newer.needsUpdate = true;
+    this.values = { low, high };
+    this.valuesAt = now;
+    this.colour(true);
+  }
+
+  /** no colours: tissue again, or the values of another field are waited for */
+  dropField() {
+    this.values = null;
+    this.colour(false);
+  }
+
+  /** @param {boolean} on */
+  colour(on) {
+    this.uniforms.mix.value = on ? 1 : 0;
+    Object.assign(this.mesh.material, on ? MATT : WET);
+  }
+
+  /** what the first and the last colour mean @param {{low: number, high: number}} range */
+  colourRange(range) {
+    this.uniforms.range.value.set(range.low, range.high);
+  }
+
+  /** colours on their way to the newest values @param {number} now ms @returns {boolean} they still move */
+  blend(now) {
+    if (!this.values || this.uniforms.blend.value >= 1) return false;
+    this.uniforms.blend.value = Math.min(1, (now - this.valuesAt) / BLEND_MS);
+    return true;
   }
 
   /** @param {boolean} on */

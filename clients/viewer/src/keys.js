@@ -20,6 +20,7 @@ function viewKeys(view) {
 function taken(target, key) {
   const name = target?.tagName;
   if (name === "INPUT") return target.type !== "checkbox" || key === " ";
+  if (name === "SELECT") return true; // arrows and letters choose
   return name === "BUTTON" && (key === " " || key === "enter");
 }
 

@@ -1,6 +1,7 @@
 // The connection of one viewer: join, assets, frames, credit, reconnecting. Socket, fetch, clock and output are handed
 // in, so that the same code runs in the worker and under node --test.
 import { decodeAsset } from "./asset.js";
+import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
 import { vertexNormals } from "./normals.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
@@ -50,6 +51,8 @@ export class Link {
   wanted = new Map();
   /** @type {Map<number, Uint8Array>} newest frame of a part whose asset is not here yet */
   kept = new Map();
+  /** @type {Map<number, Uint8Array>} the same for fields */
+  keptField = new Map();
   decodeUs = 0;
   nDecoded = 0;
   decodeSum = 0;
@@ -70,6 +73,7 @@ export class Link {
     this.parts.clear();
     this.wanted.clear();
     this.kept.clear();
+    this.keptField.clear();
     this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
     this.latency = this.rtt = this.echo = 0;
     this.myTool = -1;
@@ -169,6 +173,7 @@ export class Link {
     const head = readHead(bytes);
     if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
     else if (head.kind === KIND.TOOLS) this.tools(bytes);
+    else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
   }
 
   /** @param {any} message */
@@ -211,6 +216,21 @@ export class Link {
     const kept = this.kept.get(index);
     this.kept.delete(index);
     if (kept) this.frame(index, kept);
+    const keptField = this.keptField.get(index);
+    this.keptField.delete(index);
+    if (keptField) this.field(index, keptField);
+  }
+
+  /** @param {number} index @param {Uint8Array} bytes */
+  field(index, bytes) {
+    const part = this.parts.get(index), { epoch } = readFieldHead(bytes);
+    if (!part || epoch > part.epoch) {
+      this.keptField.set(index, bytes.slice());
+      return;
+    }
+    if (epoch < part.epoch) return;
+    const level = new Uint8Array(part.n), head = decodeField(bytes, level);
+    this.around.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [level.buffer]);
   }
 
   /** @param {number} index @param {Uint8Array} bytes */

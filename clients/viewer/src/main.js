@@ -2,6 +2,7 @@
 // here and applied once per drawn picture.
 import { BodyMesh } from "./body_mesh.js";
 import { keyMap } from "./keys.js";
+import { FIELDS, labels, missing, offered, rangeOf } from "./legend.js";
 import { PlanPanel } from "./plan_panel.js";
 import { Stage } from "./stage.js";
 import { ToolInput } from "./tool_input.js";
@@ -36,7 +37,9 @@ const state = {
   poseAt: 0,
   drawn: 0,
   here: { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0 },
-  colourTop: 0.02,
+  field: "none", // shown in colour
+  /** @type {{low: number, high: number} | null} what the colours mean, null: no values yet */ range: null,
+  /** @type {string[]} names of the plan's rows as the panel has them */ rows: [],
 };
 
 const input = new ToolInput(
@@ -141,6 +144,66 @@ function showTool() {
   } else if (!hint.classList.contains("gone")) hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
 }
 
+/** asks for the chosen field of every part that gives it, and for none of the others */
+function askField() {
+  state.hello?.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => {
+    // a server of before fields would take the wish for a mistake of ours
+    if (!part.fields) return;
+    const field = part.fields.includes(state.field) ? state.field : "none";
+    worker.postMessage({ type: "control", message: { type: "view", part: i, field } });
+  });
+}
+
+function showLegend() {
+  byId("legend").hidden = state.field === "none";
+  if (state.field === "none") return;
+  const { low, high, unit } = state.range ? labels(state.field, state.range) : { low: "", high: "", unit: "" };
+  byId("legend-title").textContent = FIELDS[state.field].title;
+  byId("legend-unit").textContent = unit;
+  byId("legend-low").textContent = low;
+  byId("legend-high").textContent = high;
+  byId("legend-wait").hidden = state.range !== null;
+}
+
+/** @param {string} name of the field to show from now on, "none": tissue */
+function chooseField(name) {
+  state.field = name;
+  state.range = null;
+  byId("field").value = name;
+  for (const body of state.bodies.values()) body.dropField();
+  askField();
+  showLegend();
+  stage.dirty = true;
+}
+
+/** what there is to choose, after hello; what was chosen stays if it can */
+function offerFields() {
+  const names = offered(state.hello.parts), note = missing(state.hello.parts);
+  const option = (/** @type {string} */ value, /** @type {string} */ text) => Object.assign(document.createElement("option"), { value, textContent: text });
+  byId("field").replaceChildren(option("none", "Tissue"), ...names.map((name) => option(name, FIELDS[name].title)));
+  byId("field-note").textContent = note;
+  byId("field-note").hidden = !note;
+  chooseField(names.includes(state.field) ? state.field : "none");
+}
+
+/** the range of the colours follows the values of all parts */
+function followField() {
+  const values = [...state.bodies.values()].flatMap((body) => body.values ?? []);
+  if (values.length === 0) return;
+  const range = rangeOf(state.field, Math.min(...values.map((v) => v.low)), Math.max(...values.map((v) => v.high)), state.range);
+  const same = state.range && range.low === state.range.low && range.high === state.range.high;
+  state.range = range;
+  for (const body of state.bodies.values()) body.colourRange(range);
+  if (!same) showLegend();
+}
+
+/** rows come and go with fields @param {string[]} names */
+function showRows(names) {
+  if (names.join() === state.rows.join()) return;
+  state.rows = names;
+  panel.plan(names);
+}
+
 /** @type {Record<string, (m: any) => void>} */
 const control = {
   hello(m) {
@@ -150,11 +213,11 @@ const control = {
     state.me = m.you.id;
     state.myTool = m.you.tool ?? -1;
     if (!again) stage.frameBox([m.box_min_m, m.box_max_m], m.up);
-    state.colourTop = stage.size / 15;
-    byId("scale-top").textContent = (1000 * state.colourTop).toFixed(0) + " mm";
     input.radius = m.tools[Math.max(0, state.myTool)]?.radius_m ?? 0.02 * stage.size;
     keepParts(m.parts.length);
+    state.rows = m.rows;
     panel.plan(m.rows);
+    offerFields();
     showTitle();
     showTool();
   },
@@ -163,6 +226,7 @@ const control = {
   },
   status(m) {
     state.status = m;
+    showRows(m.rows?.length ? m.rows : state.hello.rows);
     byId("pause").textContent = m.paused ? "Go on" : "Pause";
     byId("pause").setAttribute("aria-pressed", String(m.paused));
     byId("step").hidden = !m.paused;
@@ -184,6 +248,7 @@ const control = {
   },
   error(m) {
     if (m.code === "tool_taken") return;
+    if (m.code === "field" && state.field !== "none") chooseField("none");
     notice(m.text, TOLD_MS);
   },
 };
@@ -206,7 +271,6 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
     case "part": {
       state.bodies.get(data.part)?.dispose();
       const body = new BodyMesh(stage.scene, data.rest, data.triangles);
-      body.colourMap(byId("colour-map").checked, state.colourTop);
       body.wireframe(byId("wireframe").checked);
       state.bodies.set(data.part, body);
       state.here.vertices = [...state.bodies.values()].reduce((n, b) => n + b.rest.length / 3, 0);
@@ -217,6 +281,15 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
       const older = state.frames.get(data.part);
       if (older) worker.postMessage({ type: "reuse", part: data.part, ...older }, [older.positions.buffer, older.normals.buffer]);
       state.frames.set(data.part, { positions: data.positions, normals: data.normals });
+      break;
+    }
+    case "field": {
+      const body = state.bodies.get(data.part);
+      // values that were on their way when another field was chosen are nobody's
+      if (data.name !== state.field || !body || 3 * data.level.length !== body.rest.length) break;
+      body.takeField(data.level, data.low, data.high, performance.now());
+      followField();
+      stage.dirty = true;
       break;
     }
     case "tools":
@@ -252,6 +325,7 @@ function picture() {
     fresh = true;
   }
   if (fresh) state.drawn++;
+  for (const body of state.bodies.values()) if (body.blend(performance.now())) stage.dirty = true;
   if (stage.dirty) {
     marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
     stage.draw();
@@ -298,16 +372,17 @@ byId("pause").onclick = togglePause;
 byId("step").onclick = () => command("step");
 byId("reset").onclick = () => command("reset");
 byId("panel-toggle").onclick = togglePanel;
-byId("colour-map").onchange = () => {
-  for (const body of state.bodies.values()) body.colourMap(byId("colour-map").checked, state.colourTop);
-  byId("scale").hidden = !byId("colour-map").checked;
-  stage.dirty = true;
+byId("field").onchange = () => chooseField(byId("field").value);
+/** the next of the fields that there are */
+const nextField = () => {
+  const names = [...byId("field").options].map((o) => o.value);
+  chooseField(names[(names.indexOf(state.field) + 1) % names.length]);
 };
 byId("wireframe").onchange = () => {
   for (const body of state.bodies.values()) body.wireframe(byId("wireframe").checked);
   stage.dirty = true;
 };
-const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel }, stage);
+const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField }, stage);
 window.addEventListener("keydown", (e) => {
   const action = actionOf(e);
   if (action) {

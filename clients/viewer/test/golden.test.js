@@ -4,6 +4,7 @@ import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
+import { decodeField, readFieldHead } from "../src/field_decoder.js";
 import { FrameDecoder, readFrameHead } from "../src/frame_decoder.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHaptic, readHead, readTools, WireError, writeAck, writePose } from "../src/wire.js";
 
@@ -36,6 +37,27 @@ test("reads the golden tools", () => {
 
 test("reads the golden haptic model", () => same(readHaptic(load("haptic.bin")), expected.haptic));
 
+test("reads the golden field", () => {
+  const level = new Uint8Array(expected.field.n), head = decodeField(load("field.bin"), level);
+  same({ ...head, level }, expected.field, "field");
+  assert.equal(head.name, "von_mises");
+});
+
+test("refuses fields of bad kinds, ranges, counts and blocks", () => {
+  const bytes = load("field.bin");
+  /** @param {number} at @param {number} value */
+  const changed = (at, value) => {
+    const copy = bytes.slice();
+    copy[at] = value;
+    return copy;
+  };
+  for (const [at, value, code] of [[0, 0, "MAGIC"], [4, 1, "KIND"], [4, 99, "KIND"], [5, 1, "FLAGS"], [6, 16, "RANGE"], [12, 0, "RANGE"], [12, 4, "RANGE"], [15, 128, "RANGE"], [23, 255, "RANGE"], [27, 127, "RANGE"], [35, 255, "COUNT"], [36, 0, "LONG"]])
+    assert.throws(() => readFieldHead(changed(Number(at), Number(value))), { code }, `byte ${at}`);
+  const level = new Uint8Array(expected.field.n);
+  assert.throws(() => decodeField(bytes, new Uint8Array(level.length - 1)), { code: "COUNT" });
+  assert.throws(() => decodeField(changed(40, 255), level), WireError);
+});
+
 test("reads the golden asset, whose hash is its name", () => {
   const bytes = load("asset.bin"), asset = decodeAsset(bytes);
   same(asset, { ...expected.asset, levels: {}, hash: undefined, rest: Object.assign({}, expected.asset.rest) }, "asset");
@@ -64,6 +86,7 @@ test("refuses every message cut anywhere, and with a byte too many", () => {
   const asset = decodeAsset(load("asset.bin")), decoder = new FrameDecoder(asset), positions = new Float32Array(asset.rest.length);
   /** @type {[string, (bytes: Uint8Array) => any][]} */
   const readers = [["tools.bin", readTools], ["haptic.bin", readHaptic], ["asset.bin", decodeAsset],
+    ["field.bin", (bytes) => decodeField(bytes, new Uint8Array(expected.field.n))],
     ["frame_bend.bin", (bytes) => decoder.decode(bytes, positions)], ["frame_affine.bin", (bytes) => decoder.decode(bytes, positions)]];
   for (const [name, read] of readers) {
     const bytes = load(name);

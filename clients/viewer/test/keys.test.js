@@ -32,6 +32,7 @@ test("space presses the focused button instead of pausing", () => {
 test("what is typed into a text field is text", () => {
   const { did, press } = stand();
   for (const key of ["r", " ", "ArrowLeft", "-"]) press(key, { target: { tagName: "INPUT", type: "text" } });
+  for (const key of ["r", " ", "ArrowDown"]) press(key, { target: { tagName: "SELECT" } }); // nor is what chooses from a list
   assert.deepEqual(did, []);
 });
 

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
+import { readFieldHead } from "../src/field_decoder.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
 import { KIND, POSE_FLAG, readHead, readTools } from "../src/wire.js";
@@ -112,6 +113,29 @@ test("keeps the newest frame until its asset has come, then shows it", async () 
     const length = Math.hypot(...shown[0].normals.subarray(i, i + 3));
     assert.ok(length === 0 || Math.abs(length - 1) < 1e-5);
   }
+});
+
+test("keeps the newest field until its asset has come, drops one of an older epoch", async () => {
+  const s = stand(), field = load("field.bin"), head = readFieldHead(field), n = 301;
+  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
+  s.sockets[0].accept();
+  s.sockets[0].say({ ...HELLO, parts: Array.from({ length: head.part + 1 }, () => ({ epoch: head.epoch, asset: "/asset/ab" })) });
+  s.sockets[0].say(field);
+  assert.equal(s.of("field").length, 0);
+  // as if an asset of as many vertices had come
+  s.link.parts.set(head.part, { epoch: head.epoch, n });
+  s.sockets[0].say(field);
+  const [shown] = s.of("field");
+  assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
+  assert.ok(shown.low < shown.high);
+  s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
+  s.sockets[0].say(field);
+  assert.equal(s.of("field").length, 1);
+  assert.equal(s.sockets[0].closed, 0);
+  // of another number of vertices: the server's mistake
+  s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
+  s.sockets[0].say(field);
+  assert.equal(s.sockets[0].closed, 4900);
 });
 
 test("acknowledges every cycle, frames decoded or not", async () => {

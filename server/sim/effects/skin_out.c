@@ -24,7 +24,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     PAL_TRY(pal_item_done(item, build->note));
     pal_body *body = build->body;
     if (!body->skin || !body->surface || body->skin->n_vertex != body->surface->n_vertex ||
-        body->skin->n_node != body->n_node)
+        body->skin->n_node > body->n_node)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body has no skin that fits its mesh", item->path);
     skin_out *out = PAL_NEW(build->arena, skin_out, 1);
     double *axes = PAL_NEW(build->arena, double, axes_count(body->skin));

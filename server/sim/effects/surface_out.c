@@ -21,7 +21,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     PAL_TRY(pal_item_done(item, build->note));
     pal_body *body = build->body;
     const pal_tets *tets = body->tets;
-    if (!tets || tets->n_face == 0 || tets->n_node != body->n_node)
+    if (!tets || tets->n_face == 0 || tets->n_node > body->n_node)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body has no boundary faces to show", item->path);
 
     /* number the nodes of boundary faces */

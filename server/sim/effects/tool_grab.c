@@ -9,9 +9,17 @@
  * shortened to what the tool's cap and the nodes' load_cap_N leave. The patch is let go when the button goes up or the
  * tool's ramp has fallen to 0.
  *
+ * With an implicit solver (pal_body.implicit) nothing limits k, c is 0 (the step itself damps), the solver takes the
+ * spring implicitly and the forces are those of the end of the sub-step. The spring stretches by at most 0.02 S more
+ * than at the end of the last sub-step (numerics.md part 3: a tool that jumps) and never by more than 98 % of the caps,
+ * so tissue follows a faster tool late. Where caps leave less than the spring's force, it becomes a constant force and
+ * the solver goes round once more (pal_tangent.settle).
+ *
  * For a haptic bridge the tool's bilateral part is published as f0 - K (x - x0) - b v, K = k_s 1: k_s starts as this
  * spring in series with the tissue under the patch, 2 E R / (1 - nu^2), and follows least squares on the tool's moves
- * (haptics.md 2.3 steps 3 and 6).
+ * (haptics.md 2.3 steps 3 and 6). Where the solver has a compliance, K = (C + 1/k)^-1 with the 3 x 3 compliance C of
+ * the patch, one column of it found anew in each step in which the tool moved; columns not found yet are taken
+ * isotropic.
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
@@ -27,6 +35,18 @@
 #define FORGET       0.9
 #define LEAST_MOVE_M 0.05e-3
 #define LEAST_K_N_M  10.0
+#define RISE_S       0.02
+#define BELOW_CAP    0.98
+
+/* what a grip needs beside with an implicit solver */
+typedef struct firm_grip {
+    bool constant, settled;       /* the load stays as it is; force is part of the tool's */
+    double k_N_m, pull[3];        /* at the sub-step's begin: stiffness, force of the spring on tissue            */
+    double load[3];               /* force on tissue in body->load                                                */
+    double stretch_m;             /* at the end of the last sub-step                                              */
+    double give[3][3], give_m[3]; /* compliance of the patch, a column an axis, m/N; where the tool was then      */
+    int n_give, next_give;        /* columns known                                                                */
+} firm_grip;
 
 typedef struct grip {
     bool held, button; /* has tissue; button in the last step                              */
@@ -38,6 +58,8 @@ typedef struct grip {
     double force[3];                /* on the tool, this sub-step                                       */
     /* felt stiffness */
     double last_m[3], last_N[3], xx, xf, k_start_N_m, k_felt_N_m;
+    bool pulls;      /* implicit solvers only: in this sub-step */
+    firm_grip *firm; /* implicit solvers only, else NULL */
 } grip;
 
 typedef struct tool_grab {
@@ -72,14 +94,14 @@ static void let_go(tool_grab *grab, grip *g)
 {
     for (int i = 0; i < g->n_node; i++) grab->sum_weight[g->node[i]] -= g->weight[i];
     g->n_node = 0;
-    g->held = false;
+    g->held = g->pulls = false;
 }
 
 static void reset(void *self, const pal_body *body)
 {
     tool_grab *grab = self;
     for (int t = 0; t < grab->n_tool; t++) {
-        grab->grip[t].held = grab->grip[t].button = false;
+        grab->grip[t].held = grab->grip[t].button = grab->grip[t].pulls = false;
         grab->grip[t].n_node = 0;
     }
     memset(grab->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
@@ -97,7 +119,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (build->body->n_shown == 0)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: tool_grab needs a body that shows something",
                             item->path);
-    size_t n_node = (size_t)build->body->n_node;
+    size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
+    if (build->body->implicit) {
+        build->body->wants_compliance = true;
+        if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    }
     grab->n_tool = build->scene->n_tool;
     grab->sum_weight = PAL_NEW(build->arena, double, n_node);
     grab->gather = PAL_NEW(build->arena, double, n_node);
@@ -106,6 +132,9 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         grab->grip[t].node = PAL_NEW(build->arena, int32_t, n_node);
         grab->grip[t].weight = PAL_NEW(build->arena, double, n_node);
         if (!grab->grip[t].node || !grab->grip[t].weight) return PAL_ERR_MEMORY;
+        if (!build->body->implicit) continue;
+        grab->grip[t].firm = PAL_NEW(build->arena, firm_grip, 1);
+        if (!grab->grip[t].firm) return PAL_ERR_MEMORY;
     }
     material(grab, build->body, &build->def->material, NULL);
     *self = grab;
@@ -176,6 +205,10 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     g->xx = g->xf = 0;
     pal_copy3(g->last_m, tool->last.position_m);
     pal_set3(g->last_N, 0, 0, 0);
+    if (g->firm) {
+        g->firm->stretch_m = 0;
+        g->firm->n_give = g->firm->next_give = 0;
+    }
 }
 
 /* once a step: the button's edges */
@@ -227,10 +260,89 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     tool->holding = true;
 }
 
-/* the bilateral part for a haptic bridge, in the last sub-step */
-static void publish(const tool_grab *grab, grip *g, pal_tool *tool)
+/* adds a force on the patch to `to` [n_node][3] */
+static void to_nodes(const grip *g, const double force[3], double *to)
 {
-    double move[3], change[3], k = spring_N_m(grab, g, tool);
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(to + 3 * (size_t)g->node[i], g->weight[i], force);
+}
+
+/* the same with an implicit solver: the spring's force at the begin */
+static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *step)
+{
+    pal_body *body = step->body;
+    double y[3], v[3], goal[3], rise = RISE_S * body->size_m / step->n_sub;
+    patch_place(g, body, y, v);
+    pal_quat_rotate(goal, tool->next.quat, g->offset);
+    pal_add3(goal, goal, tool->here_m);
+    pal_sub3(goal, goal, body->offset_m);
+    pal_sub3(goal, goal, y);
+    g->firm->k_N_m = tool->ramp * stiffness_N_m(grab, reach_m(grab, tool));
+    double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), most = g->firm->stretch_m + rise, weight = 0;
+    for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);
+    if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / weight);
+    if (g->firm->k_N_m * most > BELOW_CAP * cap) most = BELOW_CAP * cap / g->firm->k_N_m;
+    if (way > most) pal_scale3(goal, most / way, goal);
+    g->pulls = pal_finite3(goal);
+    g->firm->constant = g->firm->settled = false;
+    pal_set3(g->force, 0, 0, 0);
+    if (!g->pulls) return;
+    pal_scale3(g->firm->pull, g->firm->k_N_m, goal);
+    pal_copy3(g->firm->load, g->firm->pull);
+    to_nodes(g, g->firm->load, body->load);
+}
+
+/* compliance of the patch, one column a step */
+static void find_give(grip *g, const pal_tool *tool, pal_step *step)
+{
+    const pal_body *body = step->body;
+    if (!body->compliance ||
+        (g->firm->n_give == 3 && g->firm->next_give == 0 && pal_dist3(g->firm->give_m, tool->here_m) < LEAST_MOVE_M))
+        return;
+    size_t used = pal_arena_used(step->scratch), n3 = 3 * (size_t)body->n_node;
+    double *load = PAL_NEW(step->scratch, double, n3), *move = PAL_NEW(step->scratch, double, n3);
+    double unit[3] = {0};
+    int axis = g->firm->next_give;
+    unit[axis] = 1;
+    bool known = load && move;
+    if (known) to_nodes(g, unit, load);
+    known = known && body->compliance->solve(body->compliance->self, body, load, move);
+    if (known) {
+        pal_set3(g->firm->give[axis], 0, 0, 0);
+        for (int i = 0; i < g->n_node; i++) pal_axpy3(g->firm->give[axis], g->weight[i], move + 3 * (size_t)g->node[i]);
+        if (axis == 0) pal_copy3(g->firm->give_m, tool->here_m);
+        if (g->firm->n_give == axis) g->firm->n_give++;
+        g->firm->next_give = (axis + 1) % 3;
+    }
+    pal_arena_return(step->scratch, used);
+}
+
+/* K = (C + 1/k)^-1; false: not known */
+static bool felt(const grip *g, double k_N_m, double K[6])
+{
+    double c[3][3], minor[3][3];
+    if (!g->firm || g->firm->n_give == 0 || !(k_N_m > 0)) return false;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            c[i][j] =
+                i < g->firm->n_give && j < g->firm->n_give ? 0.5 * (g->firm->give[i][j] + g->firm->give[j][i]) : 0;
+            if (i == j) c[i][j] = (i < g->firm->n_give ? c[i][i] : g->firm->give[0][0]) + 1 / k_N_m;
+        }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
+            minor[i][j] = c[a][p] * c[b][q] - c[a][q] * c[b][p];
+        }
+    double det = pal_dot3(c[0], minor[0]);
+    if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
+    const int place[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+    for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
+    return isfinite(det);
+}
+
+/* the bilateral part for a haptic bridge, in the last sub-step */
+static void publish(const tool_grab *grab, grip *g, pal_tool *tool, bool implicit)
+{
+    double move[3], change[3], k = implicit ? g->firm->k_N_m : spring_N_m(grab, g, tool);
     pal_sub3(move, tool->here_m, g->last_m);
     pal_sub3(change, g->force, g->last_N);
     double way2 = pal_dot3(move, move);
@@ -250,7 +362,12 @@ static void publish(const tool_grab *grab, grip *g, pal_tool *tool)
         tool->grip_k_N_m[c] = tool->grip_k_N_m[c + 3] = 0;
     }
     tool->grip_k_N_m[0] = tool->grip_k_N_m[3] = tool->grip_k_N_m[5] = g->k_felt_N_m;
-    tool->grip_b_Ns_m = fmin(k * grab->damping_s, g->c_most_Ns_m) * g->k_felt_N_m / fmax(k, LEAST_K_N_M);
+    double damping = k * grab->damping_s;
+    if (implicit && felt(g, k, tool->grip_k_N_m))
+        g->k_felt_N_m = fmax(LEAST_K_N_M, (tool->grip_k_N_m[0] + tool->grip_k_N_m[3] + tool->grip_k_N_m[5]) / 3);
+    else if (!implicit)
+        damping = fmin(damping, g->c_most_Ns_m);
+    tool->grip_b_Ns_m = damping * g->k_felt_N_m / fmax(k, LEAST_K_N_M);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -261,12 +378,101 @@ static pal_err run(void *self, pal_step *step)
     for (int t = 0; t < n_tool; t++) {
         grip *g = &grab->grip[t];
         if (step->sub == 0) begin_tool(grab, g, &tools->tool[t], step->body);
+        g->pulls = false;
         if (!g->held || step->body->frozen) continue;
+        if (step->body->implicit) {
+            tie(grab, g, &tools->tool[t], step);
+            continue;
+        }
         pull(grab, g, &tools->tool[t], step);
-        if (step->sub == step->n_sub - 1) publish(grab, g, &tools->tool[t]);
+        if (step->sub == step->n_sub - 1) publish(grab, g, &tools->tool[t], false);
     }
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_tool_grab = {
-    .name = "tool_grab", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .material = material, .reset = reset};
+/* ---- implicit solvers ---- */
+
+static void linearise(void *self, const pal_body *body)
+{
+    (void)self, (void)body;
+}
+
+static void mean_of(const grip *g, const double *p, double mean[3])
+{
+    pal_set3(mean, 0, 0, 0);
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(mean, g->weight[i], p + 3 * (size_t)g->node[i]);
+}
+
+static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+{
+    tool_grab *grab = self;
+    (void)body, (void)c;
+    for (int t = 0; t < grab->n_tool; t++) {
+        const grip *g = &grab->grip[t];
+        if (!g->held || !g->pulls || g->firm->constant) continue;
+        double mean[3];
+        mean_of(g, p, mean);
+        pal_scale3(mean, k * g->firm->k_N_m, mean);
+        to_nodes(g, mean, out);
+    }
+}
+
+/* force of one tool at the end; true: beyond a cap, another load */
+static bool settle_tool(grip *g, pal_tool *tool, pal_body *body, const double *moved)
+{
+    double mean[3], most = 0, room = 1;
+    if (g->firm->settled) pal_sub3(tool->force_N, tool->force_N, g->force);
+    mean_of(g, moved, mean);
+    if (!g->firm->constant)
+        for (int c = 0; c < 3; c++) g->firm->load[c] = g->firm->pull[c] - g->firm->k_N_m * mean[c];
+    if (!pal_finite3(g->firm->load)) pal_set3(g->firm->load, 0, 0, 0);
+    pal_scale3(g->force, -1, g->firm->load);
+    if (!g->firm->constant) {
+        for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
+        double size = most * pal_norm3(g->force);
+        if (body->load_cap_N > 0 && size > body->load_cap_N) room = body->load_cap_N / size;
+        room = fmin(room, pal_tool_room(tool, g->force));
+        if (room < 1) {
+            double change[3];
+            pal_scale3(g->firm->load, room, g->firm->load);
+            pal_scale3(g->force, room, g->force);
+            pal_sub3(change, g->firm->load, g->firm->pull);
+            to_nodes(g, change, body->load);
+            g->firm->constant = true;
+        }
+    }
+    /* the stretch that this force would keep */
+    g->firm->stretch_m = g->firm->k_N_m > 0 ? pal_norm3(g->firm->load) / g->firm->k_N_m : 0;
+    pal_add3(tool->force_N, tool->force_N, g->force);
+    g->firm->settled = true;
+    tool->holding = true;
+    return room < 1;
+}
+
+static bool settle(void *self, pal_step *step, const double *moved)
+{
+    tool_grab *grab = self;
+    pal_tools *tools = step->tools;
+    int n_tool = tools->n_tool < grab->n_tool ? tools->n_tool : grab->n_tool;
+    bool again = false;
+    for (int t = 0; t < n_tool; t++) {
+        grip *g = &grab->grip[t];
+        if (!g->held || !g->pulls) continue;
+        bool first = !g->firm->settled;
+        again |= settle_tool(g, &tools->tool[t], step->body, moved);
+        if (step->sub != step->n_sub - 1) continue;
+        if (first) find_give(g, &tools->tool[t], step);
+        publish(grab, g, &tools->tool[t], true);
+    }
+    return again;
+}
+
+static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply, .settle = settle};
+
+const pal_effect pal_effect_tool_grab = {.name = "tool_grab",
+                                         .stage = PAL_STAGE_CONTACT,
+                                         .make = make,
+                                         .run = run,
+                                         .material = material,
+                                         .reset = reset,
+                                         .tangent = &tangent};

@@ -10,16 +10,23 @@
  * the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the tool's cap, and in its
  * first and last 10 steps by its ramp. The opposite force acts on the tool.
  *
+ * With an implicit solver (pal_body.implicit) a sub-step is the whole step and nothing limits k but the number of its
+ * iterations: k is 15 times as stiff as the tissue behind half a radius, spread over that area, with E of the tissue at
+ * each point; the solver takes it implicitly, there is no damping term, and the forces are those of the end of the
+ * sub-step (sim/press.h, which also says how caps are kept). Patches are then published after the solve, their k1 from
+ * the solver's compliance where it has one, at most two of them a step.
+ *
  * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
- * Keys: stiffness_Pa_m (0: 200 E / radius), friction (Coulomb, 0), clamp_S (0.02: penetration correction a step, in box
- * diagonals), near_m (0: the larger of a radius and 10 mm; within it a patch is published), slip_S (0.25), slip_s
- * (0.5). */
+ * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: penetration correction a
+ * step, in box diagonals), near_m (0: the larger of a radius and 10 mm; within it a patch is published), slip_S (0.25),
+ * slip_s (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/effect.h"
 #include "server/sim/patch.h"
+#include "server/sim/press.h"
 #include "server/sim/proxy.h"
 #include "server/sim/touch.h"
 
@@ -32,7 +39,31 @@
 #define SHARE_RISE    1.01
 #define DEEPEST_RADII 0.5
 #define BLOB_COSINE   0.25
-enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10 };
+/* implicit: contact over tissue stiffness; a point that is nearly as near as the nearest belongs to a near patch */
+#define STIFFER     15.0
+#define NEAR_RADII  0.125
+#define STILL_RADII 0.01
+/* points so far from the sphere can come to touch in a sub-step */
+#define COMING_RADII 1.0
+/* and it grows by STIFFEN a step while the proxy is kept from its tool, down again by SOFTEN while contact is shallow
+ */
+#define STIFFEN       1.3
+#define SOFTEN        0.95
+#define STIFFEST      8.0
+#define SHALLOW_RADII 0.05
+#define BELOW_CAP     0.98
+enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10, FELT_A_STEP = 2, NEAR_MAX = 256 };
+
+/* what a tool needs beside with an implicit solver */
+typedef struct firm {
+    pal_press press;
+    pal_felt felt;
+    pal_patches patches_before; /* published anew when the solver asks again */
+    int n_patch_before;
+    double side_before[3], back_before_m;
+    bool published;
+    double back_m, last_m[3]; /* the proxy keeps so far back from its tool for the sake of caps; tool a sub-step ago */
+} firm;
 
 /* one tool as this body feels it */
 typedef struct holder {
@@ -47,9 +78,10 @@ typedef struct holder {
     pal_contact *contact; /* [CONTACT_MAX] */
     int n_contact;
     double slip[3];  /* sideways way of the tool over tissue that friction still holds, m */
-    double share;    /* of the stiffness that is stable; falls at once, rises slowly */
+    double share;    /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3]; /* on the tool, this sub-step, this body */
     pal_patches patches;
+    struct firm *firm; /* implicit solvers only */
 } holder;
 
 typedef struct tool_push {
@@ -58,6 +90,9 @@ typedef struct tool_push {
     holder holder[PAL_TOOL_MAX];
     double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s;
     double young_Pa, poisson, damping_1_s, density_kg_m3;
+    pal_ties *ties;     /* implicit solvers only */
+    float *point_Pa;    /* E at each shown vertex where a region gives it, else 0 [n_vertex]; NULL: nowhere */
+    int n_felt, n_step; /* stiffnesses found in this step; steps                             */
 } tool_push;
 
 static void take_material(tool_push *push, const pal_material *material)
@@ -71,6 +106,24 @@ static void take_material(tool_push *push, const pal_material *material)
 static double stiffness_Pa_m(const tool_push *push, double radius_m)
 {
     return push->asked_Pa_m > 0 ? push->asked_Pa_m : 200 * push->young_Pa / radius_m;
+}
+
+/* of the tissue at a contact point */
+static double young_at(const tool_push *push, int point)
+{
+    const pal_touch *touch = &push->touch;
+    if (!push->point_Pa) return push->young_Pa;
+    if (point >= touch->n_vertex) point = touch->corner[3 * (size_t)(point - touch->n_vertex)];
+    return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->young_Pa;
+}
+
+/* implicit: STIFFER times 2 E b / (1 - nu^2) over the area of a contact half a radius wide, b its half-width or that of
+ * an element */
+static double implicit_Pa_m(const tool_push *push, int point, double radius_m, double h_m)
+{
+    if (push->asked_Pa_m > 0) return push->asked_Pa_m;
+    double a = 0.5 * radius_m, b = fmax(a, 0.5 * h_m);
+    return STIFFER * 2 * young_at(push, point) * b / ((1 - push->poisson * push->poisson) * M_PI * a * a);
 }
 
 static double near_m(const tool_push *push, double radius_m)
@@ -90,9 +143,13 @@ static void reset(void *self, const pal_body *body)
     tool_push *push = self;
     (void)body;
     pal_touch_forget(&push->touch);
+    push->n_step = 0;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].active = false;
         push->holder[t].share = 1;
+        firm *f = push->holder[t].firm;
+        if (f) pal_press_reset(&f->press);
+        if (f) f->felt = (pal_felt){0};
         pal_patches_reset(&push->holder[t].patches, push->body_index * 1024);
     }
 }
@@ -107,6 +164,34 @@ static pal_err read_keys(tool_push *push, pal_item *item, pal_note *note)
     PAL_TRY(pal_item_number(item, "slip_S", 0.05, 100, &push->slip_S, note));
     PAL_TRY(pal_item_number(item, "slip_s", 0, 1e9, &push->slip_s, note));
     return pal_item_done(item, note);
+}
+
+/* what an implicit solver's contact needs beside */
+static pal_err make_implicit(tool_push *push, pal_build *build)
+{
+    pal_body *body = build->body;
+    const pal_body_def *def = build->def;
+    push->ties = PAL_NEW(build->arena, pal_ties, 1);
+    if (!push->ties) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_ties_make(body, push->n_tool * (PAL_PRESS_MOST + 2), build->arena, push->ties));
+    for (int t = 0; t < push->n_tool; t++) {
+        push->holder[t].firm = PAL_NEW(build->arena, firm, 1);
+        if (!push->holder[t].firm) return PAL_ERR_MEMORY;
+        PAL_TRY(pal_press_make(build->arena, &push->holder[t].firm->press));
+    }
+    if (def->n_region > 0) {
+        push->point_Pa = PAL_NEW(build->arena, float, push->touch.n_vertex);
+        if (!push->point_Pa) return PAL_ERR_MEMORY;
+        for (int i = 0; i < push->touch.n_vertex; i++) {
+            pal_material at;
+            pal_material_at(def, body->surface->x + 3 * (size_t)i, &at);
+            if (at.young_Pa != def->material.young_Pa) push->point_Pa[i] = (float)at.young_Pa;
+        }
+    }
+    body->wants_compliance = true;
+    size_t scratch = pal_felt_scratch(body) + (size_t)push->touch.most_point * 4 * sizeof(double) + CONTACT_MAX + 256;
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    return PAL_ERR_OK;
 }
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -139,6 +224,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     /* positions and allowed distances of one tool's points */
     size_t scratch = n_point * 4 * sizeof(double) + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    if (build->body->implicit) PAL_TRY(make_implicit(push, build));
     reset(push, build->body);
     *self = push;
     return PAL_ERR_OK;
@@ -152,6 +238,8 @@ static void seat(tool_push *push, holder *h, const pal_body *body, const double 
     pal_copy3(h->proxy.x, at);
     h->active = true;
     h->behind_s = 0;
+    if (h->firm) h->firm->back_m = 0;
+    if (h->firm) pal_copy3(h->firm->last_m, at);
     if (!pal_touch_nearest(&push->touch, body, at, p, normal)) return;
     pal_sub3(out, at, p);
     if (pal_dot3(out, normal) > 0) {
@@ -196,24 +284,52 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     h->n_list = pal_touch_collect(&push->touch, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
 }
 
-/* contacts of the proxy where it now is; x [n_list][3] are the points */
-static void find_contacts(const tool_push *push, holder *h, const double *x)
+/* contacts of the proxy where it now is, and with an implicit solver points that may come to touch in this sub-step; x
+ * [n_list][3] are the points */
+static void find_contacts(const tool_push *push, holder *h, const pal_body *body, const double *x)
 {
     double radius = h->limits.radius_m, k_area = stiffness_Pa_m(push, radius);
+    double reach = body->implicit ? (1 + COMING_RADII) * radius : radius;
     h->n_contact = 0;
     for (int i = 0; i < h->n_list && h->n_contact < CONTACT_MAX; i++) {
         double w[3];
         pal_sub3(w, x + 3 * i, h->proxy.x);
         double d2 = pal_dot3(w, w);
-        if (!(d2 < radius * radius) || push->touch.area_m2[h->list[i]] <= 0) continue;
+        if (!(d2 < reach * reach) || push->touch.area_m2[h->list[i]] <= 0) continue;
         pal_contact *c = &h->contact[h->n_contact++];
         double distance = sqrt(d2);
         c->point = h->list[i];
         pal_copy3(c->x, x + 3 * i);
         if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
         c->depth_m = fmin(radius - distance, h->limits.deepest_m);
+        if (body->implicit) k_area = implicit_Pa_m(push, c->point, radius, body->h_m);
         c->k_N_m = k_area * push->touch.area_m2[c->point];
     }
+}
+
+/* where the proxy shall go: to the tool, or as far out from it as caps ask for; it stays when the tool goes deeper and
+ * is caught up with when the tool comes out */
+static void hold_back(holder *h, double here[3])
+{
+    double move[3];
+    pal_sub3(move, here, h->firm->last_m);
+    pal_copy3(h->firm->last_m, here);
+    if (!(h->firm->back_m > 0)) return;
+    h->firm->back_m = fmax(0, h->firm->back_m - pal_dot3(move, h->proxy.normal));
+    pal_axpy3(here, h->firm->back_m, h->proxy.normal);
+}
+
+/* after the solve: back so far that contact itself gives BELOW_CAP of what caps allow. Constant forces alone, shared
+ * out anew in each step, would let a tool at its cap wander */
+static void find_back(const tool_push *push, holder *h, const pal_tool *tool)
+{
+    const pal_press *press = &h->firm->press;
+    double k = 2 * push->young_Pa * tool->radius_m / (1 - push->poisson * push->poisson);
+    for (int i = 0; i < PAL_PATCH_MAX; i++)
+        if (h->firm->felt.entry[i].used && h->firm->felt.entry[i].contact) k = fmax(k, h->firm->felt.entry[i].k_N_m);
+    h->firm->back_m = h->firm->back_before_m;
+    if (press->capped || h->firm->back_m > 0)
+        h->firm->back_m = fmax(0, h->firm->back_m + 0.5 * (press->raw_N - BELOW_CAP * press->allowed_N) / k);
 }
 
 /* proxy and contacts of one tool in this sub-step */
@@ -226,13 +342,14 @@ static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step 
     pal_sub3(here, tool->here_m, step->body->offset_m);
     h->limits.rise_m = push->clamp_S * step->body->size_m / step->n_sub;
     h->limits.stroke_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
+    if (step->body->implicit) hold_back(h, here);
     size_t used = pal_arena_used(step->scratch);
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
            *core = PAL_NEW(step->scratch, double, h->n_list);
     if (x && core) {
         for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
         pal_proxy_move(&h->proxy, here, x, h->n_list, &h->limits, step->dt_s, core);
-        find_contacts(push, h, x);
+        find_contacts(push, h, step->body, x);
     }
     pal_arena_return(step->scratch, used);
 }
@@ -285,6 +402,15 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
 }
 
+/* the side the tool is on, slowly */
+static void follow_side(holder *h, const double before[3])
+{
+    double side[3];
+    if (!pal_unit3(side, h->total, 0)) return;
+    pal_axpy3(side, 4, before);
+    pal_unit3(h->proxy.normal, side, 1e-9);
+}
+
 /* forces of one tool to the nodes and back */
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
@@ -314,12 +440,37 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
     pal_add3(tool->force_N, tool->force_N, h->total);
     tool->touching = true;
-    /* the side the tool is on, slowly */
-    double side[3];
-    if (pal_unit3(side, h->total, 0)) {
-        pal_axpy3(side, 4, h->proxy.normal);
-        pal_unit3(h->proxy.normal, side, 1e-9);
-    }
+    follow_side(h, h->proxy.normal);
+}
+
+/* A proxy that cannot go deeper is placed anew by tissue in each step, which is contact by steps again and trembles at
+ * 60 steps a second; contact that is stiff enough lets it reach its tool. h->share is how much stiffer than asked. */
+static void find_stiffening(holder *h, const pal_tool *tool, const pal_body *body)
+{
+    double here[3], deepest = 0, radius = tool->radius_m;
+    pal_sub3(here, tool->here_m, body->offset_m);
+    for (int i = 0; i < h->n_contact; i++) deepest = fmax(deepest, h->contact[i].depth_m);
+    if (deepest > 0.9 * h->limits.deepest_m && pal_dist3(here, h->proxy.x) > 0.01 * radius)
+        h->share = fmin(STIFFEST, h->share * STIFFEN);
+    else if (deepest < SHALLOW_RADII * radius)
+        h->share = fmax(1, h->share * SOFTEN);
+}
+
+/* the same with an implicit solver: ties and the loads they begin with */
+static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
+{
+    find_stiffening(h, tool, step->body);
+    double soft = tool->ramp * h->ease * h->share, move[3];
+    pal_copy3(h->firm->side_before, h->proxy.normal);
+    h->firm->back_before_m = h->firm->back_m;
+    h->firm->published = false;
+    if (step->sub == step->n_sub - 1) h->firm->patches_before = h->patches;
+    h->n_contact = soft > 0 ? pal_press_thin(h->contact, h->n_contact) : 0;
+    for (int i = 0; i < h->n_contact; i++) h->contact[i].k_N_m *= soft;
+    pal_scale3(move, step->dt_s, h->proxy.v);
+    pal_press_begin(&h->firm->press, push->ties, &push->touch, step->body, h->contact, h->n_contact, push->friction,
+                    move);
+    h->n_contact = h->firm->press.n_contact;
 }
 
 /* the strongest contacts not yet grouped, within 75 degrees of their mean */
@@ -345,7 +496,7 @@ static bool contact_blob(const holder *h, uint8_t *grouped, pal_blob *blob)
         if (pal_dot3(h->contact[i].away, axis) >= BLOB_COSINE) grouped[i] = 1;
     grouped[seed] = 1;
     blob->force_N = pal_norm3(sum);
-    blob->gap_m = 0;
+    blob->gap_m = blob->k_N_m = 0;
     pal_scale3(sum, -1, sum);
     return pal_unit3(blob->normal, sum, 0);
 }
@@ -377,6 +528,41 @@ static bool near_blob(const holder *h, const double *x, double near, const pal_b
     return pal_unit3(blob->normal, sum, 0);
 }
 
+/* k1 of a blob from the solver's compliance: as it is known, found again when it has changed and the step's budget
+ * allows; x [n_list][3] are the points */
+static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *step, const double *x, pal_blob *blob)
+{
+    double here[3], radius = tool->radius_m, least = INFINITY, sum = 0;
+    pal_sub3(here, tool->here_m, step->body->offset_m);
+    h->firm->felt.step = push->n_step;
+    if (!pal_felt_look(&h->firm->felt, blob, here, STILL_RADII * radius) || push->n_felt >= FELT_A_STEP) return;
+    if (blob->force_N > 0 && h->firm->press.constant) return;
+    push->n_felt++;
+    if (blob->force_N > 0) {
+        pal_felt_contact(&h->firm->felt, blob, here, &h->firm->press, push->ties, &push->touch, step->body, h->contact,
+                         radius, step->scratch);
+        return;
+    }
+    /* what the sphere would lie on, were it an eighth of a radius nearer */
+    int32_t point[NEAR_MAX];
+    double weight[NEAR_MAX], k = 0;
+    int n = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < h->n_list && n < NEAR_MAX; i++) {
+            double out[3], area = push->touch.area_m2[h->list[i]];
+            pal_sub3(out, h->proxy.x, x + 3 * i);
+            double along = pal_dot3(out, blob->normal), distance = pal_norm3(out);
+            if (along < 0.5 * distance || area <= 0) continue;
+            if (pass == 0) least = fmin(least, distance);
+            if (pass == 0 || distance > least + NEAR_RADII * radius) continue;
+            point[n] = h->list[i];
+            k += area * implicit_Pa_m(push, point[n], radius, step->body->h_m);
+            sum += weight[n++] = area;
+        }
+    for (int i = 0; i < n; i++) weight[i] /= sum;
+    pal_felt_near(&h->firm->felt, blob, here, &push->touch, step->body, point, weight, n, k, step->scratch);
+}
+
 /* what a haptic bridge needs to know, in the last sub-step */
 static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
@@ -390,6 +576,7 @@ static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
         while (n < PAL_PATCH_MAX && contact_blob(h, grouped, &blob[n])) n++;
         for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
         while (n < PAL_PATCH_MAX && near_blob(h, x, near_m(push, tool->radius_m), blob, n, &blob[n])) n++;
+        for (int b = 0; b < n && step->body->compliance; b++) feel(push, h, tool, step, x, &blob[b]);
     }
     pal_arena_return(step->scratch, used);
     double radius = tool->radius_m;
@@ -413,6 +600,13 @@ static pal_err run(void *self, pal_step *step)
     }
     pal_touch_update(&push->touch, step->body, step->dt_s);
     for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
+    if (step->body->implicit) {
+        push->n_step += step->sub == 0;
+        push->n_felt = 0;
+        pal_ties_begin(push->ties);
+        for (int t = 0; t < n_tool; t++) tie(push, &push->holder[t], &tools->tool[t], step);
+        return PAL_ERR_OK;
+    }
 
     for (int t = 0; t < n_tool; t++) find_share(push, t, n_tool, step);
     for (int t = 0; t < n_tool; t++) press(push, &push->holder[t], &tools->tool[t], step);
@@ -421,5 +615,58 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_tool_push = {
-    .name = "tool_push", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .material = material, .reset = reset};
+/* ---- implicit solvers ---- */
+
+static void linearise(void *self, const pal_body *body)
+{
+    /* the ties of a sub-step are made by run */
+    (void)self, (void)body;
+}
+
+static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+{
+    (void)body, (void)c;
+    pal_ties_multiply(((tool_push *)self)->ties, k, p, out);
+}
+
+static bool settle(void *self, pal_step *step, const double *moved)
+{
+    tool_push *push = self;
+    pal_tools *tools = step->tools;
+    int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
+    bool again = false;
+    pal_ties_motion(push->ties, moved);
+    for (int t = 0; t < n_tool; t++) {
+        holder *h = &push->holder[t];
+        pal_tool *tool = &tools->tool[t];
+        if (!h->active) continue;
+        again |= pal_press_settle(&h->firm->press, push->ties, step->body, tool, h->contact, push->friction);
+        pal_copy3(h->total, h->firm->press.total_N);
+        follow_side(h, h->firm->side_before);
+        find_back(push, h, tool);
+    }
+    /* each tool in turn is the first to have its patches' stiffness found */
+    for (int i = 0; i < n_tool && step->sub == step->n_sub - 1; i++) {
+        int t = (i + push->n_step) % n_tool;
+        holder *h = &push->holder[t];
+        pal_tool *tool = &tools->tool[t];
+        if (h->firm->published) {
+            h->patches = h->firm->patches_before;
+            tool->n_patch = h->firm->n_patch_before;
+        }
+        h->firm->n_patch_before = tool->n_patch;
+        publish(push, h, tool, step);
+        h->firm->published = true;
+    }
+    return again;
+}
+
+static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply, .settle = settle};
+
+const pal_effect pal_effect_tool_push = {.name = "tool_push",
+                                         .stage = PAL_STAGE_CONTACT,
+                                         .make = make,
+                                         .run = run,
+                                         .material = material,
+                                         .reset = reset,
+                                         .tangent = &tangent};

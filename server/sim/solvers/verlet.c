@@ -4,8 +4,9 @@
  * sub-step is `safety` (key, 0.5) of the stability limit that Gershgorin's bound gives: with K and C the row sums of
  * stiffness and explicit damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node.
  * The bound is taken again at the current state whenever a node may have moved a fifth of an element since the last
- * time. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps
- * (step->heavy), the same inequality is met by adding mass to the nodes that break it. */
+ * time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a sub-step (numerics.md part 3).
+ * Where the world cannot afford the sub-steps (step->heavy), the same inequality is met by adding mass to the nodes
+ * that break it. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 
@@ -113,7 +114,7 @@ static pal_err run(void *self, pal_step *step)
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
         if (step->heavy) m = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
-        double s = body->held[i] ? 0 : dt / m, k = body->held[i] ? 0 : keep;
+        double s = body->held[i] ? 0 : dt / m, k = !body->held[i] ? keep : body->held[i] == 2 ? 1 : 0;
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
         most2 = v2 > most2 ? v2 : most2;

@@ -1,0 +1,401 @@
+/* `palpate solve`: a load-case problem -> displacements, the error against a reference, files for other tools. */
+#include "server/base/clock.h"
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/commands/solve_study.h"
+#include "server/lab/solve.h"
+#include "server/mesh/mesh_file.h"
+#include "server/scene/problem_file.h"
+#include "server/scene/scene_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATH = 1200 };
+
+static const char about[] =
+    "Solves a load case with finite elements on the voxels of a surface, and compares displacements with a reference.\n"
+    "PROBLEM.json is of format palpate-reference-1: surface, materials, supports, load cases, references\n"
+    "(server/scene/problem_file.h says every key). --case takes a load case, which is compared with the reference of\n"
+    "the same kinematics, E and nu if there is one, or a reference, whose load case, law, E and nu are then taken.\n"
+    "Example: palpate solve deploy/problems/beam.json --case tip --resolution 32 --vtk tip.vtk\n"
+    "Several resolutions or elements, with commas between, give a table: error, observed order of convergence from "
+    "one\n"
+    "resolution to the next, the change of displacement between them, the order and the error that the changes speak\n"
+    "for (Richardson), seconds. Example: --resolution 8,16,32 --element hex8_bbar,tet4,tet10:16 --plot error.svg\n";
+
+typedef struct wishes {
+    const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *linear, *free,
+        *folder, *vtk, *csv, *plot;
+    pal_study_list list;
+    pal_solve_options solve;
+} wishes;
+
+/* what is solved and what it is compared with */
+typedef struct study {
+    pal_problem *problem;
+    const pal_problem_case *load_case;
+    const pal_problem_reference *reference; /* NULL: none */
+    const char *samples_file;               /* NULL: none */
+    pal_samples samples;
+    pal_surface surface;
+    pal_solution *solution;
+    pal_solve_result result;
+    double rms_percent, max_percent, total_s;
+    char file[2][PATH];
+    int n_file;
+} study;
+
+static int usage(const pal_flag_common *common, const char *sentence)
+{
+    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
+    return 2;
+}
+
+/* ---- what is meant ---- */
+
+static pal_err no_case(const study *s, const char *id, pal_note *note)
+{
+    char list[320] = "";
+    size_t n = 0;
+    const pal_problem *p = s->problem;
+    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
+        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
+                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
+    if (!id) return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case is missing; known are %s", p->path, list);
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: there is no load case or reference \"%.40s\"; known are %s",
+                        p->path, id, list);
+}
+
+/* the law: --law, or what --kinematics, or the reference, asks for */
+static const char *law_of(const wishes *wish, const pal_problem_reference *reference)
+{
+    bool finite = wish->kinematics ? !strcmp(wish->kinematics, "finite") : reference && reference->finite;
+    if (wish->law) return wish->law;
+    if (!finite) return "linear";
+    bool neo = !reference || !reference->finite || !strcmp(reference->law, "neo-hookean");
+    return neo ? "neo_hookean" : "corotational";
+}
+
+static bool same(double a, double b)
+{
+    return fabs(a - b) <= 1e-9 * fabs(b);
+}
+
+/* does the reference answer what is asked? */
+static bool answers(const study *s, const wishes *wish, const pal_problem_reference *r)
+{
+    const pal_problem_material *m = &s->problem->material[0];
+    double young = isnan(r->young_Pa) ? m->young_Pa : r->young_Pa;
+    double poisson = isnan(r->poisson) ? m->poisson : r->poisson;
+    return !strcmp(r->load_case, s->load_case->id) && r->finite == (strcmp(wish->solve.law, "linear") != 0) &&
+           same(isnan(wish->solve.young_Pa) ? m->young_Pa : wish->solve.young_Pa, young) &&
+           same(isnan(wish->solve.poisson) ? m->poisson : wish->solve.poisson, poisson);
+}
+
+/* --case -> load case, law, E, nu and what to compare with */
+static pal_err choose(study *s, wishes *wish, pal_note *note)
+{
+    const pal_problem *p = s->problem;
+    const char *id = wish->load_case ? wish->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
+    const pal_problem_reference *named = id ? pal_problem_reference_find(p, id) : NULL;
+    s->load_case = named ? pal_problem_case_find(p, named->load_case) : id ? pal_problem_case_find(p, id) : NULL;
+    if (!s->load_case) return no_case(s, id, note);
+    wish->solve.law = law_of(wish, named);
+    if (named && isnan(wish->solve.young_Pa)) wish->solve.young_Pa = named->young_Pa;
+    if (named && isnan(wish->solve.poisson)) wish->solve.poisson = named->poisson;
+    s->samples_file = wish->samples;
+    if (wish->samples) return PAL_ERR_OK;
+    s->reference = named;
+    for (int k = 0; k < p->n_reference && !named; k++) {
+        const pal_problem_reference *r = &p->reference[k];
+        if (!answers(s, wish, r)) continue;
+        if (!s->reference || !strcmp(r->law, "neo-hookean")) s->reference = r;
+    }
+    if (s->reference) s->samples_file = s->reference->file;
+    return PAL_ERR_OK;
+}
+
+/* ---- work ---- */
+
+static pal_err compare(study *s, pal_note *note)
+{
+    if (!s->samples_file) return PAL_ERR_OK;
+    double *u = malloc(3 * (size_t)s->samples.n * sizeof *u);
+    if (!u) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d samples", s->samples.n);
+    for (int k = 0; k < s->samples.n; k++) pal_solution_at(s->solution, s->samples.x + 3 * k, u + 3 * k);
+    pal_samples_error(&s->samples, u, &s->rms_percent, &s->max_percent);
+    free(u);
+    return PAL_ERR_OK;
+}
+
+static pal_err write_one(study *s, const char *path, bool vtk, pal_note *note)
+{
+    PAL_TRY(vtk ? pal_solution_vtk(s->solution, path, note) : pal_solution_csv(s->solution, path, note));
+    if (s->n_file < 2) snprintf(s->file[s->n_file++], PATH, "%s", path);
+    return PAL_ERR_OK;
+}
+
+static pal_err write_files(study *s, const wishes *wish, pal_note *note)
+{
+    char csv[PATH], vtk[PATH];
+    if (wish->folder) {
+        PAL_TRY(pal_scene_make_folder(wish->folder, note));
+        snprintf(csv, sizeof csv, "%s/solution.csv", wish->folder);
+        snprintf(vtk, sizeof vtk, "%s/solution.vtk", wish->folder);
+        PAL_TRY(write_one(s, wish->csv ? wish->csv : csv, false, note));
+        return write_one(s, wish->vtk ? wish->vtk : vtk, true, note);
+    }
+    if (wish->csv) PAL_TRY(write_one(s, wish->csv, false, note));
+    return wish->vtk ? write_one(s, wish->vtk, true, note) : PAL_ERR_OK;
+}
+
+static pal_err read_all(study *s, wishes *wish, pal_note *note)
+{
+    PAL_TRY(pal_problem_read(wish->problem, &s->problem, note));
+    PAL_TRY(choose(s, wish, note));
+    if (s->samples_file) PAL_TRY(pal_samples_read(s->samples_file, &s->samples, note));
+    pal_mesh_file_options file = {.unit_m = s->problem->unit_m, .weld = PAL_MESH_WELD};
+    pal_surface_report report = {0};
+    return pal_mesh_file_read(s->problem->surface, &file, &s->surface, &report, NULL, NULL, note);
+}
+
+static pal_err work(study *s, const wishes *wish, pal_note *note)
+{
+    pal_note why = {""};
+    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &wish->solve, &s->solution, &s->result, &why);
+    if (err) return pal_note_set(note, err, "%s: %s", wish->problem, why.text);
+    PAL_TRY(compare(s, note));
+    return write_files(s, wish, note);
+}
+
+/* ---- saying ---- */
+
+static void add_vector(cJSON *object, const char *key, const double v[3])
+{
+    cJSON_AddItemToObject(object, key, cJSON_CreateDoubleArray(v, 3));
+}
+
+static void add_or_null(cJSON *object, const char *key, bool known, double number)
+{
+    if (known && isfinite(number))
+        cJSON_AddNumberToObject(object, key, number);
+    else
+        cJSON_AddNullToObject(object, key);
+}
+
+static void add_seconds(cJSON *object, const study *s)
+{
+    const pal_solve_result *r = &s->result;
+    cJSON *seconds = cJSON_AddObjectToObject(object, "seconds");
+    cJSON_AddNumberToObject(seconds, "prepare", r->prepare_s);
+    cJSON_AddNumberToObject(seconds, "assemble", r->assemble_s);
+    cJSON_AddNumberToObject(seconds, "factor", r->factor_s);
+    cJSON_AddNumberToObject(seconds, "solve", r->solve_s);
+    cJSON_AddNumberToObject(seconds, "total", s->total_s);
+}
+
+static cJSON *as_json(const study *s, const wishes *wish)
+{
+    const pal_solve_result *r = &s->result;
+    cJSON *o = cJSON_CreateObject();
+    bool compared = s->samples_file != NULL;
+    cJSON_AddBoolToObject(o, "ok", true);
+    cJSON_AddStringToObject(o, "problem", s->problem->name);
+    cJSON_AddStringToObject(o, "case", s->load_case->id);
+    if (s->reference)
+        cJSON_AddStringToObject(o, "reference", s->reference->id);
+    else
+        cJSON_AddNullToObject(o, "reference");
+    cJSON_AddStringToObject(o, "element", wish->solve.element);
+    cJSON_AddStringToObject(o, "law", wish->solve.law);
+    cJSON_AddNumberToObject(o, "resolution", wish->solve.resolution);
+    cJSON_AddBoolToObject(o, "fill", wish->solve.fill);
+    add_or_null(o, "rms_percent", compared, s->rms_percent);
+    add_or_null(o, "max_percent", compared, s->max_percent);
+    add_or_null(o, "reference_rms_percent", s->reference != NULL, s->reference ? 100 * s->reference->estimated_rms : 0);
+    cJSON_AddNumberToObject(o, "samples", s->samples.n);
+    cJSON_AddNumberToObject(o, "nodes", r->n_node);
+    cJSON_AddNumberToObject(o, "elements", r->n_element);
+    cJSON_AddNumberToObject(o, "dof", r->n_dof);
+    cJSON_AddNumberToObject(o, "held_nodes", r->n_held);
+    cJSON_AddNumberToObject(o, "iterations", r->n_newton);
+    cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
+    cJSON_AddNumberToObject(o, "residual", r->residual);
+    cJSON_AddNumberToObject(o, "voxel_m", r->h_m);
+    cJSON_AddNumberToObject(o, "volume_m3", r->volume_m3);
+    cJSON_AddItemToObject(o, "load_area_m2", cJSON_CreateDoubleArray(r->area_m2, s->load_case->n_load));
+    add_vector(o, "load_N", r->load_N);
+    add_vector(o, "reaction_N", r->reaction_N);
+    cJSON_AddNumberToObject(o, "work_J", r->work_J);
+    cJSON_AddNumberToObject(o, "energy_J", r->energy_J);
+    cJSON_AddNumberToObject(o, "max_displacement_m", r->most_m);
+    cJSON_AddBoolToObject(o, "poisson_clamped", r->clamped);
+    cJSON *files = cJSON_AddArrayToObject(o, "files");
+    for (int k = 0; k < s->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(s->file[k]));
+    add_seconds(o, s);
+    return o;
+}
+
+static void print(const study *s, const wishes *wish)
+{
+    const pal_solve_result *r = &s->result;
+    printf("%s, load case %s: %s, %s, %d nodes, %d elements of %g m, %d unknowns\n", s->problem->name, s->load_case->id,
+           wish->solve.element, wish->solve.law, r->n_node, r->n_element, r->h_m, r->n_dof);
+    if (r->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
+    printf("%d Newton iteration%s", r->n_newton, r->n_newton == 1 ? "" : "s");
+    if (r->n_cg > 0) printf(" with %d conjugate gradients", r->n_cg);
+    printf(", residual %.1e; largest displacement %.6g m, work of the loads %.6g J, elastic energy %.6g J\n",
+           r->residual, r->most_m, r->work_J, r->energy_J);
+    printf("loads (%.4g, %.4g, %.4g) N, supports (%.4g, %.4g, %.4g) N\n", r->load_N[0], r->load_N[1], r->load_N[2],
+           r->reaction_N[0], r->reaction_N[1], r->reaction_N[2]);
+    if (s->samples_file)
+        printf("against %s (%d points): RMS %.3f %%, largest %.3f %% of the largest displacement\n",
+               s->reference ? s->reference->id : s->samples_file, s->samples.n, s->rms_percent, s->max_percent);
+    printf("seconds: prepare %.3f, assemble %.3f, factor %.3f, solve %.3f, total %.3f\n", r->prepare_s, r->assemble_s,
+           r->factor_s, r->solve_s, s->total_s);
+    for (int k = 0; k < s->n_file; k++) printf("wrote %s\n", s->file[k]);
+}
+
+/* ---- the command ---- */
+
+static bool show_progress(const char *what, double fraction, void *user)
+{
+    pal_report_progress(what, fraction, user);
+    return true;
+}
+
+/* several elements or resolutions, or a plot of them */
+static bool is_many(const wishes *wish)
+{
+    return wish->list.n_element * wish->list.n_resolution > 1 || wish->plot;
+}
+
+static int run_many(const pal_flag_common *common, const study *s, const wishes *wish)
+{
+    const pal_study_case what = {.problem = s->problem,
+                                 .load_case = s->load_case,
+                                 .reference = s->reference,
+                                 .samples_file = s->samples_file,
+                                 .samples = s->samples_file ? &s->samples : NULL,
+                                 .surface = &s->surface,
+                                 .options = &wish->solve,
+                                 .plot = wish->plot};
+    return pal_study_run(common, &what, &wish->list);
+}
+
+static int run(pal_flag_common *common, wishes *wish)
+{
+    study s = {0};
+    pal_note note = {""};
+    double start = pal_clock_s();
+    wish->solve.progress = show_progress;
+    wish->solve.user = common;
+    pal_err err = read_all(&s, wish, &note);
+    bool many = !err && is_many(wish);
+    if (!err && !many) err = work(&s, wish, &note);
+    s.total_s = pal_clock_s() - start;
+    pal_report_progress(NULL, 0, common);
+    int code = err            ? pal_report_refusal(common, err, &note)
+               : many         ? run_many(common, &s, wish)
+               : common->json ? pal_report_json(common, as_json(&s, wish))
+                              : 0;
+    if (!err && !many && !common->json && !common->quiet) print(&s, wish);
+    pal_solution_free(s.solution);
+    pal_surface_free(&s.surface);
+    pal_samples_free(&s.samples);
+    free(s.problem);
+    return code;
+}
+
+/* is a word one of a NULL-terminated list, or not given? */
+static bool is_one(const char *word, const char *const *list)
+{
+    for (int k = 0; word && list[k]; k++)
+        if (!strcmp(word, list[k])) return true;
+    return !word;
+}
+
+/* the words of flags; NULL: all fine, else the sentence */
+static const char *check_words(const wishes *wish)
+{
+    if (!is_one(wish->kinematics, (const char *const[]){"linear", "finite", NULL}))
+        return "--kinematics: is not linear or finite";
+    if (!is_one(wish->law, (const char *const[]){"linear", "corotational", "neo_hookean", NULL}))
+        return "--law: is not linear, corotational or neo_hookean";
+    if (!is_one(wish->fill, (const char *const[]){"on", "off", NULL})) return "--fill: is not on or off";
+    if (!is_one(wish->align, (const char *const[]){"on", "off", NULL})) return "--align: is not on or off";
+    if (!is_one(wish->linear, (const char *const[]){"direct", "pcg", NULL})) return "--linear: is not direct or pcg";
+    if (!is_one(wish->free, (const char *const[]){"refuse", "inertia_relief", NULL}))
+        return "--free: is not refuse or inertia_relief";
+    if (wish->kinematics && wish->law && !strcmp(wish->kinematics, "linear") != !strcmp(wish->law, "linear"))
+        return "--kinematics and --law: linear goes with linear only";
+    if (is_many(wish) && (wish->folder || wish->csv || wish->vtk))
+        return "-o, --csv and --vtk: are for one element and one resolution";
+    return NULL;
+}
+
+int command_solve(int argc, char **argv)
+{
+    wishes wish = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
+    pal_solve_options *o = &wish.solve;
+    const pal_flag flag[] = {
+        {"--case", "ID", PAL_FLAG_TEXT, &wish.load_case, 0, 0, "load case or reference (the only load case)"},
+        {"--kinematics", "WORD", PAL_FLAG_TEXT, &wish.kinematics, 0, 0,
+         "linear or finite (the reference's, or linear)"},
+        {"--law", "WORD", PAL_FLAG_TEXT, &wish.law, 0, 0,
+         "linear, corotational or neo_hookean (linear, or neo_hookean when finite)"},
+        {"--element", "LIST", PAL_FLAG_TEXT, &wish.element, 0, 0,
+         "hex8_bbar, hex8, tet4 or tet10, or several with commas between; tet10:16 is not solved beyond resolution 16\n"
+         "(hex8_bbar)"},
+        {"--resolution", "LIST", PAL_FLAG_TEXT, &wish.resolution, 0, 0,
+         "voxels on the longest axis, 1 to 1024, or several with commas between, ascending (32)"},
+        {"--fill", "WORD", PAL_FLAG_TEXT, &wish.fill, 0, 0,
+         "on: voxels that the surface cuts count by their filled share; off: those at least half filled, whole (on)"},
+        {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->least_fill, 1e-6, 1,
+         "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
+         "of the volume; 0.5 without)"},
+        {"--align", "WORD", PAL_FLAG_TEXT, &wish.align, 0, 0,
+         "on: voxels are shifted so that faces lie where a support, or else a material, ends inside the body; off: "
+         "they\n"
+         "begin at the box of the surface (on)"},
+        {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 16,
+         "every voxel is solved as K x K x K of its fill: what is left of the error is that of the jagged border (1)"},
+        {"--samples", "U.csv", PAL_FLAG_TEXT, &wish.samples, 0, 0,
+         "compare at these points: CSV x,y,z,ux,uy,uz (the reference's)"},
+        {"--nu", "NU", PAL_FLAG_NUMBER, &o->poisson, -1e300, 1e300, "Poisson ratio (the problem's)"},
+        {"--young", "PA", PAL_FLAG_NUMBER, &o->young_Pa, -1e300, 1e300, "stiffness (the problem's)"},
+        {"--tolerance", "T", PAL_FLAG_NUMBER, &o->tolerance, 1e-14, 0.1, "residual relative to the loads (1e-8)"},
+        {"--linear", "WORD", PAL_FLAG_TEXT, &wish.linear, 0, 0,
+         "direct or pcg: how the linear systems are solved (whichever suits the size)"},
+        {"--free", "WORD", PAL_FLAG_TEXT, &wish.free, 0, 0,
+         "a body without supports: refuse, or inertia_relief: its inertia balances the loads (refuse)"},
+        {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "writes DIR/solution.csv and DIR/solution.vtk"},
+        {"--csv", "FILE", PAL_FLAG_TEXT, &wish.csv, 0, 0, "writes x,y,z,ux,uy,uz of all nodes, m"},
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &wish.vtk, 0, 0, "writes a legacy VTK file with displacement and stress"},
+        {"--plot", "FILE.svg", PAL_FLAG_TEXT, &wish.plot, 0, 0,
+         "draws error over nodes, and in FILE_seconds.svg error over seconds"},
+    };
+    const pal_flag_table table = {.usage = "solve PROBLEM.json --case ID [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .least_operand = 1,
+                                  .most_operand = 1};
+    pal_flag_common common;
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &wish.problem, &n);
+    if (code >= 0) return code;
+    pal_note note = {""};
+    if (!pal_study_parse(wish.element, wish.resolution, &wish.list, &note)) return usage(&common, note.text);
+    const char *sentence = check_words(&wish);
+    if (sentence) return usage(&common, sentence);
+    o->element = wish.list.element[0];
+    o->resolution = wish.list.resolution[0];
+    o->fill = !wish.fill || !strcmp(wish.fill, "on");
+    o->align = !wish.align || !strcmp(wish.align, "on");
+    o->linear = wish.linear;
+    o->inertia_relief = wish.free && !strcmp(wish.free, "inertia_relief");
+    return run(&common, &wish);
+}

@@ -1,0 +1,67 @@
+/* Private to the mesh room: convex polygons of a few corners, cut by planes. A corner that lies on the plane belongs to
+ * both sides, and the corners a cut makes are the same in both, so that no area is lost or counted twice. Thread: any.
+ */
+#ifndef PAL_MESH_POLYGON_H
+#define PAL_MESH_POLYGON_H
+#include <stddef.h>
+
+enum { PAL_POLYGON_MOST = 24 };
+
+typedef struct pal_polygon {
+    int n;
+    double x[PAL_POLYGON_MOST][3];
+} pal_polygon;
+
+static inline void pal_polygon_put(pal_polygon *p, const double x[3])
+{
+    if (p->n == PAL_POLYGON_MOST) return;
+    for (int k = 0; k < 3; k++) p->x[p->n][k] = x[k];
+    p->n++;
+}
+
+/* height [n] of the corners over the plane; low takes what lies below, high what lies above (either may be NULL) */
+static inline void pal_polygon_cut(const pal_polygon *p, const double *height, pal_polygon *low, pal_polygon *high)
+{
+    if (low) low->n = 0;
+    if (high) high->n = 0;
+    for (int i = 0; i < p->n; i++) {
+        int j = i + 1 == p->n ? 0 : i + 1;
+        double a = height[i], b = height[j], q[3];
+        if (a <= 0 && low) pal_polygon_put(low, p->x[i]);
+        if (a >= 0 && high) pal_polygon_put(high, p->x[i]);
+        if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
+        double t = a / (a - b);
+        for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
+        if (low) pal_polygon_put(low, q);
+        if (high) pal_polygon_put(high, q);
+    }
+}
+
+/* the same by the plane where coordinate axis is `at`: corners of the cut lie on it to the bit */
+static inline void pal_polygon_cut_axis(const pal_polygon *p, int axis, double at, pal_polygon *low, pal_polygon *high)
+{
+    if (low) low->n = 0;
+    if (high) high->n = 0;
+    for (int i = 0; i < p->n; i++) {
+        int j = i + 1 == p->n ? 0 : i + 1;
+        double a = p->x[i][axis] - at, b = p->x[j][axis] - at, q[3];
+        if (a <= 0 && low) pal_polygon_put(low, p->x[i]);
+        if (a >= 0 && high) pal_polygon_put(high, p->x[i]);
+        if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
+        double t = a / (a - b);
+        for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
+        q[axis] = at;
+        if (low) pal_polygon_put(low, q);
+        if (high) pal_polygon_put(high, q);
+    }
+}
+
+static inline void pal_polygon_range(const pal_polygon *p, int axis, double *least, double *most)
+{
+    *least = *most = p->x[0][axis];
+    for (int i = 1; i < p->n; i++) {
+        if (p->x[i][axis] < *least) *least = p->x[i][axis];
+        if (p->x[i][axis] > *most) *most = p->x[i][axis];
+    }
+}
+#endif

@@ -1,0 +1,101 @@
+/* Fields in colour at the hub: who looks at what, and the newest values for those who do. A client looks at one field
+ * of each part at most; a field that nobody looks at is neither computed nor encoded. Values go out at most 10 times a
+ * second, newest first and the rest never, only while the client's credit is free, behind control and before the next
+ * cycle. */
+#include "server/net/hub_parts.h"
+
+#include "protocol/field_codec.h"
+
+/* names and numbers of the wire are those of the simulation */
+_Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT_M &&
+                   (int)PAL_WIRE_FIELD_VON_MISES_PA == (int)PAL_FIELD_VON_MISES_PA &&
+                   (int)PAL_WIRE_FIELD_ENERGY_J_M3 == (int)PAL_FIELD_ENERGY_J_M3 &&
+                   (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
+               "fields are numbered alike");
+
+void pal_hub_tell_fields(pal_hub_room *room)
+{
+    for (int p = 0; p < room->stream->n_part; p++)
+        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
+            bool wanted = room->n_look[p][k] > 0;
+            if (wanted == room->told[p][k]) continue;
+            pal_command command = {.kind = PAL_COMMAND_FIELD, .body = p, .field = (pal_field)k, .wanted = wanted};
+            /* a session whose queue is full is told at the next tick */
+            if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->told[p][k] = wanted;
+        }
+}
+
+static void look(pal_client *c, int part, pal_field field)
+{
+    pal_field before = (pal_field)c->view[part];
+    if (field == before) return;
+    if (before != PAL_FIELD_NONE) c->room->n_look[part][before]--;
+    if (field != PAL_FIELD_NONE) c->room->n_look[part][field]++;
+    c->view[part] = (uint8_t)field;
+    c->sent_field[part] = 0;
+}
+
+void pal_hub_look_away(pal_client *c)
+{
+    for (int p = 0; p < c->room->stream->n_part; p++) look(c, p, PAL_FIELD_NONE);
+    pal_hub_tell_fields(c->room);
+}
+
+void pal_hub_view(pal_hub *hub, pal_client *c, const pal_wire_view *view)
+{
+    const pal_stream *s = c->room->stream;
+    pal_wire_field field = pal_wire_field_find(view->field);
+    if (view->part >= (uint32_t)s->n_part) {
+        pal_hub_complain(hub, c, "part", "there is no part %u, the scene has %d", view->part, s->n_part);
+        return;
+    }
+    int part = (int)view->part;
+    if (field == PAL_WIRE_FIELD_COUNT) {
+        pal_hub_complain(hub, c, "field", "there is no field %s", view->field);
+        return;
+    }
+    if (field != PAL_WIRE_FIELD_NONE && !pal_session_gives(c->room->session, part, (pal_field)field)) {
+        pal_hub_complain(hub, c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
+                         pal_field_title((pal_field)field));
+        return;
+    }
+    look(c, part, (pal_field)field);
+    pal_hub_tell_fields(c->room);
+    c->peer->ops->ready(c->peer); /* others may look at it already */
+}
+
+/* the first part of which this client lacks the newest values; -1: none */
+static int lacking(const pal_client *c)
+{
+    const pal_stream *s = c->room->stream;
+    for (int p = 0; p < s->n_part; p++)
+        if (c->view[p] && s->part[p].field[c->view[p]] && s->part[p].field_made[c->view[p]] != c->sent_field[p])
+            return p;
+    return -1;
+}
+
+bool pal_hub_wants_field(const pal_client *c)
+{
+    return c->id && c->out_begin == c->n_out && pal_credit_free(&c->credit) && lacking(c) >= 0;
+}
+
+pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *c)
+{
+    if (!pal_hub_wants_field(c)) return NULL;
+    int p = lacking(c);
+    const pal_stream_part *part = &c->room->stream->part[p];
+    c->sent_field[p] = part->field_made[c->view[p]];
+    hub->count.n_field++;
+    return pal_packet_hold(part->field[c->view[p]]);
+}
+
+uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now)
+{
+    uint64_t due = 0;
+    if (!pal_stream_fields(room->stream, now, room->n_look, &due)) return due;
+    for (int i = 0; i < hub->most_clients; i++) {
+        pal_client *c = &hub->client[i];
+        if (c->peer && c->room == room && !c->peer->drop_code && pal_hub_wants_field(c)) c->peer->ops->ready(c->peer);
+    }
+    return due;
+}

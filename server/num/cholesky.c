@@ -1,0 +1,532 @@
+/* Sparse Cholesky factors: CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008) orders, analyses and factors with
+ * supernodes; the factor is then copied into the panels of panels.h, where solves need neither BLAS nor threads.
+ *
+ * The ordering is found for points, whose three unknowns stay together: a ninth of the entries to order. Matrices are
+ * scaled by a power of two near 1 / (largest diagonal), right sides likewise, so that single precision neither
+ * overflows nor underflows whatever the units are. A pivot that lost fourteen digits of its diagonal entry counts as
+ * not positive. While solving, numbers below the smallest normal one count as zero: where inertia rules, answers decay
+ * from point to point until they would be subnormal, which costs a hundred times a normal number.
+ *
+ * BLAS runs on the calling thread only: OpenBLAS and OpenMP are told so where they are loaded, since their idle threads
+ * spin on the processors that simulation threads need. */
+#include "server/num/cholesky.h"
+
+#include "server/num/panels.h"
+
+#include <cholmod.h>
+#include <dlfcn.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
+
+/* one thread's means of factoring */
+typedef struct bench {
+    cholmod_common common;
+    cholmod_factor *pattern; /* the analysis, without values                      */
+    double *value;           /* lower triangle of the scaled matrix               */
+    double scale;            /* value = scale * a                                 */
+    bool started, finite;
+} bench;
+
+/* a factor in use or in the making */
+typedef struct factor {
+    void *value; /* double or float [panels.n_value[single]] */
+    double scale;
+    bool single, good;
+} factor;
+
+typedef enum work { WORK_NONE, WORK_BEGUN, WORK_DONE } work;
+
+struct pal_cholesky {
+    int n, n_free;    /* points, points not held                     */
+    int32_t *place;   /* of each point in the factor, -1: held  [n]  */
+    int64_t n_entry;  /* of the lower triangle, numbers              */
+    int *start, *row; /* its columns, by unheld points in order      */
+    pal_panels panels;
+    double nonzeros, flops;
+    void *y, *vector; /* working vectors of a solve */
+    bench own, spare;
+    factor now, next;
+    /* the spare thread: everything below, spare and next are its own while state is WORK_BEGUN */
+    bool threaded, quit;
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    work state;
+    pal_err outcome;
+};
+
+/* BLAS libraries that bring threads of their own are told to use none; once in a process */
+static void silence_threads(void)
+{
+    void (*set)(int);
+    void *at = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
+    if (!at) return;
+    memcpy(&set, &at, sizeof set);
+    set(1);
+}
+
+/* for this thread: OpenMP regions inside CHOLMOD run on it alone */
+static void stay_on_this_thread(void)
+{
+    void (*set)(int);
+    void *at = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
+    if (!at) return;
+    memcpy(&set, &at, sizeof set);
+    set(0);
+}
+
+static pal_err error_of(const cholmod_common *common)
+{
+    switch (common->status) {
+    case CHOLMOD_OK:
+        return PAL_ERR_OK;
+    case CHOLMOD_NOT_POSDEF:
+    case CHOLMOD_DSMALL:
+        return PAL_ERR_NUMERIC;
+    case CHOLMOD_OUT_OF_MEMORY:
+    case CHOLMOD_TOO_LARGE:
+        return PAL_ERR_MEMORY;
+    default:
+        return PAL_ERR_INTERNAL;
+    }
+}
+
+static void start_bench(bench *b)
+{
+    cholmod_start(&b->common);
+    b->common.print = 0;
+    b->common.error_handler = NULL;
+    b->common.try_catch = 1;
+    b->common.quick_return_if_not_posdef = 1;
+    b->common.useGPU = 0;
+    b->common.final_ll = 1;
+    b->started = true;
+}
+
+static void finish_bench(bench *b)
+{
+    if (!b->started) return;
+    cholmod_free_factor(&b->pattern, &b->common);
+    cholmod_finish(&b->common);
+    free(b->value);
+}
+
+/* the lower triangle's columns, a point each (expand 1) or its three unknowns (expand 3) */
+static int64_t lay_columns(const pal_blocks *a, const int32_t *number, int expand, int *start, int *row)
+{
+    int64_t n = 0;
+    int column = 0;
+    for (int j = 0; j < a->n; j++) {
+        if (number[j] < 0) continue;
+        for (int c = 0; c < expand; c++) {
+            if (start) start[column++] = (int)n;
+            for (int k = a->start[j]; k < a->start[j + 1]; k++) {
+                int i = number[a->row[k]];
+                if (i < 0) continue;
+                for (int r = k == a->start[j] ? c : 0; r < expand; r++, n++)
+                    if (row) row[n] = expand * i + r;
+            }
+        }
+    }
+    if (start) start[column] = (int)n;
+    return n;
+}
+
+static cholmod_sparse sparse_of(int n, int64_t n_entry, int *start, int *row, double *value)
+{
+    return (cholmod_sparse){.nrow = (size_t)n,
+                            .ncol = (size_t)n,
+                            .nzmax = (size_t)n_entry,
+                            .p = start,
+                            .i = row,
+                            .x = value,
+                            .stype = -1,
+                            .itype = CHOLMOD_INT,
+                            .xtype = value ? CHOLMOD_REAL : CHOLMOD_PATTERN,
+                            .dtype = CHOLMOD_DOUBLE,
+                            .sorted = 1,
+                            .packed = 1};
+}
+
+/* the order of points with the fewest entries of the factor, as an order of unknowns [3 n_free] */
+static pal_err find_order(const pal_blocks *a, const int32_t *number, int n_free, int *order)
+{
+    cholmod_common common;
+    cholmod_factor *found = NULL;
+    int64_t n_entry = lay_columns(a, number, 1, NULL, NULL);
+    int *start = malloc(sizeof *start * ((size_t)n_free + 1)), *row = malloc(sizeof *row * (size_t)n_entry);
+    pal_err err = start && row ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (!err) {
+        lay_columns(a, number, 1, start, row);
+        cholmod_sparse points = sparse_of(n_free, n_entry, start, row, NULL);
+        cholmod_start(&common);
+        common.print = 0;
+        common.try_catch = 1;
+        common.supernodal = CHOLMOD_SIMPLICIAL;
+        common.nmethods = 2;
+        common.method[0].ordering = CHOLMOD_AMD;
+        common.method[1].ordering = CHOLMOD_METIS;
+        found = cholmod_analyze(&points, &common);
+        if (found) {
+            const int *at = found->Perm;
+            for (int i = 0; i < 3 * n_free; i++) order[i] = 3 * at[i / 3] + i % 3;
+        } else {
+            err = error_of(&common);
+        }
+        cholmod_free_factor(&found, &common);
+        cholmod_finish(&common);
+    }
+    free(start);
+    free(row);
+    return err;
+}
+
+/* a supernodal factor's pattern for the order found, and where each point went */
+static pal_err analyse(pal_cholesky *c, const pal_blocks *a, int32_t *number)
+{
+    cholmod_common *common = &c->own.common;
+    int *order = malloc(sizeof *order * 3 * (size_t)c->n_free);
+    if (!order) return PAL_ERR_MEMORY;
+    pal_err err = find_order(a, number, c->n_free, order);
+    if (!err) {
+        cholmod_sparse matrix = sparse_of(3 * c->n_free, c->n_entry, c->start, c->row, NULL);
+        common->supernodal = CHOLMOD_SUPERNODAL;
+        common->nmethods = 1;
+        common->method[0].ordering = CHOLMOD_GIVEN;
+        c->own.pattern = cholmod_analyze_p(&matrix, order, NULL, 0, common);
+        err = c->own.pattern ? PAL_ERR_OK : error_of(common);
+    }
+    free(order);
+    if (err) return err;
+    const cholmod_factor *l = c->own.pattern;
+    if (!l->is_super) return PAL_ERR_INTERNAL;
+    c->nonzeros = common->lnz;
+    c->flops = common->fl;
+    const int *permuted = l->Perm;
+    int *home = malloc(sizeof *home * (size_t)c->n_free);
+    if (!home) return PAL_ERR_MEMORY;
+    for (int i = 0; i < c->n_free; i++) home[permuted[3 * i] / 3] = i;
+    for (int i = 0; i < c->n; i++) c->place[i] = number[i] < 0 ? -1 : home[number[i]];
+    free(home);
+    return pal_panels_make((int)l->nsuper, l->super, l->pi, l->s, &c->panels);
+}
+
+static pal_err make(pal_cholesky *c, const pal_blocks *a, const uint8_t *held)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
+    pthread_once(&once, silence_threads);
+    c->place = malloc(sizeof *c->place * ((size_t)c->n + 1));
+    if (!c->place) return PAL_ERR_MEMORY;
+    int32_t *number = c->place;
+    for (int i = 0; i < c->n; i++) number[i] = held && held[i] ? -1 : c->n_free++;
+    if (c->n_free == 0) return PAL_ERR_OK;
+    c->n_entry = lay_columns(a, number, 3, NULL, NULL);
+    if (c->n_entry > INT32_MAX || c->n_free > INT32_MAX / 3) return PAL_ERR_MEMORY;
+    c->start = malloc(sizeof *c->start * (3 * (size_t)c->n_free + 1));
+    c->row = malloc(sizeof *c->row * (size_t)c->n_entry);
+    if (!c->start || !c->row) return PAL_ERR_MEMORY;
+    lay_columns(a, number, 3, c->start, c->row);
+    /* the graph partitioner below CHOLMOD keeps one random number generator for the process */
+    pthread_mutex_lock(&one_at_a_time);
+    pal_err err = analyse(c, a, number);
+    pthread_mutex_unlock(&one_at_a_time);
+    if (err) return err;
+    size_t n_work = (size_t)c->panels.most_row + PAL_PANEL_SLACK;
+    c->y = calloc(3 * (size_t)c->n_free, sizeof(double));
+    c->vector = calloc(n_work, sizeof(double));
+    return c->y && c->vector ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_cholesky_create(const pal_blocks *a, const uint8_t *held, pal_cholesky **out)
+{
+    pal_cholesky *c = calloc(1, sizeof *c);
+    if (!c) return PAL_ERR_MEMORY;
+    c->n = a->n;
+    pthread_mutex_init(&c->lock, NULL);
+    pthread_cond_init(&c->changed, NULL);
+    start_bench(&c->own);
+    pal_err err = make(c, a, held);
+    if (err)
+        pal_cholesky_destroy(c);
+    else
+        *out = c;
+    return err;
+}
+
+void pal_cholesky_destroy(pal_cholesky *c)
+{
+    if (!c) return;
+    if (c->threaded) {
+        pthread_mutex_lock(&c->lock);
+        c->quit = true;
+        pthread_cond_broadcast(&c->changed);
+        pthread_mutex_unlock(&c->lock);
+        pthread_join(c->thread, NULL);
+    }
+    pthread_cond_destroy(&c->changed);
+    pthread_mutex_destroy(&c->lock);
+    finish_bench(&c->own);
+    finish_bench(&c->spare);
+    pal_panels_free(&c->panels);
+    free(c->place);
+    free(c->start);
+    free(c->row);
+    free(c->y);
+    free(c->vector);
+    free(c->now.value);
+    free(c->next.value);
+    free(c);
+}
+
+/* copies the scaled values of a's lower triangle without held points; finds out whether they are finite */
+static pal_err take_values(const pal_cholesky *c, const pal_blocks *a, bench *b)
+{
+    if (!b->value) b->value = malloc(sizeof *b->value * (size_t)c->n_entry);
+    if (!b->value) return PAL_ERR_MEMORY;
+    double most = 0, sum = 0;
+    for (int j = 0; j < a->n; j++) {
+        const double *v = a->value + 9 * (size_t)a->start[j];
+        if (c->place[j] >= 0) most = fmax(most, fmax(v[0], fmax(v[4], v[8])));
+    }
+    int e = 0;
+    if (most > 0 && isfinite(most)) (void)frexp(most, &e);
+    b->scale = ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
+    double *to = b->value;
+    for (int j = 0; j < a->n; j++) {
+        if (c->place[j] < 0) continue;
+        for (int k = 0; k < 3; k++)
+            for (int p = a->start[j]; p < a->start[j + 1]; p++) {
+                if (c->place[a->row[p]] < 0) continue;
+                const double *v = a->value + 9 * (size_t)p;
+                for (int r = p == a->start[j] ? k : 0; r < 3; r++) {
+                    *to = b->scale * v[3 * r + k];
+                    sum += 0 * *to++;
+                }
+            }
+    }
+    b->finite = sum == 0;
+    return PAL_ERR_OK;
+}
+
+/* all pivots positive, finite and above rounding */
+static bool pivots_good(const pal_cholesky *c, const bench *b, const cholmod_factor *l)
+{
+    const int *super = l->super, *pi = l->pi, *px = l->px, *perm = l->Perm;
+    const double *x = l->x;
+    for (size_t s = 0; s < l->nsuper; s++)
+        for (int j = super[s]; j < super[s + 1]; j++) {
+            double d = x[px[s] + (int64_t)(j - super[s]) * (pi[s + 1] - pi[s] + 1)];
+            if (!(d > 0 && d * d > 1e-14 * b->value[c->start[perm[j]]]) || !isfinite(d)) return false;
+        }
+    return true;
+}
+
+/* the factor and its copy fit into this machine; asked first, since memory that is promised and not there kills */
+static bool fits(const pal_cholesky *c, const bench *b, bool single)
+{
+    double have = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    double need = (double)b->pattern->xsize * sizeof(double) +
+                  (double)c->panels.n_value[single] * (single ? sizeof(float) : sizeof(double));
+    return !(have > 0) || need < 0.8 * have;
+}
+
+/* factors b's values into f, which keeps its old values unless all goes well */
+static pal_err factor_values(const pal_cholesky *c, bench *b, bool single, factor *f)
+{
+    if (!b->finite) return PAL_ERR_NUMERIC;
+    if (!fits(c, b, single)) return PAL_ERR_MEMORY;
+    stay_on_this_thread();
+    cholmod_sparse matrix = sparse_of(3 * c->n_free, c->n_entry, c->start, c->row, b->value);
+    cholmod_factor *l = cholmod_copy_factor(b->pattern, &b->common);
+    if (!l) return error_of(&b->common);
+    cholmod_factorize(&matrix, l, &b->common);
+    pal_err err = error_of(&b->common);
+    if (!err && (l->minor < l->n || l->xtype != CHOLMOD_REAL || !l->is_super || !pivots_good(c, b, l)))
+        err = PAL_ERR_NUMERIC;
+    if (!err && (!f->value || f->single != single)) {
+        size_t n_byte = (size_t)c->panels.n_value[single] * (single ? sizeof(float) : sizeof(double));
+        void *value = aligned_alloc(64, (n_byte + 63) / 64 * 64);
+        if (value) {
+            free(f->value);
+            *f = (factor){.value = value, .single = single};
+        } else {
+            err = PAL_ERR_MEMORY;
+        }
+    }
+    if (!err) {
+        if (single)
+            pal_panels_fill_single(&c->panels, l->px, l->x, f->value);
+        else
+            pal_panels_fill_double(&c->panels, l->px, l->x, f->value);
+        f->scale = b->scale;
+        f->good = true;
+    }
+    cholmod_free_factor(&l, &b->common);
+    return err;
+}
+
+pal_err pal_cholesky_factor(pal_cholesky *c, const pal_blocks *a, bool single)
+{
+    if (pal_cholesky_refreshing(c)) return PAL_ERR_STATE;
+    if (c->n_free == 0) {
+        c->now.good = true;
+        return PAL_ERR_OK;
+    }
+    PAL_TRY(take_values(c, a, &c->own));
+    return factor_values(c, &c->own, single, &c->now);
+}
+
+static void solve_panels(pal_cholesky *c, const double *b, double s, double *x)
+{
+    const pal_panels *p = &c->panels;
+    double t = c->now.scale / s;
+    if (c->now.single) {
+        float *y = c->y;
+        for (int i = 0; i < c->n; i++)
+            for (int k = 0; k < 3 && c->place[i] >= 0; k++) y[3 * c->place[i] + k] = (float)(s * b[3 * i + k]);
+        pal_panels_solve_single(p, c->now.value, y, c->vector);
+        for (int i = 0; i < c->n; i++)
+            for (int k = 0; k < 3; k++) x[3 * i + k] = c->place[i] < 0 ? 0 : t * (double)y[3 * c->place[i] + k];
+    } else {
+        double *y = c->y;
+        for (int i = 0; i < c->n; i++)
+            for (int k = 0; k < 3 && c->place[i] >= 0; k++) y[3 * c->place[i] + k] = s * b[3 * i + k];
+        pal_panels_solve_double(p, c->now.value, y, c->vector);
+        for (int i = 0; i < c->n; i++)
+            for (int k = 0; k < 3; k++) x[3 * i + k] = c->place[i] < 0 ? 0 : t * y[3 * c->place[i] + k];
+    }
+}
+
+pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x)
+{
+    if (!c->now.good) return PAL_ERR_STATE;
+    double most = 0, sum = 0;
+    for (int i = 0; i < c->n; i++)
+        for (int k = 0; k < 3 && c->place[i] >= 0; k++) {
+            most = fmax(most, fabs(b[3 * i + k]));
+            sum += 0 * b[3 * i + k];
+        }
+    if (sum != 0) return PAL_ERR_NUMERIC;
+    if (most == 0) {
+        for (int i = 0; i < 3 * c->n; i++) x[i] = 0;
+        return PAL_ERR_OK;
+    }
+    int e;
+    (void)frexp(most, &e);
+#ifdef __SSE2__
+    unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | 0x8040); /* flush to zero, denormals are zero */
+#endif
+    solve_panels(c, b, ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e), x);
+#ifdef __SSE2__
+    _mm_setcsr(mode);
+#endif
+    return PAL_ERR_OK;
+}
+
+static void *spare_thread(void *self)
+{
+    pal_cholesky *c = self;
+    pthread_mutex_lock(&c->lock);
+    for (;;) {
+        while (!c->quit && c->state != WORK_BEGUN) pthread_cond_wait(&c->changed, &c->lock);
+        if (c->quit) break;
+        pthread_mutex_unlock(&c->lock);
+        pal_err err = factor_values(c, &c->spare, c->next.single, &c->next);
+        pthread_mutex_lock(&c->lock);
+        c->outcome = err;
+        c->state = WORK_DONE;
+        pthread_cond_broadcast(&c->changed);
+    }
+    pthread_mutex_unlock(&c->lock);
+    return NULL;
+}
+
+/* the spare bench and its thread, made by the first refresh */
+static pal_err start_spare(pal_cholesky *c)
+{
+    if (!c->spare.started) start_bench(&c->spare);
+    if (!c->spare.pattern) c->spare.pattern = cholmod_copy_factor(c->own.pattern, &c->spare.common);
+    if (!c->spare.pattern) return error_of(&c->spare.common);
+    if (c->threaded) return PAL_ERR_OK;
+    sigset_t all, old; /* signals are the main thread's */
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    c->threaded = pthread_create(&c->thread, NULL, spare_thread, c) == 0;
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    return c->threaded ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_blocks *a)
+{
+    if (pal_cholesky_refreshing(c) || !c->now.good) return PAL_ERR_STATE;
+    if (c->n_free > 0) {
+        PAL_TRY(start_spare(c));
+        PAL_TRY(take_values(c, a, &c->spare));
+        if (!c->next.value) c->next.single = c->now.single;
+        if (c->next.single != c->now.single) {
+            free(c->next.value);
+            c->next = (factor){.single = c->now.single};
+        }
+    }
+    pthread_mutex_lock(&c->lock);
+    c->state = c->n_free > 0 ? WORK_BEGUN : WORK_DONE;
+    c->outcome = PAL_ERR_OK;
+    pthread_cond_broadcast(&c->changed);
+    pthread_mutex_unlock(&c->lock);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_cholesky_adopt(pal_cholesky *c, bool wait)
+{
+    pthread_mutex_lock(&c->lock);
+    while (wait && c->state == WORK_BEGUN) pthread_cond_wait(&c->changed, &c->lock);
+    work state = c->state;
+    pal_err err = c->outcome;
+    if (state == WORK_DONE) c->state = WORK_NONE;
+    pthread_mutex_unlock(&c->lock);
+    if (state != WORK_DONE) return PAL_ERR_STATE;
+    if (err || c->n_free == 0) return err;
+    factor old = c->now;
+    c->now = c->next;
+    c->next = old;
+    return PAL_ERR_OK;
+}
+
+bool pal_cholesky_refreshing(const pal_cholesky *c)
+{
+    pthread_mutex_t *lock = (pthread_mutex_t *)&c->lock;
+    pthread_mutex_lock(lock);
+    bool under_way = c->state != WORK_NONE;
+    pthread_mutex_unlock(lock);
+    return under_way;
+}
+
+int64_t pal_cholesky_nonzeros(const pal_cholesky *c)
+{
+    return (int64_t)c->nonzeros;
+}
+
+double pal_cholesky_flops(const pal_cholesky *c)
+{
+    return c->flops;
+}
+
+size_t pal_cholesky_bytes(const pal_cholesky *c)
+{
+    size_t n_byte = 0;
+    bool single = c->now.single;
+    size_t one = (size_t)c->panels.n_value[single] * (single ? sizeof(float) : sizeof(double));
+    if (c->now.value) n_byte += one;
+    /* the next one has the same precision, and is the spare thread's to look at while that is at work */
+    if (c->spare.started) n_byte += one;
+    return n_byte;
+}

@@ -1,0 +1,232 @@
+/* Row tet_elastic: elastic tetrahedra of four or ten nodes; the machinery is in elastic_tet.h.
+ *
+ * Keys: element ("tet4" or "tet10"; default by the body's elements), law ("corotational", "linear", "neo_hookean"),
+ * fill (true: stiffness by the share of material in each element where the body has it), untangle (true).
+ *
+ * Untangling (numerics.md part 3) goes farther here than the rule of elastic_tet.h, which alone left bodies of ten
+ * nodes an element and of the neo-Hookean law tangled for good. Under an implicit solver the whole body runs, while any
+ * piece is turned over, on its split: tetrahedra of four nodes (eight in one of ten), corotational, with the rule,
+ * Poisson ratios above 0.3 taken as 0.3. Pieces are looked at when the tangent is taken. corotational tet4 is tangled
+ * once det F <= 0 in a piece, tet10 and neo_hookean below 0.05, neo_hookean above 30 too, where its energy, which grows
+ * with the square of that, lets nothing else count. All are whole again when every piece is above 0.5 (neo_hookean: and
+ * below 2). What is left: a few shuffled neo_hookean tet4 bodies in a hundred rest folded on the split, no piece
+ * inverted.
+ *
+ * `internal` holds for corotational and neo_hookean; the linear law has no net force, but a torque once it turns, as
+ * every linear model. Ten nodes, corotational: a torque too while an element is crushed to next to nothing
+ * (elastic_tet.h). */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/elastic_tet.h"
+
+#include <string.h>
+
+static pal_err read_element(pal_item *item, const pal_build *build, int *n_corner)
+{
+    const char *text = build->body->n_corner == 10 ? "tet10" : "tet4";
+    PAL_TRY(pal_item_text(item, "element", &text, build->note));
+    if (strcmp(text, "tet4") && strcmp(text, "tet10"))
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.element: \"%s\" is not tet4 or tet10", item->path, text);
+    *n_corner = strcmp(text, "tet4") ? 10 : 4;
+    return PAL_ERR_OK;
+}
+
+typedef struct tet_row {
+    pal_elastic_tets whole;       /* first: tests look at it */
+    pal_elastic_tets *split;      /* NULL: never untangles this way */
+    double *rest;                 /* six times the volume of each piece at rest [n_piece] */
+    double least_volume_m3;       /* of those that are looked at, times six */
+    bool tangled, cheap;          /* cheap: whole.n_inverted tells that the body is tangled */
+    uint64_t n_tangled, n_switch; /* since reset */
+} tet_row;
+
+/* beyond the first pair a body is tangled, within the second it is whole again */
+static const double most_poisson = 0.3, tangled_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
+
+/* tetrahedra of four nodes on the body's own, eight in one of ten */
+static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_wish *to)
+{
+    static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
+                                    {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
+    const pal_elastic_tets_wish *from = &row->whole.wish;
+    *to = *from;
+    to->law = PAL_LAW_COROTATIONAL, to->untangle = true, to->most_poisson = most_poisson;
+    if (from->n_corner == 4) return PAL_ERR_OK;
+    to->n_corner = 4, to->n_tet = 8 * from->n_tet;
+    int32_t *tet = PAL_NEW(arena, int32_t, 4 * (size_t)to->n_tet);
+    float *fill = PAL_NEW(arena, float, from->fill ? to->n_tet : 0);
+    if (!tet || !fill) return PAL_ERR_MEMORY;
+    for (int i = 0; i < to->n_tet; i++) {
+        for (int c = 0; c < 4; c++) tet[4 * i + c] = from->tet[10 * (i / 8) + piece[i % 8][c]];
+        if (from->fill) fill[i] = from->fill[i / 8];
+    }
+    to->tet = tet, to->fill = from->fill ? fill : NULL;
+    return PAL_ERR_OK;
+}
+
+static double six_volumes(const double *x, const int32_t *node)
+{
+    double e[3][3], n[3];
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], x + 3 * node[k + 1], x + 3 * node[0]);
+    pal_cross3(n, e[1], e[2]);
+    return pal_dot3(e[0], n);
+}
+
+static pal_err make_split(tet_row *row, pal_build *build)
+{
+    const pal_elastic_tets_wish *whole = &row->whole.wish;
+    pal_elastic_tets_wish wish;
+    PAL_TRY(cut(row, build->arena, &wish));
+    row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
+    if (!row->split) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_elastic_tets_make(&wish, build, row->split));
+    row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
+    double h = build->body->h_m;
+    /* slivers turn over at any touch: what they do tells nothing of the body */
+    row->least_volume_m3 = 1e-3 * h * h * h;
+    row->rest = PAL_NEW(build->arena, double, wish.n_tet);
+    if (!row->rest) return PAL_ERR_MEMORY;
+    for (int i = 0; i < wish.n_tet; i++) row->rest[i] = six_volumes(build->body->x_rest, wish.tet + 4 * i);
+    return PAL_ERR_OK;
+}
+
+static bool is_tangled(const tet_row *row, const double *x)
+{
+    if (row->cheap && !row->tangled) return row->whole.n_inverted > 0;
+    const double *limit = row->tangled ? whole_det : tangled_det;
+    bool neo = row->whole.wish.law == PAL_LAW_NEO_HOOKEAN;
+    const pal_elastic_tets_wish *pieces = &row->split->wish;
+    for (int i = 0; i < pieces->n_tet; i++) {
+        if (fabs(row->rest[i]) < row->least_volume_m3) continue;
+        double det = six_volumes(x, pieces->tet + 4 * i) / row->rest[i];
+        if (det < limit[0] || (neo && det > limit[1])) return true;
+    }
+    return false;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    const pal_body *body = build->body;
+    pal_elastic_tets_wish wish = {.untangle = true};
+    bool fill = true;
+    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->note));
+    PAL_TRY(read_element(item, build, &wish.n_corner));
+    PAL_TRY(pal_item_bool(item, "fill", &fill, build->note));
+    PAL_TRY(pal_item_bool(item, "untangle", &wish.untangle, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    bool own = body->element && body->n_corner == wish.n_corner;
+    if (!own && (wish.n_corner == 10 || !body->tets))
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: body \"%s\" has no elements of %d nodes", item->path,
+                            body->name, wish.n_corner);
+    wish.tet = own ? body->element : body->tets->tet;
+    wish.n_tet = own ? body->n_element : body->tets->n_tet;
+    wish.fill = own && fill ? body->fill : NULL;
+    tet_row *row = PAL_NEW(build->arena, tet_row, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *self = row;
+    PAL_TRY(pal_elastic_tets_make(&wish, build, &row->whole));
+    return wish.untangle && body->implicit && wish.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
+}
+
+/* what the forces come from now */
+static pal_elastic_tets *acting(void *self)
+{
+    tet_row *row = self;
+    return row->tangled ? row->split : &row->whole;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    const tet_row *row = self;
+    if (row->split) step->body->n_tangled = row->n_tangled, step->body->n_split = row->n_switch;
+    pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    return pal_elastic_tets_energy(acting(self), body->d);
+}
+
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    pal_elastic_tets_bound(acting(self), body->d, bound_N_m);
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    tet_row *row = self;
+    (void)body, (void)note;
+    pal_elastic_tets_material(&row->whole, to);
+    if (row->split) pal_elastic_tets_material(row->split, to);
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    tet_row *row = self;
+    (void)body;
+    pal_elastic_tets_reset(&row->whole);
+    if (row->split) pal_elastic_tets_reset(row->split);
+    row->tangled = false;
+    row->n_tangled = row->n_switch = 0;
+}
+
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    pal_elastic_tets_measure(acting(self), body->d, field, sum, volume_m3);
+}
+
+static bool couple(void *self, pal_cliques *out)
+{
+    const pal_elastic_tets *whole = &((tet_row *)self)->whole;
+    *out = (pal_cliques){.n_item = whole->wish.n_tet, .n_corner = whole->wish.n_corner, .node = whole->wish.tet};
+    return true;
+}
+
+static void linearise(void *self, const pal_body *body)
+{
+    tet_row *row = self;
+    bool before = row->tangled, known = row->split && (before || !row->cheap);
+    bool told = known && is_tangled(row, body->d);
+    if (!told) pal_elastic_tets_linearise(&row->whole, body->d);
+    row->tangled = known ? told : row->split && is_tangled(row, body->d);
+    row->n_tangled += row->tangled;
+    row->n_switch += row->tangled != before;
+    if (!row->tangled) return;
+    if (!before) pal_elastic_tets_reset(row->split);
+    pal_elastic_tets_linearise(row->split, body->d);
+}
+
+static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+{
+    (void)body, (void)c;
+    if (k != 0) pal_elastic_tets_multiply(acting(self), k, p, out);
+}
+
+static void assemble(void *self, const pal_body *body, double k, double c, pal_blocks *to)
+{
+    (void)body, (void)c;
+    if (k != 0) pal_elastic_tets_assemble(acting(self), k, to);
+}
+
+static void rotate(void *self, const pal_body *body, double *turn)
+{
+    (void)body;
+    pal_elastic_tets_rotate(acting(self), turn);
+}
+
+static const pal_tangent tangent = {
+    .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
+
+const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
+                                           .stage = PAL_STAGE_FORCE,
+                                           .internal = true,
+                                           .make = make,
+                                           .run = run,
+                                           .energy = energy,
+                                           .stiffness = stiffness,
+                                           .material = material,
+                                           .reset = reset,
+                                           .tangent = &tangent,
+                                           .measure = measure};

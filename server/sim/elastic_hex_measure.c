@@ -1,0 +1,96 @@
+/* What is shown of voxel hexahedra: von Mises stress and energy density at the Gauss point nearest to each corner,
+ * which stands for an eighth of the cube. */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/num/shape.h"
+#include "server/sim/elastic_hex.h"
+
+#include <string.h>
+
+/* one cube: its constants and the gradients at its points */
+typedef struct cube {
+    bool bbar;
+    double mu, lambda; /* Pa */
+    double f[8][9], r[9];
+} cube;
+
+/* stress (symmetric) and energy density of the small strain in the frame of the cube */
+static double small_strain(const cube *q, double mean, const double e[9], double stress[9])
+{
+    double trace = e[0] + e[4] + e[8], square = 0;
+    /* B-bar: the deviator of the point, the dilatation of the cube */
+    double kappa = q->lambda + 2 * q->mu / 3, volume = q->bbar ? mean : trace;
+    for (int i = 0; i < 9; i++) {
+        double deviator = e[i] - (i % 4 == 0 ? trace / 3 : 0);
+        square += deviator * deviator;
+        stress[i] = 2 * q->mu * deviator + (i % 4 == 0 ? kappa * volume : 0);
+    }
+    return q->mu * square + 0.5 * kappa * volume * volume;
+}
+
+static void corot_points(const cube *q, double von_mises[8], double density[8])
+{
+    double e[8][9], mean = 0, stress[9];
+    for (int p = 0; p < 8; p++) {
+        double m[9];
+        for (int i = 0; i < 9; i++)
+            m[i] = q->r[i / 3] * q->f[p][i % 3] + q->r[3 + i / 3] * q->f[p][3 + i % 3] +
+                   q->r[6 + i / 3] * q->f[p][6 + i % 3];
+        for (int i = 0; i < 9; i++) e[p][i] = 0.5 * (m[i] + m[3 * (i % 3) + i / 3]) - (i % 4 == 0);
+        mean += (e[p][0] + e[p][4] + e[p][8]) / 8;
+    }
+    for (int p = 0; p < 8; p++) {
+        density[p] = small_strain(q, mean, e[p], stress);
+        von_mises[p] = pal_von_mises(stress);
+    }
+}
+
+static void neo_points(const cube *q, double von_mises[8], double density[8])
+{
+    double mean = 0, kappa = q->bbar ? q->lambda + 2 * q->mu / 3 : 0, k1 = q->bbar ? q->mu / 3 : q->lambda + q->mu;
+    for (int p = 0; p < 8; p++) mean += pal_det3(q->f[p]) / 8;
+    for (int p = 0; p < 8; p++) {
+        double stress[9], cauchy[9], det = pal_det3(q->f[p]);
+        pal_neo_stress(q->mu, k1, kappa * (mean - 1), q->f[p], stress);
+        for (int i = 0; i < 9; i++) {
+            const double *a = stress + 3 * (i / 3), *b = q->f[p] + 3 * (i % 3);
+            cauchy[i] = pal_dot3(a, b) / fmax(fabs(det), 1e-3);
+        }
+        von_mises[p] = pal_von_mises(cauchy);
+        density[p] = pal_neo_energy(q->mu, k1, q->f[p]) + 0.5 * kappa * (mean - 1) * (mean - 1);
+    }
+}
+
+void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    const double h = row->h_m;
+    double grad[8][8][3];
+    if (field != PAL_FIELD_VON_MISES_PA && field != PAL_FIELD_ENERGY_J_M3) return;
+    for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
+    for (int e = 0; e < row->n_hex; e++) {
+        const int32_t *node = row->hexes->node + 8 * e;
+        int lane = row->strips.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
+        double von_mises[8], density[8], share = row->share[lane], volume = share * h * h * h / 8, centre[9] = {0};
+        double q[4];
+        cube at = {.bbar = row->element == PAL_HEX_BBAR,
+                   .mu = row->mu[lane] * 16 / (h * share),
+                   .lambda = row->lambda[lane] * 16 / (h * share)};
+        for (int p = 0; p < 8; p++)
+            for (int i = 0; i < 9; i++) {
+                for (int c = 0; c < 8; c++) at.f[p][i] += 2 / h * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
+                centre[i] += at.f[p][i] / 8;
+            }
+        for (int i = 0; i < 4; i++)
+            q[i] = row->law == PAL_LAW_LINEAR ? i == 0 : row->q[(4 * block + i) * PAL_LANES + l];
+        if (row->law == PAL_LAW_COROTATIONAL) pal_polar_turn(centre, q, 50);
+        pal_quat_matrix(q, at.r);
+        if (row->law == PAL_LAW_NEO_HOOKEAN)
+            neo_points(&at, von_mises, density);
+        else
+            corot_points(&at, von_mises, density);
+        for (int c = 0; c < 8; c++) {
+            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA ? von_mises[c] : density[c]);
+            volume_m3[node[c]] += volume;
+        }
+    }
+}

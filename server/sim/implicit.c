@@ -1,0 +1,481 @@
+/* One implicit stage. */
+#include "server/sim/implicit.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+
+#include <string.h>
+
+static const double most_move_S = 0.2;
+/* of a step's loads: residuals below are not worth an iteration, so that a body at rest costs none */
+static const double floor_share = 1e-7;
+/* most iterations of a step that began with one and gained energy */
+enum { rescue_newton = 8 };
+
+static size_t bytes3(const pal_implicit *core)
+{
+    return 3 * sizeof(double) * (size_t)core->system.body->n_node;
+}
+
+/* ---- load ---- */
+
+pal_err pal_implicit_read(pal_item *item, const pal_build *build, pal_implicit_wish *out)
+{
+    *out = (pal_implicit_wish){
+        .tolerance = 1e-2, .iterations = 60, .newton = 1, .refresh_iterations = 12, .refresh = true, .warp = true};
+    PAL_TRY(pal_item_number(item, "tolerance", 1e-14, 0.5, &out->tolerance, build->note));
+    PAL_TRY(pal_item_count(item, "iterations", 1, 100000, &out->iterations, build->note));
+    PAL_TRY(pal_item_count(item, "newton", 1, 1000, &out->newton, build->note));
+    PAL_TRY(pal_item_number(item, "substep_s", 0, 10, &out->substep_s, build->note));
+    PAL_TRY(pal_item_count(item, "refresh_iterations", 1, 100000, &out->refresh_iterations, build->note));
+    PAL_TRY(pal_item_bool(item, "refresh", &out->refresh, build->note));
+    PAL_TRY(pal_item_bool(item, "warp", &out->warp, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    if (out->substep_s == 0) out->substep_s = INFINITY;
+    return PAL_ERR_OK;
+}
+
+static void multiply(void *user, const double *p, double *out)
+{
+    pal_system_multiply(&((pal_implicit *)user)->system, p, out);
+}
+
+static void precondition(void *user, const double *r, double *z)
+{
+    pal_warp_solve(&((pal_implicit *)user)->warp, r, z);
+}
+
+static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
+{
+    size_t n3 = 3 * (size_t)core->system.body->n_node;
+    double **const array[] = {&core->x0,    &core->v0,   &core->xs,   &core->vs,   &core->start, &core->work,
+                              &core->moved, &core->cg.r, &core->cg.z, &core->cg.p, &core->cg.q};
+    for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
+        *array[i] = PAL_NEW(arena, double, n3);
+        if (!*array[i]) return PAL_ERR_MEMORY;
+    }
+    core->cg.n = (int)n3;
+    core->cg.multiply = multiply;
+    core->cg.precondition = precondition;
+    core->cg.user = core;
+    return PAL_ERR_OK;
+}
+
+/* factors of the present linearisation: of A for stages of tau_rest_s, and of K where it is wanted */
+static pal_err factor_all(pal_implicit *core)
+{
+    double tau = core->tau_rest_s;
+    core->system.mass = 1 + tau * pal_system_drag(&core->system);
+    core->system.stiff = tau * tau;
+    core->system.damp = tau;
+    double before = pal_clock_s();
+    pal_system_assemble(&core->system, &core->blocks);
+    core->report.assemble_s += pal_clock_s() - before;
+    PAL_TRY(pal_warp_factor(&core->warp, &core->blocks));
+    if (core->answer.door.solve) PAL_TRY(pal_answer_factor(&core->answer, &core->system, &core->blocks));
+    return PAL_ERR_OK;
+}
+
+/* at rest, wherever the body is now */
+static pal_err factor_at_rest(pal_implicit *core)
+{
+    pal_body *body = core->system.body;
+    double *x = body->x, *d = body->d;
+    body->x = body->d = body->x_rest;
+    pal_turns_reset(&core->turns);
+    pal_system_linearise(&core->system);
+    pal_err err = factor_all(core);
+    body->x = x, body->d = d;
+    return err;
+}
+
+pal_err pal_implicit_make(const pal_implicit_wish *wish, pal_build *build, double share, pal_implicit **out)
+{
+    pal_body *body = build->body;
+    pal_implicit *core = PAL_NEW(build->arena, pal_implicit, 1);
+    if (!core) return PAL_ERR_MEMORY;
+    /* from here on the row's destroy takes care of what was made */
+    *out = core;
+    core->wish = *wish;
+    core->tau_rest_s = share * fmin(build->scene->step_s, wish->substep_s);
+    core->density = build->def->material.density_kg_m3;
+    PAL_TRY(pal_system_make(build, &core->system));
+    PAL_TRY(make_arrays(core, build->arena));
+    if (core->system.n_free == 0) return PAL_ERR_OK;
+    PAL_TRY(pal_system_pattern(&core->system, build->arena, &core->blocks));
+    PAL_TRY(pal_turns_make(&core->system, build->arena, &core->turns));
+    core->turns.any &= wish->warp;
+    PAL_TRY(pal_warp_make(&core->blocks, body, &core->turns, true, build->arena, &core->warp));
+    pal_err err = factor_at_rest(core);
+    if (!err) err = pal_answer_make(&core->system, &core->turns, &core->blocks, build->arena, &core->answer);
+    if (err == PAL_ERR_NUMERIC)
+        return pal_note_set(
+            build->note, PAL_ERR_REFUSED,
+            "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix", body->name,
+            core->tau_rest_s);
+    return err;
+}
+
+void pal_implicit_destroy(void *self)
+{
+    pal_implicit *core = self;
+    pal_warp_destroy(&core->warp);
+    pal_answer_destroy(&core->answer);
+}
+
+/* ---- a stage ---- */
+
+static void clear_held(const pal_body *body, double *r)
+{
+    for (int i = 0; i < body->n_node; i++)
+        if (body->held[i]) pal_set3(r + 3 * i, 0, 0, 0);
+}
+
+static double norm(const pal_implicit *core, const double *r)
+{
+    return sqrt(pal_sum_products(core->cg.n, r, r));
+}
+
+/* what contact gives beyond its loads at V where the body is now, times -tau: onto r */
+static void add_contact(pal_implicit *core, double tau, const double *velocity, double *r)
+{
+    const double *x = core->system.body->x;
+    double *p = core->cg.p, *q = core->cg.q;
+    memset(q, 0, bytes3(core));
+    for (int i = 0; i < core->cg.n; i++) p[i] = x[i] - core->x0[i];
+    pal_system_contact(&core->system, tau, 0, p, q);
+    for (int i = 0; i < core->cg.n; i++) p[i] = velocity[i] - core->v0[i];
+    pal_system_contact(&core->system, 0, tau, p, q);
+    for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
+}
+
+/* r = M (v* - V) + tau (f - c M V) + contact at V, the body being at x* + tau V; returns |M v* + tau f| */
+static double residual(pal_implicit *core, double tau, const double *velocity, double *r)
+{
+    const pal_body *body = core->system.body;
+    double keep = core->system.mass, *b = core->work;
+    for (int i = 0; i < body->n_node; i++) {
+        double m = body->mass_kg[i];
+        for (int c = 3 * i; c < 3 * i + 3; c++) {
+            b[c] = m * core->vs[c] + tau * body->f[c];
+            r[c] = b[c] - m * keep * velocity[c];
+        }
+    }
+    if (core->system.has_contact) add_contact(core, tau, velocity, r);
+    clear_held(body, b);
+    clear_held(body, r);
+    return norm(core, b);
+}
+
+/* the incremental potential at V where the body is now: kinetic + drag + rows - loads + contact, J */
+static double potential(pal_implicit *core, double tau, const double *velocity)
+{
+    const pal_body *body = core->system.body;
+    double sum = pal_system_energy(&core->system), keep = core->system.mass - 1;
+    for (int i = 0; i < body->n_node; i++) {
+        double m = 0.5 * body->mass_kg[i];
+        if (body->held[i]) continue;
+        for (int c = 3 * i; c < 3 * i + 3; c++) {
+            double slip = velocity[c] - core->vs[c];
+            sum += m * (slip * slip + keep * velocity[c] * velocity[c]) - body->load[c] * (body->x[c] - core->x0[c]);
+        }
+    }
+    if (!core->system.has_contact) return sum;
+    double *p = core->cg.z, *q = core->cg.q;
+    for (int which = 0; which < 2; which++) {
+        memset(q, 0, bytes3(core));
+        for (int i = 0; i < core->cg.n; i++) p[i] = which ? velocity[i] - core->v0[i] : body->x[i] - core->x0[i];
+        pal_system_contact(&core->system, which ? 0 : 1, which ? tau : 0, p, q);
+        sum += 0.5 * pal_sum_products(core->cg.n, p, q);
+    }
+    return sum;
+}
+
+/* conjugate gradients from the guess body->v; core->cg.r is the residual at `start`. The velocities it ends with */
+static void solve_linear(pal_implicit *core, double target)
+{
+    const pal_body *body = core->system.body;
+    double *v = body->v, *r = core->cg.r, *q = core->cg.q, *p = core->cg.p;
+    bool led = false;
+    for (int i = 0; i < core->cg.n; i++) p[i] = v[i] - core->start[i];
+    for (int i = 0; i < body->n_node; i++) led = led || (body->held[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
+    double before = norm(core, r);
+    pal_system_multiply(&core->system, p, q);
+    for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
+    /* a guess that is worse than none */
+    if (!led && !(norm(core, r) <= before)) {
+        memcpy(v, core->start, bytes3(core));
+        for (int i = 0; i < core->cg.n; i++) r[i] += q[i];
+    }
+    int n = pal_conjugate_run(&core->cg, v, target, 1, core->wish.iterations);
+    core->report.n_cg += n;
+    if (n > core->most_cg) core->most_cg = n;
+}
+
+/* A of a uniform velocity V is (1 + tau c) M V where nothing holds the body: V takes up the mean of the residual */
+static void keep_momentum(pal_implicit *core)
+{
+    const pal_body *body = core->system.body;
+    double sum[3] = {0, 0, 0}, mass = 0;
+    if (core->system.n_free < body->n_node || core->system.has_contact) return;
+    for (int i = 0; i < body->n_node; i++) {
+        pal_add3(sum, sum, core->cg.r + 3 * i);
+        mass += body->mass_kg[i];
+    }
+    pal_scale3(sum, 1 / (mass * core->system.mass), sum);
+    for (int i = 0; i < body->n_node; i++) pal_add3(body->v + 3 * i, body->v + 3 * i, sum);
+}
+
+/* an iteration moves no node farther than 0.2 S: the whole way from `start` is shortened, because a body of which some
+ * nodes stop and others go on is torn. What nothing holds may fly on as a whole: the mean way to v* does not count */
+static void clamp_moves(pal_implicit *core, double tau)
+{
+    pal_body *body = core->system.body;
+    double most = most_move_S * body->size_m / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
+    for (int i = 0; i < body->n_node && core->system.n_free == body->n_node; i++) {
+        pal_axpy3(mean, body->mass_kg[i], core->vs + 3 * i);
+        pal_axpy3(mean, -body->mass_kg[i], core->start + 3 * i);
+        mass += body->mass_kg[i];
+    }
+    if (mass > 0) pal_scale3(mean, 1 / mass, mean);
+    for (int i = 0; i < body->n_node; i++) {
+        double way[3];
+        pal_sub3(way, body->v + 3 * i, core->start + 3 * i);
+        double far = pal_norm3(way), own = fmin(far, pal_dist3(way, mean));
+        if (body->held[i]) continue;
+        longest = fmax(longest, own);
+        body->n_clamped += own > most;
+    }
+    if (!(longest > most)) return;
+    for (int i = 0; i < core->cg.n; i++) {
+        if (body->held[i / 3]) continue;
+        double way = body->v[i] - core->start[i] - mean[i % 3];
+        body->v[i] = core->start[i] + mean[i % 3] + most / longest * way;
+    }
+}
+
+static void go(pal_implicit *core, double tau)
+{
+    pal_body *body = core->system.body;
+    for (int i = 0; i < core->cg.n; i++) body->x[i] = core->xs[i] + tau * body->v[i];
+}
+
+/* halves the way from `start` to body->v until the potential falls by a little of what its slope there promises;
+ * core->moved is the residual at `start` */
+static void search(pal_implicit *core, double tau)
+{
+    const pal_body *body = core->system.body;
+    double *v = body->v, *way = core->work, slope = 0, step = 1;
+    for (int i = 0; i < body->n_node; i++) {
+        pal_sub3(way + 3 * i, v + 3 * i, core->start + 3 * i);
+        slope -= pal_dot3(core->moved + 3 * i, way + 3 * i);
+        /* where led nodes move on, the potential before and after are not of one problem */
+        if (body->held[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
+    }
+    if (!(slope < 0)) return;
+    for (int i = 0; i < core->cg.n; i++) body->x[i] = core->xs[i] + tau * core->start[i];
+    double at_start = potential(core, tau, core->start), noise = 1e-13 * fabs(at_start);
+    for (;; step *= 0.5) {
+        for (int i = 0; i < core->cg.n; i++) v[i] = core->start[i] + step * way[i];
+        go(core, tau);
+        if (step < 1e-3 || potential(core, tau, v) <= at_start + 1e-4 * step * slope + noise) break;
+    }
+    core->report.step_size = step;
+}
+
+/* one Newton iteration with the residual at `start` in cg.r */
+static void iterate(pal_implicit *core, double tau, double target)
+{
+    pal_system_linearise(&core->system);
+    pal_turns_take(&core->turns, &core->system);
+    pal_warp_turn(&core->warp, &core->turns);
+    memcpy(core->moved, core->cg.r, bytes3(core));
+    solve_linear(core, target);
+    keep_momentum(core);
+    clamp_moves(core, tau);
+    go(core, tau);
+    core->report.n_newton++;
+    core->report.step_size = 1;
+}
+
+/* energy at velocities v, the body being at its x: kinetic, of the rows, less the work of loads and contact since the
+ * sub-step's begin; *slack: what of it is not worth an iteration */
+static double total_energy(pal_implicit *core, const double *velocity, double *slack)
+{
+    const pal_body *body = core->system.body;
+    double kinetic = 0, rows = pal_system_energy(&core->system), work = 0, *p = core->cg.z, *q = core->cg.q;
+    for (int i = 0; i < core->cg.n; i++) p[i] = body->x[i] - core->x0[i];
+    work = pal_sum_products(core->cg.n, body->load, p);
+    for (int i = 0; i < body->n_node; i++)
+        kinetic += 0.5 * body->mass_kg[i] * pal_dot3(velocity + 3 * i, velocity + 3 * i);
+    if (core->system.has_contact) {
+        memset(q, 0, bytes3(core));
+        pal_system_contact(&core->system, 1, 0, p, q);
+        work -= 0.5 * pal_sum_products(core->cg.n, p, q);
+    }
+    *slack = 1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows);
+    return kinetic + rows - work;
+}
+
+/* led nodes put in work that nobody counts */
+static bool is_led(const pal_body *body)
+{
+    for (int i = 0; i < body->n_node; i++)
+        if (body->held[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0) return true;
+    return false;
+}
+
+/* was one iteration not enough? */
+static bool rises(pal_implicit *core)
+{
+    double slack;
+    return core->guarded && total_energy(core, core->system.body->v, &slack) > core->energy0_J + slack;
+}
+
+static void open_stage(pal_implicit *core, double tau)
+{
+    core->system.mass = 1 + tau * pal_system_drag(&core->system);
+    core->system.stiff = tau * tau;
+    core->system.damp = tau;
+    const double *x = core->system.body->x;
+    for (int i = 0; i < core->cg.n; i++) core->start[i] = (x[i] - core->xs[i]) / tau;
+}
+
+pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
+{
+    pal_body *body = core->system.body;
+    pal_solve_report *to = &core->report;
+    int most = core->wish.newton;
+    open_stage(core, tau);
+    for (int k = 0;; k++) {
+        if (k > 0) memcpy(core->start, body->v, bytes3(core));
+        PAL_TRY(pal_gather(step));
+        double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
+        if (k == 0) {
+            double loads = tau * sqrt(pal_sum_products(core->cg.n, body->load, body->load));
+            core->reference = fmax(size, floor_share * fmax(loads, left));
+        }
+        double best = core->wish.tolerance * core->reference;
+        to->residual = core->reference > 0 ? left / core->reference : 0;
+        to->converged = k > 0 && left <= best;
+        if (to->converged || k == most || !isfinite(left)) return PAL_ERR_OK;
+        /* an iteration of several need not be solved better than the next one starts */
+        iterate(core, tau, core->wish.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
+        if (core->wish.newton > 1) {
+            if (core->system.has_energy) search(core, tau);
+            continue;
+        }
+        to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
+        to->converged = core->cg.residual <= best;
+        if (most == rescue_newton || !rises(core)) return PAL_ERR_OK;
+        search(core, tau);
+        most++;
+    }
+}
+
+/* ---- a sub-step ---- */
+
+static bool sound(const pal_body *body)
+{
+    return pal_body_finite(body);
+}
+
+bool pal_implicit_begin(pal_implicit *core, pal_step *step)
+{
+    pal_body *body = core->system.body;
+    if (!sound(body)) {
+        body->frozen = true;
+        return false;
+    }
+    if (core->system.n_free == 0) {
+        for (int i = 0; i < core->cg.n; i++) body->x[i] += step->dt_s * body->v[i];
+        return false;
+    }
+    memcpy(core->x0, body->x, bytes3(core));
+    memcpy(core->v0, body->v, bytes3(core));
+    core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
+    pal_system_touch(&core->system, step);
+    step->drag_apart = true;
+    double slack;
+    core->guarded = core->wish.newton == 1 && core->system.has_energy && !is_led(body);
+    if (core->guarded) core->energy0_J = total_energy(core, body->v, &slack);
+    return true;
+}
+
+bool pal_implicit_settle(pal_implicit *core, pal_step *step)
+{
+    const pal_body *body = core->system.body;
+    bool again = false;
+    for (int i = 0; i < core->cg.n; i++) core->moved[i] = body->x[i] - core->x0[i];
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_row *row = &step->contact[i];
+        if (row->effect->tangent && row->effect->tangent->settle)
+            again |= row->effect->tangent->settle(row->self, step, core->moved);
+    }
+    return again && core->round++ < 2;
+}
+
+void pal_implicit_end(pal_implicit *core, pal_step *step)
+{
+    pal_body *body = core->system.body;
+    if (!sound(body)) {
+        memcpy(body->x, core->x0, bytes3(core));
+        memset(body->v, 0, bytes3(core));
+        body->frozen = true;
+        return;
+    }
+    pal_warp_tick(&core->warp);
+    if (core->answer.door.solve) pal_warp_turn(&core->answer.warp, &core->turns);
+    if (!core->wish.refresh || core->most_cg <= core->wish.refresh_iterations) return;
+    if (core->warp.wait > 0 || core->warp.pause > 0) return;
+    pal_system_assemble(&core->system, &core->blocks);
+    (void)pal_warp_refresh(&core->warp, &core->blocks, step->dt_s);
+}
+
+/* ---- hooks ---- */
+
+double pal_implicit_limit(void *self, pal_step *step)
+{
+    const pal_implicit *core = self;
+    return sound(step->body) ? core->wish.substep_s : (double)NAN;
+}
+
+pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_note *note)
+{
+    pal_implicit *core = self;
+    if (core->system.n_free == 0) return PAL_ERR_OK;
+    /* the world scales the masses after its rows have heard of the edit */
+    double ratio = material->density_kg_m3 / core->density;
+    for (int i = 0; i < body->n_node; i++) body->mass_kg[i] *= ratio;
+    pal_err err = factor_at_rest(core);
+    for (int i = 0; i < body->n_node; i++) body->mass_kg[i] /= ratio;
+    if (!err) core->density = material->density_kg_m3;
+    if (err == PAL_ERR_NUMERIC)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\": with E %g Pa, nu %g and %g kg/m^3 its matrix at rest is "
+                            "not positive definite",
+                            body->name, material->young_Pa, material->poisson, material->density_kg_m3);
+    return err;
+}
+
+void pal_implicit_reset(void *self, const pal_body *body)
+{
+    pal_implicit *core = self;
+    (void)body;
+    if (core->system.n_free == 0) return;
+    pal_turns_reset(&core->turns);
+    pal_answer_forget(&core->answer);
+    /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */
+    if (core->warp.refreshed || core->warp.wait > 0) (void)factor_at_rest(core);
+}
+
+void pal_implicit_report(const void *self, pal_solve_report *out)
+{
+    const pal_implicit *core = self;
+    *out = core->report;
+    if (core->system.n_free == 0) return;
+    out->factor_nonzeros = pal_cholesky_nonzeros(core->warp.factor);
+    out->n_factor = core->warp.n_factor;
+    out->analyse_s = core->warp.analyse_s;
+    out->factor_s = core->warp.factor_s;
+}

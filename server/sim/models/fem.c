@@ -1,0 +1,201 @@
+/* Model fem: linear or quadratic tetrahedra, or one hexahedron per voxel, on the nodes of a prepared mesh.
+ *
+ * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, tet4 where
+ * it has none), law (the row's: "corotational" | "linear" | "neo_hookean"), fill (true: mass and stiffness of a voxel
+ * that the surface cuts are scaled by its filled share, at least 0.02 of it, numerics.md part 2 and Meshing).
+ *
+ * Rows: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver implicit_euler.
+ * Masses are lumped: equal shares to the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a
+ * corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the mesh's own nodes, so
+ * that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
+#include "server/base/vec3.h"
+#include "server/num/shape.h"
+#include "server/sim/effect_list.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct fem_choice {
+    const char *element, *law; /* law NULL: the row's default */
+    bool fill, hex;
+    int n_corner;
+} fem_choice;
+
+static const float least_fill = 0.02f;
+
+static pal_err read_keys(pal_item *item, const pal_build *build, fem_choice *to)
+{
+    static const char *const names[] = {"hex8_bbar", "hex8", "tet4", "tet10"};
+    static const int corners[] = {8, 8, 4, 10};
+    const pal_prepared *mesh = build->def->mesh;
+    *to = (fem_choice){.element = mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4", .fill = true};
+    PAL_TRY(pal_item_text(item, "element", &to->element, build->note));
+    PAL_TRY(pal_item_text(item, "law", &to->law, build->note));
+    PAL_TRY(pal_item_bool(item, "fill", &to->fill, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    for (int i = 0; i < 4; i++)
+        if (!strcmp(to->element, names[i])) to->n_corner = corners[i];
+    if (to->n_corner == 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "body \"%s\" %s.element: \"%s\" is none of hex8_bbar, hex8, tet4, tet10", build->body->name,
+                            item->path, to->element);
+    to->hex = to->n_corner == 8;
+    if (to->hex && mesh->hexes.n_hex == 0)
+        return pal_note_set(
+            build->note, PAL_ERR_REFUSED,
+            "body \"%s\" %s.element: \"%s\" needs a mesh of voxels and this one has no hexahedra; prepare "
+            "it from its surface with `palpate prepare --model fem`, or take tet4",
+            build->body->name, item->path, to->element);
+    return PAL_ERR_OK;
+}
+
+static pal_err list_rows(const pal_item *item, const pal_build *build, const fem_choice *choice, pal_recipe *out)
+{
+    out->n_row = 0;
+    pal_item *row = &out->row[out->n_row++];
+    pal_item_init(row, item->path, choice->hex ? "hex_elastic" : "tet_elastic");
+    PAL_TRY(pal_item_put_text(row, "element", choice->element, build->note));
+    if (choice->law) PAL_TRY(pal_item_put_text(row, "law", choice->law, build->note));
+    PAL_TRY(pal_item_put_bool(row, "fill", choice->fill, build->note));
+    if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
+    pal_item_init(&out->row[out->n_row++], item->path, "implicit_euler");
+    return PAL_ERR_OK;
+}
+
+/* the tets with a middle node on every edge, numbered behind the corners; edges ascend by their first node */
+static pal_err add_middles(const pal_tets *tets, const int32_t *edge, int n_edge, pal_arena *arena, int32_t **out)
+{
+    int32_t *element = PAL_NEW(arena, int32_t, 10 * (size_t)tets->n_tet);
+    int32_t *first = calloc((size_t)tets->n_node + 1, sizeof *first);
+    if (!element || !first) {
+        free(first);
+        return PAL_ERR_MEMORY;
+    }
+    for (int e = 0; e < n_edge; e++) first[edge[2 * e] + 1]++;
+    for (int i = 0; i < tets->n_node; i++) first[i + 1] += first[i];
+    for (int t = 0; t < tets->n_tet; t++) {
+        const int32_t *corner = tets->tet + 4 * t;
+        memcpy(element + 10 * t, corner, 4 * sizeof *corner);
+        for (int k = 0; k < 6; k++) {
+            int32_t a = corner[pal_tet10_edge[k][0]], b = corner[pal_tet10_edge[k][1]];
+            int32_t low = a < b ? a : b, high = a < b ? b : a, at = first[low];
+            while (edge[2 * at + 1] != high) at++;
+            element[10 * t + 4 + k] = tets->n_node + at;
+        }
+    }
+    free(first);
+    *out = element;
+    return PAL_ERR_OK;
+}
+
+static void place_nodes(pal_body *body, const pal_tets *tets, const int32_t *edge, int n_edge)
+{
+    memcpy(body->x_rest, tets->x, 3 * sizeof(double) * (size_t)tets->n_node);
+    for (int e = 0; e < n_edge; e++) {
+        double *x = body->x_rest + 3 * (tets->n_node + e);
+        pal_add3(x, tets->x + 3 * edge[2 * e], tets->x + 3 * edge[2 * e + 1]);
+        pal_scale3(x, 0.5, x);
+    }
+    memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_node);
+}
+
+static pal_err make_nodes(const pal_build *build, const fem_choice *choice)
+{
+    const pal_prepared *mesh = build->def->mesh;
+    pal_body *body = build->body;
+    int32_t *edge = NULL;
+    int n_edge = 0;
+    if (choice->n_corner == 10) PAL_TRY(pal_tets_edges(&mesh->tets, &edge, &n_edge));
+    pal_err err = pal_body_allocate(body, build->arena, mesh->tets.n_node + n_edge);
+    if (!err) place_nodes(body, &mesh->tets, edge, n_edge);
+    if (!err && choice->n_corner == 10) {
+        int32_t *element = NULL;
+        err = add_middles(&mesh->tets, edge, n_edge, build->arena, &element);
+        body->element = element;
+    }
+    free(edge);
+    if (choice->n_corner == 4) body->element = mesh->tets.tet;
+    if (choice->hex) body->element = mesh->hexes.node;
+    body->n_element = choice->hex ? mesh->hexes.n_hex : mesh->tets.n_tet;
+    body->n_corner = choice->n_corner;
+    return err;
+}
+
+/* does hexahedron i hold tetrahedra 5 i to 5 i + 4, for all i? */
+static bool five_each(const pal_tets *tets, const pal_hexes *hexes)
+{
+    if (hexes->n_hex == 0 || tets->n_tet != 5 * hexes->n_hex) return false;
+    for (int i = 0; i < 4 * tets->n_tet; i++) {
+        const int32_t *corner = hexes->node + 8 * (i / 20);
+        bool found = false;
+        for (int c = 0; c < 8; c++) found = found || corner[c] == tets->tet[i];
+        if (!found) return false;
+    }
+    return true;
+}
+
+static pal_err make_fill(const pal_build *build, const fem_choice *choice)
+{
+    const pal_prepared *mesh = build->def->mesh;
+    pal_body *body = build->body;
+    if (!choice->fill || !mesh->hexes.fill || !five_each(&mesh->tets, &mesh->hexes)) return PAL_ERR_OK;
+    float *fill = PAL_NEW(build->arena, float, body->n_element);
+    if (!fill) return PAL_ERR_MEMORY;
+    for (int e = 0; e < body->n_element; e++) {
+        float share = mesh->hexes.fill[choice->hex ? e : e / 5];
+        fill[e] = share > least_fill ? share : least_fill;
+    }
+    body->fill = fill;
+    return PAL_ERR_OK;
+}
+
+static double element_volume(const pal_body *body, const int32_t *c)
+{
+    double e[3][3], n[3];
+    const int far[3] = {1, 2, body->n_corner == 8 ? 4 : 3};
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x_rest + 3 * c[far[k]], body->x_rest + 3 * c[0]);
+    pal_cross3(n, e[1], e[2]);
+    return pal_dot3(e[0], n) / (body->n_corner == 8 ? 1 : 6);
+}
+
+static pal_err lump_mass(const pal_build *build)
+{
+    pal_body *body = build->body;
+    int n_corner = body->n_corner, n_mean = n_corner == 8 ? 8 : 4;
+    for (int e = 0; e < body->n_element; e++) {
+        const int32_t *node = body->element + n_corner * e;
+        double centre[3] = {0, 0, 0};
+        pal_material material;
+        for (int c = 0; c < n_mean; c++) pal_axpy3(centre, 1.0 / n_mean, body->x_rest + 3 * node[c]);
+        pal_material_at(build->def, centre, &material);
+        double mass = material.density_kg_m3 * element_volume(body, node) * (body->fill ? (double)body->fill[e] : 1);
+        for (int c = 0; c < n_corner; c++)
+            body->mass_kg[node[c]] += mass * (n_corner < 10 ? 1.0 / n_corner : c < 4 ? 1.0 / 36 : 4.0 / 27);
+    }
+    for (int i = 0; i < body->n_node; i++)
+        if (!(body->mass_kg[i] > 0))
+            return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name, i,
+                                body->mass_kg[i]);
+    return PAL_ERR_OK;
+}
+
+static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    const pal_prepared *mesh = build->def->mesh;
+    pal_body *body = build->body;
+    fem_choice choice;
+    PAL_TRY(read_keys(item, build, &choice));
+    PAL_TRY(list_rows(item, build, &choice, out));
+    PAL_TRY(make_nodes(build, &choice));
+    PAL_TRY(make_fill(build, &choice));
+    PAL_TRY(lump_mass(build));
+    body->tets = &mesh->tets;
+    body->hexes = mesh->hexes.n_hex > 0 ? &mesh->hexes : NULL;
+    body->surface = &mesh->surface;
+    body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
+    body->h_m = mesh->tets.h_m;
+    double lattice_m = choice.n_corner == 10 ? 0.5 * body->h_m : body->h_m;
+    return pal_slots_make(body->x_rest, body->n_node, lattice_m, build->arena, &body->slots);
+}
+
+const pal_model pal_model_fem = {.name = "fem", .build = build};

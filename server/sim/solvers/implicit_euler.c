@@ -1,0 +1,46 @@
+/* Solver implicit_euler: backward Euler, x = x0 + dt V, M (V - v0) = dt f(x, V), after Baraff & Witkin (1998) with one
+ * linearisation per step (newton 1) or as many as asked. First order, damps; contact and drag are implicit too.
+ *
+ * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
+ * refresh (true); see implicit.h. */
+#include "server/sim/effect_list.h"
+#include "server/sim/implicit.h"
+
+#include <string.h>
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    pal_implicit_wish wish;
+    pal_implicit *core = NULL;
+    PAL_TRY(pal_implicit_read(item, build, &wish));
+    pal_err err = pal_implicit_make(&wish, build, 1, &core);
+    *self = core;
+    return err;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    pal_implicit *core = self;
+    pal_body *body = step->body;
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
+    if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
+    memcpy(core->xs, core->x0, n_byte);
+    memcpy(core->vs, core->v0, n_byte);
+    do {
+        memcpy(body->x, core->x0, n_byte);
+        PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
+    } while (pal_implicit_settle(core, step));
+    pal_implicit_end(core, step);
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_implicit_euler = {.name = "implicit_euler",
+                                              .stage = PAL_STAGE_SOLVE,
+                                              .make = make,
+                                              .run = run,
+                                              .limit = pal_implicit_limit,
+                                              .material = pal_implicit_material,
+                                              .reset = pal_implicit_reset,
+                                              .implicit = true,
+                                              .report = pal_implicit_report,
+                                              .destroy = pal_implicit_destroy};

@@ -1,0 +1,535 @@
+/* Solver static_newton: the body at rest under its loads, by Newton's method with a line search on the total energy.
+ *
+ * Each world step goes on from the present shape with all speeds 0 and makes at most `newton` iterations, so that a
+ * caller may follow the way with few per step. The linear systems K d = r (K as the rows hold it: for the corotational
+ * law without the rotations' derivative, which costs iterations but keeps the energy falling at full steps) are solved
+ *   direct: by a factor of the present K, made anew in every iteration (once for the linear law),
+ *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
+ *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
+ *           made of the present K before the next.
+ * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
+ * of forces along each direction, system.h) by conjugate gradients with the same factor, as far as it is positive
+ * (truncated Newton; Nash 2000): half the iterations or fewer on a bent beam.
+ *
+ * Converged: the Euclidean norm of the residual force at free nodes is at most `tolerance` times the larger of the sums
+ * of |load| over all nodes and of |reaction| over held ones. Loads (lasting, contact, gravity) are taken up in
+ * `load_steps` equal parts, each solved before the next.
+ *
+ * A body that its supports do not hold is refused at load (free "refuse"), or, being one part without any held node,
+ * solved by inertia relief (free "inertia_relief"): relief.h balances the loads, K + eps M is what is solved, rigid
+ * motion is taken out of every d.
+ *
+ * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3: residual
+ * of conjugate gradients over that of the iteration, for laws that are not linear), iterations (500, of one solve).
+ * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/num/conjugate.h"
+#include "server/sim/compliance.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/relief.h"
+
+#include <string.h>
+
+typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG } linear_kind;
+
+typedef struct static_newton {
+    double tolerance, cg_tolerance;
+    int newton, load_steps, iterations;
+    linear_kind linear;
+    bool relieved, constant; /* inertia relief; K never changes (linear law) */
+    pal_system system;
+    pal_blocks blocks;
+    pal_turns turns;
+    pal_warp warp;
+    pal_answer answer;
+    pal_conjugate cg;
+    pal_relief relief;
+    double *x0, *outer;     /* at the step's begin; loads that do not come from within [n_node][3] */
+    double *force, *move;   /* residual and d of the iteration                       [n_node][3] */
+    double *now, *low;      /* work space of the true stiffness [n_node][3] */
+    double *inertia;        /* what balances the loads; NULL: no relief              [n_node][3] */
+    double shift_1_s2;      /* eps                                           */
+    bool has_factor, stale; /* a factor is there; it is not worth its while  */
+    bool exact;             /* the tangent is too slow here: the true stiffness */
+    int calm;               /* iterations left without it */
+    int part;               /* of the load, of load_steps                    */
+    double scale_N;         /* of the tolerance                              */
+    pal_solve_report report;
+} static_newton;
+
+static const double relief_share = 1e-8, flops_per_nonzero = 20;
+/* an iteration that leaves more than this of the residual was a slow one */
+static const double slow = 0.1;
+static const double most_move_S = 0.2;
+/* iterations by the tangent alone after the true stiffness has led nowhere */
+enum { CALM = 4 };
+
+static size_t bytes3(const static_newton *row)
+{
+    return 3 * sizeof(double) * (size_t)row->system.body->n_node;
+}
+
+/* ---- load ---- */
+
+static pal_err read_choice(pal_item *item, const pal_build *build, const char *key, const char *const *names, int n,
+                           int *out)
+{
+    const char *text = names[*out];
+    PAL_TRY(pal_item_text(item, key, &text, build->note));
+    for (int i = 0; i < n; i++)
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return PAL_ERR_OK;
+        }
+    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s", item->path, key, text,
+                        names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "");
+}
+
+static pal_err read_keys(pal_item *item, const pal_build *build, static_newton *row)
+{
+    static const char *const linear[] = {"auto", "direct", "pcg"}, *const rigid[] = {"refuse", "inertia_relief"};
+    int kind = 0, relieved = 0;
+    row->tolerance = 1e-8, row->cg_tolerance = 1e-3;
+    row->newton = 50, row->load_steps = 1, row->iterations = 500;
+    PAL_TRY(pal_item_number(item, "tolerance", 1e-15, 0.5, &row->tolerance, build->note));
+    PAL_TRY(pal_item_number(item, "cg_tolerance", 1e-14, 0.5, &row->cg_tolerance, build->note));
+    PAL_TRY(pal_item_count(item, "newton", 1, 100000, &row->newton, build->note));
+    PAL_TRY(pal_item_count(item, "load_steps", 1, 10000, &row->load_steps, build->note));
+    PAL_TRY(pal_item_count(item, "iterations", 1, 100000, &row->iterations, build->note));
+    PAL_TRY(read_choice(item, build, "linear", linear, 3, &kind));
+    PAL_TRY(read_choice(item, build, "free", rigid, 2, &relieved));
+    PAL_TRY(pal_item_done(item, build->note));
+    row->linear = (linear_kind)kind;
+    row->relieved = relieved;
+    const char *law = "";
+    pal_item model = build->def->model;
+    if (pal_item_has(&model, "law")) PAL_TRY(pal_item_text(&model, "law", &law, build->note));
+    row->constant = !strcmp(law, "linear");
+    return PAL_ERR_OK;
+}
+
+static void multiply(void *user, const double *p, double *out)
+{
+    pal_system_multiply(&((static_newton *)user)->system, p, out);
+}
+
+/* the true stiffness at row->now; with contact and, for relief, eps M */
+static void multiply_true(void *user, const double *p, double *out)
+{
+    static_newton *row = user;
+    const pal_body *body = row->system.body;
+    pal_system_curve(&row->system, row->now, row->low, p, out);
+    if (row->system.has_contact) pal_system_contact(&row->system, 1, 0, p, out);
+    for (int i = 0; i < row->cg.n; i++)
+        out[i] = body->held[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
+}
+
+static void precondition(void *user, const double *r, double *z)
+{
+    pal_warp_solve(&((static_newton *)user)->warp, r, z);
+}
+
+static pal_err make_arrays(static_newton *row, pal_arena *arena)
+{
+    size_t n3 = 3 * (size_t)row->system.body->n_node;
+    double **const array[] = {&row->x0,  &row->outer, &row->force, &row->move, &row->now,
+                              &row->low, &row->cg.r,  &row->cg.z,  &row->cg.p, &row->cg.q};
+    for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
+        *array[i] = PAL_NEW(arena, double, n3);
+        if (!*array[i]) return PAL_ERR_MEMORY;
+    }
+    if (row->relieved && !(row->inertia = PAL_NEW(arena, double, n3))) return PAL_ERR_MEMORY;
+    row->cg.n = (int)n3;
+    row->cg.multiply = multiply;
+    row->cg.precondition = precondition;
+    row->cg.user = row;
+    return PAL_ERR_OK;
+}
+
+/* of the rows' present linearisation */
+static void assemble(static_newton *row)
+{
+    double before = pal_clock_s();
+    pal_system_assemble(&row->system, &row->blocks);
+    row->report.assemble_s += pal_clock_s() - before;
+}
+
+static pal_err factor(static_newton *row)
+{
+    assemble(row);
+    PAL_TRY(pal_warp_factor(&row->warp, &row->blocks));
+    row->has_factor = true;
+    row->stale = false;
+    return PAL_ERR_OK;
+}
+
+/* eps: a small part of what K is per mass */
+static void choose_shift(static_newton *row)
+{
+    const pal_body *body = row->system.body;
+    double stiff = 0, mass = 0;
+    assemble(row);
+    for (int i = 0; i < body->n_node; i++) {
+        const double *block = row->blocks.value + 9 * (size_t)row->blocks.start[i];
+        stiff += (block[0] + block[4] + block[8]) / 3;
+        mass += body->mass_kg[i];
+    }
+    row->shift_1_s2 = relief_share * stiff / mass;
+    row->system.mass = row->shift_1_s2;
+}
+
+static pal_err check_supports(static_newton *row, const pal_build *build)
+{
+    const pal_body *body = build->body;
+    pal_supports s;
+    PAL_TRY(pal_system_supports(&row->system, &s));
+    if (s.n_loose == 0) {
+        row->relieved = false;
+        return PAL_ERR_OK;
+    }
+    const double *x = body->x_rest + 3 * s.loose_node;
+    if (!row->relieved)
+        return pal_note_set(
+            build->note, PAL_ERR_REFUSED,
+            "body \"%s\": %d of its %d parts (the one at (%g, %g, %g) m) has fewer than three held nodes "
+            "off a line, so it has no state of rest; give supports, or free \"inertia_relief\" to "
+            "static_newton",
+            body->name, s.n_loose, s.n_part, x[0], x[1], x[2]);
+    if (s.n_part > 1 || row->system.n_free < body->n_node)
+        return pal_note_set(
+            build->note, PAL_ERR_REFUSED,
+            "body \"%s\": inertia_relief is for one part without held nodes, this body has %d parts and "
+            "%d held nodes",
+            body->name, s.n_part, body->n_node - row->system.n_free);
+    return PAL_ERR_OK;
+}
+
+static pal_err make_factors(static_newton *row, pal_build *build)
+{
+    pal_body *body = build->body;
+    PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
+    PAL_TRY(pal_turns_make(&row->system, build->arena, &row->turns));
+    PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
+    pal_system_linearise(&row->system);
+    if (row->relieved) choose_shift(row);
+    pal_err err = row->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(row);
+    if (!err) err = pal_answer_make(&row->system, &row->turns, &row->blocks, build->arena, &row->answer);
+    if (err == PAL_ERR_NUMERIC)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
+                            body->name);
+    return err;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    static_newton *row = PAL_NEW(build->arena, static_newton, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *self = row;
+    PAL_TRY(read_keys(item, build, row));
+    PAL_TRY(pal_system_make(build, &row->system));
+    row->system.mass = 0, row->system.stiff = 1, row->system.damp = 0;
+    PAL_TRY(make_arrays(row, build->arena));
+    if (row->system.n_free == 0) return PAL_ERR_OK;
+    PAL_TRY(check_supports(row, build));
+    return make_factors(row, build);
+}
+
+static void destroy(void *self)
+{
+    static_newton *row = self;
+    pal_warp_destroy(&row->warp);
+    pal_answer_destroy(&row->answer);
+}
+
+/* ---- forces and energy ---- */
+
+static pal_err run_rows(pal_step *step, bool internal)
+{
+    uint64_t before = pal_clock_ns();
+    for (int i = 0; i < step->n_force; i++) {
+        pal_row *force = &step->force[i];
+        if (force->effect->internal != internal || force->effect->drag) continue;
+        PAL_TRY(force->effect->run(force->self, step));
+        uint64_t now = pal_clock_ns();
+        force->spent_ns += now - before;
+        before = now;
+    }
+    return PAL_ERR_OK;
+}
+
+/* loads that do not come from within, as they are at the step's begin */
+static pal_err find_outer(static_newton *row, pal_step *step)
+{
+    pal_body *body = row->system.body;
+    memcpy(body->f, body->load, bytes3(row));
+    PAL_TRY(run_rows(step, false));
+    memcpy(row->outer, body->f, bytes3(row));
+    return PAL_ERR_OK;
+}
+
+static double share(const static_newton *row)
+{
+    return (double)row->part / row->load_steps;
+}
+
+/* body->f = all forces at body->x; cg.r = those at free nodes; returns |r|. The tolerance's scale too */
+static pal_err find_residual(static_newton *row, pal_step *step, double *size)
+{
+    pal_body *body = row->system.body;
+    double part = share(row), loads = 0, reactions = 0, *r = row->cg.r, *p = row->cg.p;
+    for (int i = 0; i < row->cg.n; i++) body->f[i] = part * row->outer[i];
+    PAL_TRY(run_rows(step, true));
+    memcpy(r, body->f, bytes3(row));
+    if (row->system.has_contact) {
+        for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
+        pal_system_contact(&row->system, -1, 0, p, r);
+    }
+    for (int i = 0; i < body->n_node; i++) {
+        loads += pal_norm3(row->outer + 3 * i);
+        if (!body->held[i]) continue;
+        reactions += pal_norm3(r + 3 * i);
+        pal_set3(r + 3 * i, 0, 0, 0);
+    }
+    if (row->relieved && pal_relief_take(body, row->constant ? body->x_rest : body->x, &row->relief)) {
+        memcpy(row->inertia, r, bytes3(row));
+        pal_relief_balance(&row->relief, body, r);
+        for (int i = 0; i < row->cg.n; i++) row->inertia[i] = r[i] - row->inertia[i];
+    }
+    row->scale_N = fmax(loads, reactions);
+    *size = sqrt(pal_sum_products(row->cg.n, r, r));
+    return PAL_ERR_OK;
+}
+
+/* energy of the rows less the work of loads since x0, those of inertia relief as of the last residual */
+static double potential(static_newton *row)
+{
+    const pal_body *body = row->system.body;
+    double sum = 0, *p = row->cg.p, *q = row->cg.q;
+    for (int i = 0; i < row->system.n_force; i++) {
+        const pal_row *force = &row->system.force[i];
+        if (force->effect->internal && force->effect->energy) sum += force->effect->energy(force->self, body);
+    }
+    for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
+    sum -= share(row) * pal_sum_products(row->cg.n, row->outer, p);
+    if (row->relieved) sum -= pal_sum_products(row->cg.n, row->inertia, p);
+    if (row->system.has_contact) {
+        memset(q, 0, bytes3(row));
+        pal_system_contact(&row->system, 1, 0, p, q);
+        sum += 0.5 * pal_sum_products(row->cg.n, p, q);
+    }
+    return sum;
+}
+
+/* ---- an iteration ---- */
+
+/* conjugate gradients on K, or on the true stiffness: as far as that is positive along the way */
+static void run_gradients(static_newton *row, double size)
+{
+    double target = 0.3 * row->tolerance * row->scale_N;
+    if (!row->constant) target = fmax(target, row->cg_tolerance * size);
+    int n = 0;
+    if (row->exact) {
+        memcpy(row->now, row->system.body->x, bytes3(row));
+        row->cg.multiply = multiply_true;
+        n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
+        row->cg.multiply = multiply;
+    }
+    if (n == 0) n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
+    double worth = pal_cholesky_flops(row->warp.factor) /
+                   (flops_per_nonzero * (double)(pal_cholesky_nonzeros(row->warp.factor) + 1));
+    row->stale = n > fmin(fmax(worth, 10), 100);
+    row->report.n_cg += n;
+}
+
+/* move = K^-1 r */
+static pal_err solve_linear(static_newton *row, double size)
+{
+    bool fresh = row->linear == LINEAR_DIRECT && !row->constant;
+    bool direct = row->linear == LINEAR_DIRECT && !row->system.has_contact && !row->exact;
+    memset(row->move, 0, bytes3(row));
+    if (!row->has_factor || fresh || (row->stale && row->linear == LINEAR_AUTO)) PAL_TRY(factor(row));
+    pal_warp_turn(&row->warp, &row->turns);
+    double before = pal_clock_s();
+    if (direct)
+        pal_warp_solve(&row->warp, row->cg.r, row->move);
+    else
+        run_gradients(row, size);
+    if (row->relieved) pal_relief_still(&row->relief, row->system.body, row->move);
+    row->report.solve_s += pal_clock_s() - before;
+    return PAL_ERR_OK;
+}
+
+/* x += step move with the largest step of 1, 1/2, 1/4 ... that lets the energy fall by a little of what the slope
+ * promises; false: none does. at_start, x are those of the step's begin */
+static bool search(static_newton *row, double at_start, double slope)
+{
+    pal_body *body = row->system.body;
+    double step = 1, done = 0, noise = 1e-12 * fabs(at_start);
+    bool found = !row->system.has_energy || row->constant;
+    for (;; step *= 0.5) {
+        for (int i = 0; i < row->cg.n; i++) body->x[i] += (step - done) * row->move[i];
+        done = step;
+        if (found) break;
+        found = potential(row) <= at_start - 1e-4 * step * slope + noise;
+        if (found || step < 1e-4) break;
+    }
+    for (int i = 0; i < row->cg.n && !found; i++) body->x[i] -= done * row->move[i];
+    row->report.step_size = step;
+    return found;
+}
+
+static pal_err iterate(static_newton *row, double size, bool *moved)
+{
+    const pal_body *body = row->system.body;
+    double longest = 0;
+    memcpy(row->force, row->cg.r, bytes3(row));
+    /* before the tangent is taken, which energies may disturb */
+    double at_start = row->constant ? 0 : potential(row);
+    pal_system_linearise(&row->system);
+    pal_turns_take(&row->turns, &row->system);
+    PAL_TRY(solve_linear(row, size));
+    double slope = pal_sum_products(row->cg.n, row->force, row->move);
+    for (int i = 0; i < body->n_node; i++) longest = fmax(longest, pal_norm3(row->move + 3 * i));
+    row->report.n_newton++;
+    /* where the true stiffness nearly vanishes, the way is long and means little */
+    double most = most_move_S * body->size_m;
+    if (row->exact && longest > most) {
+        for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / longest;
+        slope *= most / longest;
+    }
+    *moved = search(row, at_start, slope) && longest > 1e-15 * body->size_m;
+    return PAL_ERR_OK;
+}
+
+/* iterations until the tolerance, or the step's budget of them, is met */
+static pal_err find_rest(static_newton *row, pal_step *step)
+{
+    pal_solve_report *to = &row->report;
+    to->n_newton = to->n_cg = 0;
+    double before = INFINITY;
+    row->exact = false;
+    row->calm = 0;
+    for (bool moved = true;;) {
+        double size;
+        PAL_TRY(find_residual(row, step, &size));
+        to->residual = row->scale_N > 0 ? size / row->scale_N : 0;
+        to->converged = size <= row->tolerance * row->scale_N;
+        if (to->converged && row->part < row->load_steps) {
+            row->part++;
+            before = INFINITY;
+            continue;
+        }
+        if (!moved && row->exact) moved = true, row->calm = CALM;
+        row->exact = !row->constant && row->calm == 0 && size > slow * before;
+        row->calm -= row->calm > 0;
+        before = size;
+        if (to->converged || !moved || !isfinite(size) || to->n_newton == row->newton) return PAL_ERR_OK;
+        PAL_TRY(iterate(row, size, &moved));
+    }
+}
+
+static void settle(static_newton *row, pal_step *step)
+{
+    const pal_body *body = row->system.body;
+    for (int i = 0; i < row->cg.n; i++) row->move[i] = body->x[i] - row->x0[i];
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_row *contact = &step->contact[i];
+        /* what it asks for beyond that comes with the next world step */
+        if (contact->effect->tangent && contact->effect->tangent->settle)
+            (void)contact->effect->tangent->settle(contact->self, step, row->move);
+    }
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    static_newton *row = self;
+    pal_body *body = row->system.body;
+    if (!pal_body_finite(body)) {
+        body->frozen = true;
+        return PAL_ERR_OK;
+    }
+    memcpy(row->x0, body->x, bytes3(row));
+    for (int i = 0; i < body->n_node; i++) {
+        if (body->held[i])
+            pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
+        else
+            pal_set3(body->v + 3 * i, 0, 0, 0);
+    }
+    pal_system_touch(&row->system, step);
+    PAL_TRY(find_outer(row, step));
+    if (row->system.n_free == 0) {
+        row->report.converged = true;
+        return PAL_ERR_OK;
+    }
+    if (row->part == 0) row->part = 1;
+    PAL_TRY(find_rest(row, step));
+    if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
+    if (!pal_body_finite(body)) {
+        memcpy(body->x, row->x0, bytes3(row));
+        body->frozen = true;
+        return PAL_ERR_OK;
+    }
+    settle(row, step);
+    return PAL_ERR_OK;
+}
+
+/* ---- hooks ---- */
+
+static double limit(void *self, pal_step *step)
+{
+    (void)self;
+    return pal_body_finite(step->body) ? (double)INFINITY : (double)NAN;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    static_newton *row = self;
+    (void)body;
+    row->part = 0;
+    if (row->system.n_free == 0) return;
+    pal_turns_reset(&row->turns);
+    /* a factor of some other state: made again when it is wanted */
+    if (row->linear != LINEAR_PCG && row->warp.n_factor > 1) row->has_factor = false;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    static_newton *row = self;
+    pal_body *own = row->system.body;
+    (void)to;
+    row->has_factor = false;
+    if (!row->answer.door.solve) return PAL_ERR_OK;
+    double *x = own->x, *d = own->d;
+    own->x = own->d = own->x_rest;
+    pal_turns_reset(&row->turns);
+    pal_system_linearise(&row->system);
+    pal_err err = pal_answer_factor(&row->answer, &row->system, &row->blocks);
+    own->x = x, own->d = d;
+    if (err == PAL_ERR_NUMERIC)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
+                            body->name);
+    return err;
+}
+
+static void report(const void *self, pal_solve_report *out)
+{
+    const static_newton *row = self;
+    *out = row->report;
+    if (!row->warp.factor) return;
+    out->factor_nonzeros = pal_cholesky_nonzeros(row->warp.factor);
+    out->n_factor = row->warp.n_factor;
+    out->analyse_s = row->warp.analyse_s;
+    out->factor_s = row->warp.factor_s;
+}
+
+const pal_effect pal_effect_static_newton = {.name = "static_newton",
+                                             .stage = PAL_STAGE_SOLVE,
+                                             .make = make,
+                                             .run = run,
+                                             .limit = limit,
+                                             .material = material,
+                                             .reset = reset,
+                                             .implicit = true,
+                                             .report = report,
+                                             .destroy = destroy};
