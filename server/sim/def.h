@@ -31,6 +31,14 @@ typedef struct pal_region {
     const double *grid_young_Pa, *grid_poisson, *grid_density_kg_m3; /* NULL: not given                          */
 } pal_region;
 
+/* constants of springs that vary over the body (model tet_springs, paper B 3.5): values at the nodes of a grid,
+ * trilinear between them; a spring takes the mean over its corners. Numbers are borrowed, x fastest */
+typedef struct pal_spring_grid {
+    int n[3];                   /* nodes; n[0] 0: no grid                               */
+    double low_m[3], high_m[3]; /* body frame                                          */
+    const double *k_J[3];       /* of edges, faces, tetrahedra; NULL: not given, faces: no such row */
+} pal_spring_grid;
+
 /* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), or the lowest
  * fraction of the body's height along `up` */
 typedef struct pal_support {
@@ -45,9 +53,10 @@ typedef struct pal_body_def {
     pal_material material;
     int n_region;
     pal_region region[PAL_REGION_MAX];
-    pal_item model;  /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
-    pal_item solver; /* name: "verlet"; empty name: the model's own choice               */
-    pal_item output; /* "skin_out" (default) or "surface_out"                            */
+    pal_spring_grid spring_grid; /* k_distance_J, k_area_J, k_volume_J of the model in place of its keys  */
+    pal_item model;              /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
+    pal_item solver;             /* name: "verlet"; empty name: the model's own choice               */
+    pal_item output;             /* "skin_out" (default) or "surface_out"                            */
     int n_support;
     pal_support support[PAL_SUPPORT_MAX];
     int n_effect; /* gravity, tool_push, tool_grab, finite_guard, viscous ...         */
@@ -64,6 +73,8 @@ typedef struct pal_scene {
     char name[PAL_NAME]; /* session name, [a-z0-9_-]                                  */
     char title[128];     /* shown to people: "Liver, abdominal CT"                    */
     char source[256];    /* where the organ comes from and its licence, shown as well */
+    char accuracy[128];  /* how far from its reference, shown beside the title: "2.1 % RMS of finite elements"; may be
+                            empty */
     double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
     double up[3];        /* unit, against gravity: (0, 0, 1)                          */
     double gravity_m_s2; /* 9.81 times the item `gravity`'s presence                  */

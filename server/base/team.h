@@ -1,0 +1,20 @@
+/* A team of threads that works through equal pieces of work side by side. What piece i computes must depend on i alone,
+ * never on the worker or on the order: then the result is the same whatever the number of cores. Thread: one caller at
+ * a time. */
+#ifndef PAL_BASE_TEAM_H
+#define PAL_BASE_TEAM_H
+#include "server/base/err.h"
+
+enum { PAL_TEAM_MOST = 256 };
+
+typedef struct pal_team pal_team;
+
+/* n_worker <= 0: one per core that this process may use; 1: no thread is made and the caller works. At most
+ * PAL_TEAM_MOST. MEMORY: no memory, or no thread could be made. [load] */
+pal_err pal_team_create(int n_worker, pal_team **out);
+void pal_team_destroy(pal_team *team); /* joins; NULL is fine */
+int pal_team_size(const pal_team *team);
+/* calls piece(user, worker, i) once for every i in [0, n), 0 <= worker < size, and returns when all are done; the
+ * caller works too. What the pieces wrote is visible then */
+void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user);
+#endif
