@@ -1,12 +1,5 @@
 /* A load case through the product's own pipeline: the same voxels, model and world that a live scene has, with the
- * solver static_newton. Dead loads stand at nodes as the consistent forces of the shape functions, integrated over the
- * surface that the region selects (not over the voxels' faces), so that their sum is exact whatever the mesh.
- *
- * Voxels that the surface cuts count by their filled share, spread over the whole voxel. That is right in volume and
- * too stiff in bending, since the spread reaches beyond the surface. Dropping the voxels that are less than a quarter
- * full takes most of it back (gear of ../shared/reference, linear, 20, 30, 40 voxels: RMS 1.95, 1.63, 1.09 % against
- * 5.05, 3.53, 2.28 % with all of them). Where a flat side lies so that more than 2.5 % of the volume would go, they are
- * kept (a beam that loses a layer of 0.24 voxels of 4 bends by a fifth more).
+ * solver static_newton.
  *
  * Moved supports: their nodes are set to rest + move in steps of at most half a voxel, each of them solved, so that no
  * element is turned inside out on the way. */
@@ -14,6 +7,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/lab/load_case.h"
 #include "server/lab/refine.h"
 #include "server/mesh/locate.h"
 #include "server/mesh/vtk_file.h"
@@ -27,8 +21,6 @@
 
 enum { NEWTON_A_STEP = 4, MOST_NEWTON = 400, MOST_RAMP = 40 };
 static const double lab_step_s = 1.0 / 60; /* a static solver has no use for it */
-/* cut voxels with less are dropped; as long as no more of the volume goes than ...; else; and without fill */
-static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
 
 struct pal_solution {
     pal_prepared mesh;
@@ -52,36 +44,6 @@ typedef struct job {
 static bool say(const job *j, const char *what, double fraction)
 {
     return !j->options->progress || j->options->progress(what, fraction, j->options->user);
-}
-
-/* "(0, 0, 0) .. (1, 1, 1)" in the frame of the problem */
-typedef struct box_text {
-    char text[160];
-} box_text;
-
-static box_text show_box(const pal_box *box)
-{
-    box_text out;
-    if (box->all)
-        snprintf(out.text, sizeof out.text, "the whole body");
-    else
-        snprintf(out.text, sizeof out.text, "(%g, %g, %g) .. (%g, %g, %g)", box->low_m[0], box->low_m[1], box->low_m[2],
-                 box->high_m[0], box->high_m[1], box->high_m[2]);
-    return out;
-}
-
-/* x is in the box, or within `slack` of it */
-static bool in_box(const pal_box *box, const double x[3], double slack)
-{
-    for (int c = 0; c < 3; c++)
-        if (x[c] < box->low_m[c] - slack || x[c] > box->high_m[c] + slack) return false;
-    return true;
-}
-
-/* a node on a support's border is in it, whatever rounding says */
-static double slack_of(const job *j)
-{
-    return 1e-6 * j->s->mesh.tets.h_m;
 }
 
 /* ---- scene ---- */
@@ -139,7 +101,7 @@ static pal_err check_covered(const job *j)
         double middle[3] = {t->origin_m[0], t->origin_m[1], t->origin_m[2]};
         bool found = false;
         for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
-        for (int k = 0; k < p->n_material && !found; k++) found = in_box(&p->material[k].region, middle, 0);
+        for (int k = 0; k < p->n_material && !found; k++) found = pal_box_holds(&p->material[k].region, middle, 0);
         if (!found)
             return pal_note_set(j->note, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
                                 p->n_material, middle[0], middle[1], middle[2]);
@@ -156,14 +118,8 @@ static pal_err set_supports(const job *j, pal_body_def *body)
             j->note, PAL_ERR_REFUSED,
             "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
             "balances them by its mass)");
-    for (int k = 0; k < p->n_support; k++) {
-        pal_support *to = &body->support[body->n_support++];
-        *to = (pal_support){.lowest = false};
-        pal_sub3(to->low_m, p->support[k].region.low_m, j->s->mesh.tets.origin_m);
-        pal_sub3(to->high_m, p->support[k].region.high_m, j->s->mesh.tets.origin_m);
-        for (int c = 0; c < 3; c++) to->low_m[c] -= slack_of(j), to->high_m[c] += slack_of(j);
-    }
-    return PAL_ERR_OK;
+    body->n_support = p->n_support;
+    return pal_case_supports(p, &j->s->mesh.tets, body->support, j->note);
 }
 
 static pal_err set_items(const job *j, pal_body_def *body)
@@ -207,118 +163,14 @@ static pal_err make_world(const job *j)
     return PAL_ERR_OK;
 }
 
-/* every support holds a node of the mesh */
-static pal_err check_supports(const job *j)
-{
-    const pal_tets *t = &j->s->mesh.tets;
-    for (int k = 0; k < j->problem->n_support; k++) {
-        const pal_box *box = &j->problem->support[k].region;
-        bool found = false;
-        for (int i = 0; i < t->n_node && !found; i++) {
-            double x[3];
-            pal_add3(x, t->x + 3 * i, t->origin_m);
-            found = in_box(box, x, slack_of(j));
-        }
-        if (!found)
-            return pal_note_set(j->note, PAL_ERR_REFUSED,
-                                "supports[%d]: no node of the body lies in %s (voxels of %g m at resolution %d)", k,
-                                show_box(box).text, t->h_m, j->options->resolution);
-    }
-    return PAL_ERR_OK;
-}
-
-/* ---- loads ---- */
-
-static int shape_of(const pal_solution *s, const double local[4], double n[PAL_CORNERS_MOST])
-{
-    if (s->hex)
-        pal_hex_shape(local, n, NULL);
-    else if (s->body->n_corner == 10)
-        pal_tet10_shape(local, n, NULL);
-    else
-        memcpy(n, local, 4 * sizeof *n);
-    return s->body->n_corner;
-}
-
-static void spread(const pal_solution *s, int element, const double local[4], const double force_N[3], double *f)
-{
-    double n[PAL_CORNERS_MOST];
-    int n_corner = shape_of(s, local, n);
-    const int32_t *node = s->body->element + (size_t)n_corner * (size_t)element;
-    for (int k = 0; k < n_corner; k++) pal_axpy3(f + 3 * node[k], n[k], force_N);
-}
-
-/* "load_cases[0].loads[1]" */
-static const char *load_path(const job *j, int index, char out[64])
-{
-    snprintf(out, 64, "load_cases[%d].loads[%d]", (int)(j->load_case - j->problem->load_case), index);
-    return out;
-}
-
-static pal_err add_traction(const job *j, int index, double *f)
-{
-    const pal_problem_load *load = &j->load_case->load[index];
-    pal_solution *s = j->s;
-    double low[3], high[3], area = 0, per_area[3];
-    pal_piece *piece = NULL;
-    int n_piece = 0;
-    char path[64], facing[96] = "";
-    pal_sub3(low, load->region.low_m, s->mesh.tets.origin_m);
-    pal_sub3(high, load->region.high_m, s->mesh.tets.origin_m);
-    pal_err err = pal_locate_surface(s->locate, &s->mesh.surface, low, high, load->has_normal ? load->normal : NULL,
-                                     &piece, &n_piece);
-    if (err) return pal_note_set(j->note, err, "%s: no memory for its surface", load_path(j, index, path));
-    for (int k = 0; k < n_piece; k++) area += piece[k].area_m2;
-    j->result->area_m2[index] = area;
-    if (!(area > 0)) {
-        free(piece);
-        if (load->has_normal)
-            snprintf(facing, sizeof facing, " that faces (%g, %g, %g)", load->normal[0], load->normal[1],
-                     load->normal[2]);
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", load_path(j, index, path),
-                            show_box(&load->region).text, facing);
-    }
-    if (load->has_traction)
-        pal_copy3(per_area, load->traction_Pa);
-    else
-        pal_scale3(per_area, 1 / area, load->total_N);
-    for (int k = 0; k < n_piece; k++) {
-        double force[3];
-        pal_scale3(force, piece[k].area_m2, per_area);
-        spread(s, piece[k].element, piece[k].local, force, f);
-    }
-    free(piece);
-    return PAL_ERR_OK;
-}
-
-static pal_err add_point(const job *j, int index, double *f)
-{
-    const pal_problem_load *load = &j->load_case->load[index];
-    double x[3], local[4], outside;
-    char path[64];
-    pal_sub3(x, load->point_m, j->s->mesh.tets.origin_m);
-    int element = pal_locate_point(j->s->locate, x, local, &outside);
-    if (outside > j->s->body->h_m)
-        return pal_note_set(
-            j->note, PAL_ERR_REFUSED, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
-            load_path(j, index, path), load->point_m[0], load->point_m[1], load->point_m[2], outside, j->s->body->h_m);
-    spread(j->s, element, local, load->force_N, f);
-    return PAL_ERR_OK;
-}
-
 static pal_err set_loads(const job *j)
 {
     pal_solution *s = j->s;
     const pal_body *b = s->body;
     double *f = calloc(3 * (size_t)b->n_node, sizeof *f);
-    pal_err err = f ? PAL_ERR_OK : pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the loads");
-    for (int k = 0; k < j->load_case->n_load && !err; k++) {
-        const pal_problem_load *load = &j->load_case->load[k];
-        if (load->kind == PAL_LOAD_TRACTION) err = add_traction(j, k, f);
-        if (load->kind == PAL_LOAD_POINT) err = add_point(j, k, f);
-        for (int i = 0; i < b->n_node && load->kind == PAL_LOAD_GRAVITY; i++)
-            pal_axpy3(f + 3 * i, b->mass_kg[i], load->gravity_m_s2);
-    }
+    if (!f) return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the loads");
+    pal_err err =
+        pal_case_forces(j->problem, j->load_case, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->note);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(j->result->load_N, j->result->load_N, f + 3 * i);
         err = pal_world_load(s->world, 0, i, f + 3 * i);
@@ -339,7 +191,7 @@ static void move_supports(const job *j, double share)
         if (!b->held[i]) continue;
         pal_add3(x, b->x_rest + 3 * i, j->s->mesh.tets.origin_m);
         for (int k = 0; k < j->problem->n_support; k++)
-            if (in_box(&j->problem->support[k].region, x, slack_of(j))) {
+            if (pal_box_holds(&j->problem->support[k].region, x, pal_case_slack(&j->s->mesh.tets))) {
                 pal_copy3(b->x + 3 * i, b->x_rest + 3 * i);
                 pal_axpy3(b->x + 3 * i, share, j->problem->support[k].move_m);
             }
@@ -433,59 +285,13 @@ static double volume_of(const pal_solution *s)
     return sum;
 }
 
-/* Planes of the grid go through the border of the first support (else material) that cuts the body on an axis: where
- * what is held ends within a voxel, the error is that of a support moved by up to a voxel. */
-static void align(const job *j, const pal_surface *surface, double ahead[3])
-{
-    double low[3], high[3], longest = 0;
-    pal_surface_box(surface, low, high);
-    for (int c = 0; c < 3; c++) longest = fmax(longest, high[c] - low[c]);
-    double h = longest / j->options->resolution;
-    const pal_problem *p = j->problem;
-    for (int c = 0; c < 3; c++) {
-        bool found = false;
-        ahead[c] = 0;
-        for (int k = 0; k < p->n_support + p->n_material && !found; k++) {
-            const pal_box *box = k < p->n_support ? &p->support[k].region : &p->material[k - p->n_support].region;
-            const double plane[2] = {box->low_m[c], box->high_m[c]};
-            for (int side = 0; side < 2 && !found; side++) {
-                double x = plane[side] - surface->origin_m[c], t = (x - low[c]) / h;
-                found = x > low[c] + 0.01 * h && x < high[c] - 0.01 * h;
-                if (found) ahead[c] = fabs(t - round(t)) < 1e-6 ? 0 : ceil(t) - t;
-            }
-        }
-    }
-}
-
-/* share of the surface's volume that the filled voxels miss */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.h_m * mesh->tets.h_m * mesh->tets.h_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
-static pal_err make_mesh(const job *j, const pal_surface *surface)
-{
-    const pal_solve_options *o = j->options;
-    pal_voxel_options voxel = {.resolution = o->resolution, .border = true, .least_fill = o->least_fill};
-    bool chosen = !(o->least_fill > 0);
-    if (chosen) voxel.least_fill = o->fill ? drop_fill : whole_fill;
-    if (o->align) align(j, surface, voxel.ahead);
-    PAL_TRY(pal_prepared_make(surface, &voxel, &j->s->mesh, NULL, j->note));
-    if (!chosen || !o->fill || !(missing(&j->s->mesh) > most_missing)) return PAL_ERR_OK;
-    pal_prepared_free(&j->s->mesh);
-    voxel.least_fill = keep_fill;
-    return pal_prepared_make(surface, &voxel, &j->s->mesh, NULL, j->note);
-}
-
 static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    PAL_TRY(make_mesh(j, surface));
+    pal_voxel_wish wish = {o->resolution, o->fill, o->least_fill, o->align};
+    PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->note));
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->note));
-    PAL_TRY(check_supports(j));
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
     s->hex = b->n_corner == 8;
@@ -542,12 +348,11 @@ void pal_solution_free(pal_solution *solution)
 
 void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
 {
-    double at[3], local[4], n[PAL_CORNERS_MOST];
+    double at[3], local[4], n[10];
     const pal_body *b = s->body;
+    const int32_t *node;
     pal_sub3(at, x, s->mesh.tets.origin_m);
-    int element = pal_locate_point(s->locate, at, local, NULL);
-    int n_corner = shape_of(s, local, n);
-    const int32_t *node = b->element + (size_t)n_corner * (size_t)element;
+    int element = pal_locate_point(s->locate, at, local, NULL), n_corner = pal_case_shape(b, element, local, n, &node);
     pal_set3(u, 0, 0, 0);
     for (int k = 0; k < n_corner; k++) {
         pal_axpy3(u, n[k], b->x + 3 * node[k]);
