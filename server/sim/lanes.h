@@ -11,8 +11,6 @@ typedef double pal_v8 __attribute__((vector_size(64)));
 typedef int64_t pal_i8 __attribute__((vector_size(64)));
 typedef double pal_lanes __attribute__((vector_size(64), aligned(8), may_alias));
 
-#define PAL_INLINE static inline __attribute__((always_inline))
-
 PAL_INLINE pal_v8 pal_load8(const double *at)
 {
     return *(const pal_lanes *)at;

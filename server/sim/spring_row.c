@@ -9,8 +9,7 @@ static void corners_at(const double *x, const int32_t *node, int n, const double
     for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * node[c < n ? c : 0];
 }
 
-static pal_err fill(pal_spring_row *row, const pal_body *body, pal_arena *arena, double *weight,
-                    double (*measure)(const double *const x[PAL_CORNERS]))
+static pal_err fill(pal_spring_row *row, const pal_body *body, pal_arena *arena, double *weight)
 {
     PAL_TRY(pal_strips_make(body->slots, row->item, row->n_item, row->n_corner, arena, &row->strips));
     PAL_TRY(pal_spring_weights(&row->spring, body, row->item, row->n_item, row->n_corner, weight));
@@ -20,23 +19,23 @@ static pal_err fill(pal_spring_row *row, const pal_body *body, pal_arena *arena,
     for (int i = 0; i < row->n_item; i++) {
         const double *x[PAL_CORNERS];
         corners_at(body->x_rest, row->item + row->n_corner * i, row->n_corner, x);
-        row->w[row->strips.place[i]] = 1 / measure(x);
+        row->w[row->strips.place[i]] = 1 / pal_spring_measure(row->spring.kind, x);
         row->q[row->strips.place[i]] = weight[i];
     }
     return PAL_ERR_OK;
 }
 
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
-                            int n_corner, double (*measure)(const double *const x[PAL_CORNERS]), double least,
-                            pal_spring_row *out)
+                            double least, pal_spring_row *out)
 {
     const pal_body *body = build->body;
+    const int n_corner = pal_spring_corner_count(kind);
     PAL_TRY(pal_spring_read(kind, entry, build, &out->spring));
     out->n_corner = n_corner;
     for (int i = 0; i < n_item; i++) {
         const double *x[PAL_CORNERS];
         corners_at(body->x_rest, item + n_corner * i, n_corner, x);
-        if (!(fabs(measure(x)) > least)) continue;
+        if (!(fabs(pal_spring_measure(kind, x)) > least)) continue;
         memmove(item + n_corner * out->n_item++, item + n_corner * i, sizeof *item * (size_t)n_corner);
     }
     size_t n = (size_t)out->n_item * (size_t)n_corner;
@@ -47,7 +46,7 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
         return PAL_ERR_MEMORY;
     }
     memcpy(out->item, item, n * sizeof *item);
-    pal_err err = fill(out, body, build->arena, weight, measure);
+    pal_err err = fill(out, body, build->arena, weight);
     free(weight);
     return err;
 }

@@ -1,19 +1,11 @@
 /* What the three spring rows have in common: constraints between 2, 3 or 4 nodes, each with a rest measure w and a
- * weight q, E = q k/2 C^2 (spring_law.h). An effect gives two forms of its constraint: `shape`, plain, one at a time,
- * and `kernel`, 8 lanes at a time. The loops below are inlined with them. Thread: [load] to make, then [sim]. */
+ * weight q, E = q k/2 C^2 (spring_law.h). The constraint stands in spring_shape.h, plain, one at a time; an effect
+ * gives it as a `kernel`, 8 lanes at a time. The loops below are inlined with them. Thread: [load] to make, then [sim].
+ */
 #ifndef PAL_SIM_SPRING_ROW_H
 #define PAL_SIM_SPRING_ROW_H
-#include "server/base/vec3.h"
 #include "server/sim/lanes.h"
-#include "server/sim/spring_law.h"
-
-#include <string.h>
-
-/* C and its gradient at each corner, for nodes at x */
-typedef struct pal_shape {
-    double c, g[PAL_CORNERS][3];
-} pal_shape;
-typedef void (*pal_shape_of)(const double *const x[PAL_CORNERS], double w, pal_shape *out);
+#include "server/sim/spring_shape.h"
 
 /* 8 springs with constants k q: p [n_corner][3] where the corners' coordinates stand, 8 lanes each; f [n_corner - 1][3]
  * forces on corners 1, 2, 3, the first gets minus their sum; least may be lowered to anything the effect wants to know
@@ -32,11 +24,10 @@ typedef struct pal_spring_row {
     double *w, *q; /* by lane; 0: no constraint  [strips.n_lane]    */
 } pal_spring_row;
 
-/* reads the row's keys (pal_spring_read), takes what is useful of item [n_item][n_corner] (kept: measure > least; its
- * corners reordered), with w = 1 / measure */
+/* reads the row's keys (pal_spring_read), takes what is useful of item [n_item][corners of the kind] (kept: measure >
+ * least; its corners reordered), with w = 1 / measure */
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
-                            int n_corner, double (*measure)(const double *const x[PAL_CORNERS]), double least,
-                            pal_spring_row *out);
+                            double least, pal_spring_row *out);
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note);
 
 PAL_INLINE void pal_spring_corners(const pal_spring_row *row, const double *x, int i, const double *to[PAL_CORNERS])
@@ -44,7 +35,7 @@ PAL_INLINE void pal_spring_corners(const pal_spring_row *row, const double *x, i
     for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * row->item[row->n_corner * i + (c < row->n_corner ? c : 0)];
 }
 
-PAL_INLINE double pal_spring_energy(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of)
+PAL_INLINE double pal_spring_energy(const pal_spring_row *row, const pal_body *body, pal_spring_kind kind)
 {
     double sum = 0;
     for (int i = 0; i < row->n_item; i++) {
@@ -52,22 +43,23 @@ PAL_INLINE double pal_spring_energy(const pal_spring_row *row, const pal_body *b
         pal_shape s;
         int lane = row->strips.place[i];
         pal_spring_corners(row, body->d, i, x);
-        shape_of(x, row->w[lane], &s);
+        pal_spring_shape(kind, x, row->w[lane], &s);
         sum += 0.5 * row->q[lane] * row->spring.k_J * s.c * s.c;
     }
     return sum;
 }
 
 /* f -= c q (sum of g.v) g */
-PAL_INLINE void pal_spring_damp(const pal_spring_row *row, const pal_body *body, pal_shape_of shape_of, int n_corner)
+PAL_INLINE void pal_spring_damp(const pal_spring_row *row, const pal_body *body, pal_spring_kind kind)
 {
+    const int n_corner = pal_spring_corner_count(kind);
     for (int i = 0; i < row->n_item; i++) {
         const double *x[PAL_CORNERS];
         pal_shape s;
         int lane = row->strips.place[i];
         const int32_t *node = row->item + n_corner * i;
         pal_spring_corners(row, body->d, i, x);
-        shape_of(x, row->w[lane], &s);
+        pal_spring_shape(kind, x, row->w[lane], &s);
         double rate = 0;
         for (int c = 0; c < n_corner; c++) rate += pal_dot3(s.g[c], body->dv + 3 * node[c]);
         for (int c = 0; c < n_corner; c++)

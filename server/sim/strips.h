@@ -13,6 +13,8 @@
 #include "server/base/arena.h"
 #include "server/mesh/tets.h"
 
+#define PAL_INLINE static inline __attribute__((always_inline))
+
 enum { PAL_LANES = 8, PAL_CORNERS = 4, PAL_STRIP_CORNERS = 8 };
 
 /* slots of a body's nodes and working arrays that its rows share, one after the other */

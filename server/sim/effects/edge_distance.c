@@ -16,21 +16,6 @@ typedef struct edge_distance {
     double *node_bound; /* sum of 2 q / l0^2 over the edges of each node [n_dof] */
 } edge_distance;
 
-static double measure(const double *const x[PAL_CORNERS])
-{
-    return pal_dist3(x[0], x[1]);
-}
-
-static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
-{
-    double d[3];
-    pal_sub3(d, x[1], x[0]);
-    double l = pal_norm3(d), scale = l * w > 1e-9 ? w / l : 0;
-    s->c = l * w - 1;
-    pal_scale3(s->g[1], scale, d);
-    pal_scale3(s->g[0], -scale, d);
-}
-
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     edge_distance *e = PAL_NEW(build->arena, edge_distance, 1);
@@ -38,8 +23,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     int n_edge;
     if (!e) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_edges(build->body->tets, &edge, &n_edge));
-    pal_err err = pal_spring_row_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge, 2, measure,
-                                      1e-9 * build->body->size_m, &e->row);
+    pal_err err =
+        pal_spring_row_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge, 1e-9 * build->body->size_m, &e->row);
     free(edge);
     PAL_TRY(err);
     e->node_bound = PAL_NEW(build->arena, double, build->body->n_dof);
@@ -87,13 +72,13 @@ static pal_err run(void *self, pal_step *step)
     double least = pal_spring_run(&e->row, body->slots, kernel, 2);
     pal_slots_add(body->slots, body->f);
     if (least < LEAST_Q) reopen(&e->row, body);
-    if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, shape_of, 2);
+    if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    return pal_spring_energy(&((edge_distance *)self)->row, body, shape_of);
+    return pal_spring_energy(&((edge_distance *)self)->row, body, PAL_SPRING_DISTANCE);
 }
 
 /* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is never more for l > l0

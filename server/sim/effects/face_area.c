@@ -11,29 +11,6 @@
 /* of (A/A0)^2 */
 #define LEAST_Q 1e-24
 
-/* 2A */
-static double measure(const double *const x[PAL_CORNERS])
-{
-    double e1[3], e2[3], n[3];
-    pal_sub3(e1, x[1], x[0]);
-    pal_sub3(e2, x[2], x[0]);
-    pal_cross3(n, e1, e2);
-    return pal_norm3(n);
-}
-
-static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
-{
-    double e[3][3], n[3];
-    for (int c = 0; c < 3; c++) pal_sub3(e[c], x[(c + 2) % 3], x[(c + 1) % 3]);
-    pal_cross3(n, e[2], e[0]);
-    double size = pal_norm3(n), scale = size * w > 1e-12 ? w / size : 0;
-    s->c = size * w - 1;
-    for (int c = 0; c < 3; c++) {
-        pal_cross3(s->g[c], n, e[c]);
-        pal_scale3(s->g[c], scale, s->g[c]);
-    }
-}
-
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     pal_spring_row *row = PAL_NEW(build->arena, pal_spring_row, 1);
@@ -42,7 +19,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_faces(build->body->tets, &face, &n_face));
     double size = build->body->size_m;
-    pal_err err = pal_spring_row_make(PAL_SPRING_AREA, item, build, face, n_face, 3, measure, 2e-12 * size * size, row);
+    pal_err err = pal_spring_row_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, row);
     free(face);
     *self = row;
     return err;
@@ -90,13 +67,13 @@ static pal_err run(void *self, pal_step *step)
     pal_slots_load(body->slots, body->d);
     pal_spring_run(row, body->slots, kernel, 3);
     pal_slots_add(body->slots, body->f);
-    if (row->spring.c_Js > 0) pal_spring_damp(row, body, shape_of, 3);
+    if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_AREA);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    return pal_spring_energy(self, body, shape_of);
+    return pal_spring_energy(self, body, PAL_SPRING_AREA);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)

@@ -10,27 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* 6 V */
-static double measure(const double *const x[PAL_CORNERS])
-{
-    double e[3][3], n[3];
-    for (int c = 0; c < 3; c++) pal_sub3(e[c], x[c + 1], x[0]);
-    pal_cross3(n, e[1], e[2]);
-    return pal_dot3(e[0], n);
-}
-
-static void shape_of(const double *const x[PAL_CORNERS], double w, pal_shape *s)
-{
-    double e[3][3];
-    for (int c = 0; c < 3; c++) pal_sub3(e[c], x[c + 1], x[0]);
-    for (int c = 0; c < 3; c++) pal_cross3(s->g[c + 1], e[(c + 1) % 3], e[(c + 2) % 3]);
-    s->c = pal_dot3(e[0], s->g[1]) * w - 1;
-    for (int d = 0; d < 3; d++) {
-        for (int c = 1; c < 4; c++) s->g[c][d] *= w;
-        s->g[0][d] = -(s->g[1][d] + s->g[2][d] + s->g[3][d]);
-    }
-}
-
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     const pal_tets *tets = build->body->tets;
@@ -42,8 +21,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     }
     memcpy(tet, tets->tet, 4 * sizeof *tet * (size_t)tets->n_tet);
     double h = build->body->h_m;
-    pal_err err =
-        pal_spring_row_make(PAL_SPRING_VOLUME, item, build, tet, tets->n_tet, 4, measure, 6e-6 * h * h * h, row);
+    pal_err err = pal_spring_row_make(PAL_SPRING_VOLUME, item, build, tet, tets->n_tet, 6e-6 * h * h * h, row);
     free(tet);
     *self = row;
     return err;
@@ -96,13 +74,13 @@ static pal_err run(void *self, pal_step *step)
     pal_slots_load(body->slots, body->d);
     pal_spring_run(row, body->slots, kernel, 4);
     pal_slots_add(body->slots, body->f);
-    if (row->spring.c_Js > 0) pal_spring_damp(row, body, shape_of, 4);
+    if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_VOLUME);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    return pal_spring_energy(self, body, shape_of);
+    return pal_spring_energy(self, body, PAL_SPRING_VOLUME);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
