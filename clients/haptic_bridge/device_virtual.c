@@ -19,6 +19,7 @@
 #define CATCH_UP_MOST_S 0.2 /* after a longer pause in wall time the plant skips the rest */
 #define VISCOUS_NS_M    0.05
 #define TOUCH_FELT_N    0.1
+#define TOUCH_REST_M_S  0.005 /* a hand this slow feels what it touches, no damping */
 #define APPROACH_M_S    0.04
 
 typedef struct virtual_device {
@@ -68,10 +69,11 @@ static void virtual_intend(virtual_state *s)
 {
     if (s->script == STILL) return;
     if (!s->touched) {
-        s->xd[2] = s->height_m - APPROACH_M_S * fmax(s->time_s - s->wait_s, 0);
-        const double lowest = -0.9 * s->device->radius_m;
-        if (s->xd[2] < lowest) s->xd[2] = lowest;
-        if (pal_norm3(s->applied) > TOUCH_FELT_N) {
+        /* damping is no touch: the hand halts where it feels something, and has touched when it still does at rest */
+        const bool felt = pal_norm3(s->applied) > TOUCH_FELT_N;
+        if (!felt && s->time_s > s->wait_s)
+            s->xd[2] = fmax(s->xd[2] - APPROACH_M_S * SUB_STEP_S, -0.9 * s->device->radius_m);
+        if (felt && pal_norm3(s->v) < TOUCH_REST_M_S) {
             s->touched = true;
             s->touched_s = s->time_s;
             s->touched_z = s->xd[2];

@@ -160,6 +160,32 @@ static void same_calls_give_the_same_numbers(void)
     CHECK(end[0][2] < 0.02);
 }
 
+/* a servo without fresh models damps by 3 N s/m: at the hand's approach more than what counts as felt, and yet the hand
+ * goes on to the surface at z = 0 (300 N/m) and presses there by its depth */
+static void damping_on_the_way_is_no_touch(void)
+{
+    pal_dev_info info;
+    void *d = opened("premium,script=press-hold,depth=8,clock=virtual", &info);
+    REQUIRE(d);
+    const double torque[3] = {0, 0, 0};
+    double x[3], v[3], most_above = 0, deepest = 1;
+    for (int i = 0; i < 6000; i++) {
+        pal_virtual_truth(d, x, v, NULL);
+        double force[3] = {-3 * v[0], -3 * v[1], -3 * v[2]};
+        if (x[2] > 0) most_above = fmax(most_above, fabs(force[2]));
+        if (x[2] < 0) force[2] -= 300 * x[2];
+        pal_device_virtual()->write(d, force, torque, 0);
+        pal_virtual_advance(d, 1e-3);
+        deepest = fmin(deepest, x[2]);
+    }
+    CHECK(most_above > 0.1);
+    /* the hand's two springs in series share the depth with the surface: 8 mm * 134 / (134 + 300), and the touch itself
+     */
+    CHECK(deepest < -0.002);
+    CHECK(deepest > -0.008);
+    pal_device_virtual()->close(d);
+}
+
 static void refuses_unknown_devices_hands_and_keys(void)
 {
     pal_dev_info info;
@@ -181,6 +207,7 @@ int main(void)
     RUN(encoder_shows_whole_steps_and_force_is_cut_at_the_peak);
     RUN(stop_takes_the_force_away_at_once);
     RUN(same_calls_give_the_same_numbers);
+    RUN(damping_on_the_way_is_no_touch);
     RUN(refuses_unknown_devices_hands_and_keys);
     return check_report();
 }
