@@ -1,4 +1,5 @@
 /* Materials of regions. */
+#include "server/num/trilinear.h"
 #include "server/sim/def.h"
 
 #include <math.h>
@@ -24,29 +25,13 @@ static bool in_label(const pal_region *r, const double x[3])
     return r->label[at] == r->is;
 }
 
-/* trilinear between the grid's nodes, the nearest cell's value on its border beyond them (paper B 3.5, erratum B12) */
+/* trilinear between the grid's nodes, the border's values beyond them (paper B 3.5, erratum B12) */
 static double on_grid(const pal_region *r, const double *value, const double x[3])
 {
-    size_t at[3];
-    double t[3], sum = 0;
-    for (int c = 0; c < 3; c++) {
-        double g = r->n[c] > 1 ? (x[c] - r->low_m[c]) / (r->high_m[c] - r->low_m[c]) * (r->n[c] - 1) : 0;
-        g = g > 0 ? fmin(g, r->n[c] - 1) : 0;
-        at[c] = g < r->n[c] - 1 ? (size_t)g : (size_t)(r->n[c] > 1 ? r->n[c] - 2 : 0);
-        t[c] = g - (double)at[c];
-    }
-    for (int k = 0; k < 8; k++) {
-        double w = 1;
-        size_t node = 0, step = 1;
-        for (int c = 0; c < 3; c++) {
-            int up = k >> c & 1;
-            w *= up ? t[c] : 1 - t[c];
-            node += step * (at[c] + (size_t)(up && r->n[c] > 1));
-            step *= (size_t)r->n[c];
-        }
-        if (w > 0) sum += w * value[node];
-    }
-    return sum;
+    pal_grid grid = {{r->n[0], r->n[1], r->n[2]},
+                     {r->low_m[0], r->low_m[1], r->low_m[2]},
+                     {r->high_m[0], r->high_m[1], r->high_m[2]}};
+    return pal_trilinear_at(&grid, value, x);
 }
 
 void pal_material_over(const pal_body_def *def, const pal_material *base, const double x[3], pal_material *out)
