@@ -1,13 +1,11 @@
 /* Plots as SVG. One pass finds the range, then frame, ticks, curves and legend are written in that order. */
 #include "server/lab/plot.h"
 
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "server/lab/svg.h"
 
-enum { WIDE = 760, HIGH = 480, LEFT = 84, RIGHT = 210, TOP = 46, BOTTOM = 62, TICK_MOST = 12 };
+#include <math.h>
+
+enum { WIDE = 760, HIGH = 480, LEFT = 84, RIGHT = 210, TOP = 46, BOTTOM = 62 };
 
 typedef struct axis {
     bool log;
@@ -35,13 +33,6 @@ static double place(const axis *a, double value)
     return a->from + (a->to - a->from) * (scaled(a, value) - a->low) / (a->high - a->low);
 }
 
-/* round steps for linear axes: 1, 2 or 5 times a power of ten, at most 7 of them */
-static double round_step(double span)
-{
-    double raw = span / 6, power = pow(10, floor(log10(raw))), lead = raw / power;
-    return power * (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10);
-}
-
 /* widens the range to whole ticks */
 static void settle(axis *a)
 {
@@ -55,58 +46,23 @@ static void settle(axis *a)
         double around = a->low != 0 ? 0.1 * fabs(a->low) : 1;
         a->low -= around, a->high += around;
     }
-    double step = a->step = round_step(a->high - a->low);
+    double step = a->step = pal_svg_step(a->high - a->low, 6);
     a->low = step * floor(a->low / step + 1e-9), a->high = step * ceil(a->high / step - 1e-9);
 }
 
-/* tick values, at most TICK_MOST; returns how many */
-static int ticks(const axis *a, double value[TICK_MOST])
+static int ticks(const axis *a, double value[PAL_SVG_TICKS])
 {
-    int n = 0;
-    if (!a->log) {
-        double step = a->step;
-        for (int i = 0; i < TICK_MOST && a->low + i * step <= a->high + 1e-6 * step; i++) {
-            double v = a->low + i * step;
-            value[n++] = fabs(v) < 1e-9 * step ? 0 : v;
-        }
-        return n;
-    }
-    /* whole decades, and 2 and 5 between them where there are few, thinned where there are many */
-    static const double within[] = {1, 2, 5};
-    int decades = (int)floor(a->high) - (int)ceil(a->low) + 1, every = decades > 6 ? (decades + 5) / 6 : 1;
-    for (int d = (int)floor(a->low); d <= (int)ceil(a->high); d++)
-        for (int k = 0; k < (decades <= 2 ? 3 : 1) && n < TICK_MOST; k++) {
-            double v = within[k] * pow(10, d);
-            if (log10(v) < a->low || log10(v) > a->high || (decades > 6 && d % every != 0)) continue;
-            value[n++] = v;
-        }
-    return n;
-}
-
-static void put_text(FILE *to, const char *text)
-{
-    for (; *text; text++) switch (*text) {
-        case '<':
-            fputs("&lt;", to);
-            break;
-        case '&':
-            fputs("&amp;", to);
-            break;
-        default:
-            fputc(*text, to);
-        }
+    return a->log ? pal_svg_log_ticks(a->low, a->high, value) : pal_svg_ticks(a->low, a->high, a->step, value);
 }
 
 static void label(FILE *to, double x, double y, const char *anchor, const char *more, const char *text)
 {
-    fprintf(to, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\"%s>", x, y, anchor, more);
-    put_text(to, text);
-    fputs("</text>\n", to);
+    pal_svg_text(to, x, y, anchor, more, text, 0);
 }
 
 static void draw_axes(FILE *to, const pal_plot *plot, const axis *x, const axis *y)
 {
-    double value[TICK_MOST];
+    double value[PAL_SVG_TICKS];
     char text[32];
     int n = ticks(x, value);
     for (int i = 0; i < n; i++) {
@@ -192,25 +148,10 @@ pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_note *note)
     if (!find_range(plot, &x, &y)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: there is no point to draw", path);
     settle(&x);
     settle(&y);
-    char *text = NULL;
-    size_t n_byte = 0;
-    FILE *to = open_memstream(&text, &n_byte);
-    if (!to) return PAL_ERR_MEMORY;
-    fprintf(to,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
-            "font-family=\"sans-serif\" font-size=\"13\" fill=\"#222\">\n"
-            "<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
-            WIDE, HIGH, WIDE, HIGH);
+    pal_svg svg;
+    PAL_TRY(pal_svg_begin(&svg, WIDE, HIGH, note));
+    FILE *to = svg.to;
     draw_axes(to, plot, &x, &y);
     for (int k = 0; k < plot->n_curve; k++) draw_curve(to, plot, k, &x, &y);
-    fputs("</svg>\n", to);
-    bool whole = fclose(to) == 0;
-    FILE *file = whole ? fopen(path, "wb") : NULL;
-    whole = file && fwrite(text, 1, n_byte, file) == n_byte;
-    if (file && fclose(file) != 0) whole = false;
-    free(text);
-    if (whole) return PAL_ERR_OK;
-    int code = errno;
-    if (file) remove(path);
-    return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(code));
+    return pal_svg_end(&svg, path, note);
 }
