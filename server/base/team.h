@@ -10,11 +10,13 @@ enum { PAL_TEAM_MOST = 256 };
 typedef struct pal_team pal_team;
 
 /* n_worker <= 0: one per core that this process may use; 1: no thread is made and the caller works. At most
- * PAL_TEAM_MOST. MEMORY: no memory, or no thread could be made. [load] */
+ * PAL_TEAM_MOST, and no more than the system gives: pal_team_size says how many. Between runs they sleep; they take no
+ * signals. MEMORY: no memory, or no thread could be made. [load] */
 pal_err pal_team_create(int n_worker, pal_team **out);
-void pal_team_destroy(pal_team *team); /* joins; NULL is fine */
-int pal_team_size(const pal_team *team);
+void pal_team_destroy(pal_team *team);   /* joins; NULL is fine */
+int pal_team_size(const pal_team *team); /* workers, the caller among them */
 /* calls piece(user, worker, i) once for every i in [0, n), 0 <= worker < size, and returns when all are done; the
- * caller works too. What the pieces wrote is visible then */
+ * caller works too, as worker 0. No two pieces run as one worker at once, so what belongs to a worker needs no lock.
+ * What the pieces wrote is visible on return. A piece must not run the same team. n <= 0: nothing */
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user);
 #endif

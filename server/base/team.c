@@ -1,0 +1,151 @@
+/* Workers take the next piece by counting. A run is open from its call until the caller finds no more pieces; a worker
+ * that wakes later leaves it alone, so nobody waits for a thread that has no work. */
+#include "server/base/team.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+typedef struct worker {
+    pal_team *team;
+    pthread_t thread;
+    int number;
+} worker;
+
+struct pal_team {
+    pthread_mutex_t lock;
+    pthread_cond_t begun, left; /* workers wait for begun, the caller for left            */
+    bool open, quit;
+    int n_inside;          /* workers at work on this run, without the caller        */
+    uint64_t run;          /* its number: a worker enters a run once                 */
+    _Atomic int64_t next;  /* piece to be taken; goes past n by one for each of them */
+    int n, size, n_thread; /* size = n_thread + 1                                    */
+    void (*piece)(void *user, int worker, int index);
+    void *user;
+    worker worker[];
+};
+
+/* cores that this process may use; the set grows until the system's fits */
+static int count_cores(void)
+{
+    for (int most = 1024; most <= 1 << 20; most *= 4) {
+        cpu_set_t *set = CPU_ALLOC((size_t)most);
+        if (!set) break;
+        size_t byte = CPU_ALLOC_SIZE((size_t)most);
+        CPU_ZERO_S(byte, set);
+        bool known = sched_getaffinity(0, byte, set) == 0, small = !known && errno == EINVAL;
+        int n = known ? CPU_COUNT_S(byte, set) : 0;
+        CPU_FREE(set);
+        if (n > 0) return n;
+        if (!small) break;
+    }
+    long n = sysconf(_SC_NPROCESSORS_ONLN);
+    return n < 1 ? 1 : n > PAL_TEAM_MOST ? PAL_TEAM_MOST : (int)n;
+}
+
+static void work(pal_team *team, int number)
+{
+    for (;;) {
+        int64_t i = atomic_fetch_add_explicit(&team->next, 1, memory_order_relaxed);
+        if (i >= team->n) return;
+        team->piece(team->user, number, (int)i);
+    }
+}
+
+static void *live(void *self)
+{
+    worker *w = self;
+    pal_team *team = w->team;
+    uint64_t seen = 0;
+    pthread_mutex_lock(&team->lock);
+    for (;;) {
+        while (!team->quit && !(team->open && team->run != seen)) pthread_cond_wait(&team->begun, &team->lock);
+        if (team->quit) break;
+        seen = team->run;
+        team->n_inside++;
+        pthread_mutex_unlock(&team->lock);
+        work(team, w->number);
+        pthread_mutex_lock(&team->lock);
+        if (--team->n_inside == 0) pthread_cond_signal(&team->left);
+    }
+    pthread_mutex_unlock(&team->lock);
+    return NULL;
+}
+
+pal_err pal_team_create(int n_worker, pal_team **out)
+{
+    int size = n_worker > 0 ? n_worker : count_cores();
+    if (size > PAL_TEAM_MOST) size = PAL_TEAM_MOST;
+    pal_team *team = calloc(1, sizeof *team + sizeof team->worker[0] * (size_t)(size - 1));
+    if (!team) return PAL_ERR_MEMORY;
+    pthread_mutex_init(&team->lock, NULL);
+    pthread_cond_init(&team->begun, NULL);
+    pthread_cond_init(&team->left, NULL);
+    /* signals are for the program's own threads */
+    sigset_t all, old;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    for (int i = 0; i < size - 1; i++) {
+        team->worker[i] = (worker){.team = team, .number = i + 1};
+        if (pthread_create(&team->worker[i].thread, NULL, live, &team->worker[i])) break;
+        team->n_thread++;
+    }
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    team->size = team->n_thread + 1;
+    if (size > 1 && team->n_thread == 0) {
+        pal_team_destroy(team);
+        return PAL_ERR_MEMORY;
+    }
+    *out = team;
+    return PAL_ERR_OK;
+}
+
+void pal_team_destroy(pal_team *team)
+{
+    if (!team) return;
+    pthread_mutex_lock(&team->lock);
+    team->quit = true;
+    pthread_cond_broadcast(&team->begun);
+    pthread_mutex_unlock(&team->lock);
+    for (int i = 0; i < team->n_thread; i++) pthread_join(team->worker[i].thread, NULL);
+    pthread_cond_destroy(&team->left);
+    pthread_cond_destroy(&team->begun);
+    pthread_mutex_destroy(&team->lock);
+    free(team);
+}
+
+int pal_team_size(const pal_team *team)
+{
+    return team->size;
+}
+
+void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user)
+{
+    if (n <= 1 || team->n_thread == 0) {
+        for (int i = 0; i < n; i++) piece(user, 0, i);
+        return;
+    }
+    pthread_mutex_lock(&team->lock);
+    team->piece = piece;
+    team->user = user;
+    team->n = n;
+    atomic_store_explicit(&team->next, 0, memory_order_relaxed);
+    team->run++;
+    team->open = true;
+    if (n > team->n_thread)
+        pthread_cond_broadcast(&team->begun);
+    else
+        for (int i = 0; i < n - 1; i++) pthread_cond_signal(&team->begun);
+    pthread_mutex_unlock(&team->lock);
+    work(team, 0);
+    pthread_mutex_lock(&team->lock);
+    team->open = false;
+    while (team->n_inside > 0) pthread_cond_wait(&team->left, &team->lock);
+    pthread_mutex_unlock(&team->lock);
+}

@@ -1,0 +1,363 @@
+/* Adaptive simulated annealing. The walk is a sequence of evaluations numbered from 0; number g has a key of its own,
+ * of which counter 0 decides whether the point is accepted and the others draw its values. */
+#include "server/num/anneal.h"
+
+#include "server/num/random.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double COLDEST = 1e-18; /* least T/T0 of the acceptance */
+enum { MOST_DRAW = 100 };
+
+typedef struct walk {
+    const pal_anneal_options *o;
+    pal_anneal_result *r;
+    pal_note *note;
+    int n, n_batch;
+    double *best, *last;  /* points                               [n]           */
+    double last_cost;     /* DBL_MAX: the walk has no point yet                 */
+    double *k;            /* count of a parameter's temperature at the last re-annealing [n] */
+    double *sensitivity;  /* s_i, 0: none                         [n]           */
+    double *p, *cost;     /* points of a batch and their costs    [n_batch][n], [n_batch] */
+    double t0, k_accept;  /* start temperature of acceptance, its count         */
+    double sum_temper[2]; /* |costs| of the first good samples: sum / n_temper, number */
+    int64_t since_better, since_accepted, since_generated;
+    bool ended;
+} walk;
+
+void pal_anneal_default(pal_anneal_options *options)
+{
+    *options = (pal_anneal_options){.n_start = 100,
+                                    .n_temper = 5,
+                                    .n_batch = 8,
+                                    .ratio_scale = 1e-5,
+                                    .anneal_scale = 100,
+                                    .cost_scale = 1,
+                                    .reanneal_accepted = 100,
+                                    .reanneal_generated = 10000,
+                                    .coldest = 1e-10,
+                                    .difference = 1e-3,
+                                    .enough = -DBL_MAX};
+}
+
+static double rate(const pal_anneal_options *o)
+{
+    return -log(o->ratio_scale) * exp(-log(o->anneal_scale) / o->n_parameter);
+}
+
+static double cool(double c, int n, double k, double coldest)
+{
+    return fmax(coldest, exp(-c * pow(k, 1.0 / n)));
+}
+
+/* the count at which T/T0 is the ratio */
+static double count_of(double c, int n, double ratio, double coldest)
+{
+    return pow(-log(fmin(1, fmax(coldest, ratio))) / c, n);
+}
+
+double pal_anneal_cooling(const pal_anneal_options *options, double k)
+{
+    return cool(rate(options), options->n_parameter, k, options->coldest);
+}
+
+double pal_anneal_jump(double temperature, double u)
+{
+    double size = temperature * expm1(fabs(2 * u - 1) * log1p(1 / temperature));
+    return u < 0.5 ? -size : size;
+}
+
+static double acceptance_temperature(const walk *w)
+{
+    return w->t0 * cool(w->o->cost_scale * rate(w->o), w->n, w->k_accept, COLDEST);
+}
+
+static bool has_value(double cost)
+{
+    return isfinite(cost) && cost < DBL_MAX;
+}
+
+static uint64_t key_of(const walk *w, int64_t number)
+{
+    return pal_random_bits(w->o->seed, (uint64_t)number);
+}
+
+static double anywhere(const walk *w, int i, double u)
+{
+    double low = w->o->low[i], high = w->o->high[i];
+    return fmin(high, fmax(low, low + u * (high - low)));
+}
+
+static void draw_sample(const walk *w, int64_t number, double *p)
+{
+    uint64_t key = key_of(w, number);
+    for (int i = 0; i < w->n; i++) p[i] = anywhere(w, i, pal_random_unit(key, (uint64_t)i + 1));
+}
+
+/* the count of parameter i after the candidates so far and `ahead` others: one sum, the same for every batch */
+static double count_at(const walk *w, int i, int ahead)
+{
+    return w->k[i] + (double)(w->since_generated + ahead);
+}
+
+/* a candidate from the last accepted point, when `ahead` others come before it */
+static void draw_candidate(const walk *w, int64_t number, int ahead, double *p)
+{
+    const pal_anneal_options *o = w->o;
+    const double c = rate(o);
+    uint64_t key = key_of(w, number), counter = 1;
+    for (int i = 0; i < w->n; i++) {
+        double t = cool(c, w->n, count_at(w, i, ahead), o->coldest), range = o->high[i] - o->low[i];
+        int draw = 0;
+        do p[i] = w->last[i] + range * pal_anneal_jump(t, pal_random_unit(key, counter++));
+        while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < MOST_DRAW);
+        if (draw == MOST_DRAW) p[i] = anywhere(w, i, pal_random_unit(key, counter++));
+    }
+}
+
+/* costs of the first m points of the batch */
+static pal_err evaluate(walk *w, int m)
+{
+    for (int j = 0; j < m; j++) w->cost[j] = DBL_MAX;
+    w->r->n_spent += m;
+    PAL_TRY(w->o->evaluate(w->o->user, w->p, m, w->cost));
+    for (int j = 0; j < m; j++)
+        if (!has_value(w->cost[j])) w->cost[j] = DBL_MAX;
+    return PAL_ERR_OK;
+}
+
+/* how many of m evaluations the limit still allows */
+static int allowed(const walk *w, int64_t m)
+{
+    int64_t left = w->o->most_evaluation > 0 ? w->o->most_evaluation - w->r->n_evaluation : INT64_MAX;
+    if (m > w->n_batch) m = w->n_batch;
+    return (int)(m < left ? m : left);
+}
+
+/* enters point j of the batch into the walk: its best, its ends, and the caller's view */
+static void enter(walk *w, int j, pal_anneal_step step)
+{
+    const pal_anneal_options *o = w->o;
+    pal_anneal_result *r = w->r;
+    step.p = w->p + (size_t)j * (size_t)w->n;
+    step.cost = w->cost[j];
+    step.generation = r->n_evaluation++;
+    step.improved = step.cost < r->best;
+    r->n_failed += step.cost == DBL_MAX;
+    r->n_accepted += step.accepted;
+    w->since_better++;
+    if (step.improved) {
+        r->best = step.cost;
+        memcpy(w->best, step.p, sizeof(double) * (size_t)w->n);
+        w->since_better = 0;
+    }
+    step.best = r->best;
+    if (o->step && !o->step(o->user, &step)) w->ended = true;
+    if (o->most_evaluation > 0 && r->n_evaluation >= o->most_evaluation) w->ended = true;
+    if (o->enough > -DBL_MAX && r->best <= o->enough) w->ended = true;
+    /* samples never stall the walk, unless none has a value */
+    bool sampling = step.start && (r->best < DBL_MAX || r->n_evaluation - (o->first != NULL) < o->n_start);
+    if (o->stall > 0 && w->since_better >= o->stall && !sampling) w->ended = true;
+}
+
+/* takes cost j as the first point when it is the best so far, and into the mean of T0 when it is a sample's */
+static void enter_start(walk *w, int j, bool sample)
+{
+    double cost = w->cost[j];
+    if (sample && cost < DBL_MAX && w->sum_temper[1] < w->o->n_temper) {
+        w->sum_temper[0] += fabs(cost) / w->o->n_temper;
+        w->sum_temper[1]++;
+    }
+    if (cost < w->last_cost) {
+        w->last_cost = cost;
+        memcpy(w->last, w->p + (size_t)j * (size_t)w->n, sizeof(double) * (size_t)w->n);
+    }
+    enter(w, j, (pal_anneal_step){.start = true});
+}
+
+static pal_err start(walk *w)
+{
+    const pal_anneal_options *o = w->o;
+    if (o->first) {
+        memcpy(w->p, w->best, sizeof(double) * (size_t)w->n);
+        PAL_TRY(evaluate(w, 1));
+        enter_start(w, 0, false);
+    }
+    for (int64_t sample = 0; !w->ended && (sample < o->n_start || w->last_cost == DBL_MAX);) {
+        int m = allowed(w, sample < o->n_start ? o->n_start - sample : w->n_batch);
+        for (int j = 0; j < m; j++) draw_sample(w, w->r->n_evaluation + j, w->p + (size_t)j * (size_t)w->n);
+        PAL_TRY(evaluate(w, m));
+        for (int j = 0; j < m && !w->ended; j++) {
+            enter_start(w, j, true);
+            sample++;
+            /* beyond n_start the first value ends the sampling */
+            if (sample >= o->n_start && w->last_cost < DBL_MAX) break;
+        }
+    }
+    w->since_better = 0;
+    w->t0 = w->sum_temper[1] > 0 ? w->sum_temper[0] * (o->n_temper / w->sum_temper[1]) : fabs(w->last_cost);
+    return PAL_ERR_OK;
+}
+
+/* sensitivities at the best point, in the walk's own batches */
+static pal_err probe(walk *w)
+{
+    const pal_anneal_options *o = w->o;
+    const double centre_cost = w->r->best;
+    double *centre = w->sensitivity + w->n;
+    memcpy(centre, w->best, sizeof(double) * (size_t)w->n);
+    for (int i = 0; i < w->n; i++) w->sensitivity[i] = 0;
+    for (int i = 0; i < w->n && !w->ended;) {
+        int m = allowed(w, w->n - i);
+        for (int j = 0; j < m; j++) {
+            double *p = w->p + (size_t)j * (size_t)w->n, h = o->difference * (o->high[i + j] - o->low[i + j]);
+            memcpy(p, centre, sizeof(double) * (size_t)w->n);
+            p[i + j] += p[i + j] + h <= o->high[i + j] ? h : -h;
+        }
+        PAL_TRY(evaluate(w, m));
+        for (int j = 0; j < m && !w->ended; j++) {
+            double s = fabs(w->cost[j] - centre_cost);
+            if (w->cost[j] < DBL_MAX && isfinite(s)) w->sensitivity[i + j] = s;
+            enter(w, j, (pal_anneal_step){.probe = true});
+        }
+        i += m;
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err reanneal(walk *w)
+{
+    const double c = rate(w->o), coldest = w->o->coldest;
+    double t = acceptance_temperature(w), most = 0;
+    for (int i = 0; i < w->n; i++) w->k[i] = count_at(w, i, 0);
+    w->since_accepted = w->since_generated = 0;
+    PAL_TRY(probe(w));
+    if (w->ended) return PAL_ERR_OK;
+    for (int i = 0; i < w->n; i++) most = fmax(most, w->sensitivity[i]);
+    for (int i = 0; i < w->n; i++)
+        if (w->sensitivity[i] > 0)
+            w->k[i] = count_of(c, w->n, cool(c, w->n, w->k[i], coldest) * (most / w->sensitivity[i]), coldest);
+    double last = w->last_cost, best = w->r->best, apart = fabs(last - best);
+    w->t0 = fmin(w->t0, fmax(fmax(fabs(last), fabs(best)), apart));
+    if (!(w->t0 > 0)) w->t0 = DBL_MIN;
+    t = fmin(fmax(apart, t), w->t0);
+    w->k_accept = count_of(w->o->cost_scale * c, w->n, t / w->t0, COLDEST);
+    w->r->n_reanneal++;
+    return PAL_ERR_OK;
+}
+
+static bool is_accepted(const walk *w, double cost, int64_t number)
+{
+    if (cost == DBL_MAX) return false;
+    double rise = cost - w->last_cost;
+    return rise <= 0 || pal_random_unit(key_of(w, number), 0) < exp(-rise / acceptance_temperature(w));
+}
+
+/* one batch of candidates, up to the first that is accepted */
+static pal_err advance(walk *w)
+{
+    const pal_anneal_options *o = w->o;
+    const int64_t number = w->r->n_evaluation;
+    int m = allowed(w, o->reanneal_generated > 0 ? o->reanneal_generated - w->since_generated : INT64_MAX);
+    for (int j = 0; j < m; j++) draw_candidate(w, number + j, j, w->p + (size_t)j * (size_t)w->n);
+    PAL_TRY(evaluate(w, m));
+    bool accepted = false;
+    for (int j = 0; j < m && !accepted && !w->ended; j++) {
+        accepted = is_accepted(w, w->cost[j], number + j);
+        w->since_generated++;
+        if (accepted) {
+            w->k_accept++;
+            w->since_accepted++;
+            w->last_cost = w->cost[j];
+            memcpy(w->last, w->p + (size_t)j * (size_t)w->n, sizeof(double) * (size_t)w->n);
+        }
+        enter(w, j, (pal_anneal_step){.accepted = accepted});
+    }
+    bool due = (o->reanneal_accepted > 0 && w->since_accepted >= o->reanneal_accepted) ||
+               (o->reanneal_generated > 0 && w->since_generated >= o->reanneal_generated);
+    return due && !w->ended ? reanneal(w) : PAL_ERR_OK;
+}
+
+static pal_err check_box(const pal_anneal_options *o, pal_note *note)
+{
+    if (o->n_parameter < 1 || !o->low || !o->high)
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: %d parameters, wanted 1 at least", o->n_parameter);
+    for (int i = 0; i < o->n_parameter; i++) {
+        double low = o->low[i], high = o->high[i];
+        if (!(low < high) || !isfinite(high - low))
+            return pal_note_set(note, PAL_ERR_REFUSED,
+                                "annealing: parameter %d lies between %g and %g, which is no range", i, low, high);
+        if (o->first && !(o->first[i] >= low && o->first[i] <= high))
+            return pal_note_set(note, PAL_ERR_REFUSED, "annealing: parameter %d begins at %g, outside of %g to %g", i,
+                                o->first[i], low, high);
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err check_numbers(const pal_anneal_options *o, pal_note *note)
+{
+    if (o->n_start < 0 || o->n_temper < 1 || o->n_batch < 1 || o->n_batch > PAL_ANNEAL_MOST_BATCH)
+        return pal_note_set(
+            note, PAL_ERR_REFUSED,
+            "annealing: n_start %d, n_temper %d, n_batch %d, wanted 0, 1 and 1 at least, n_batch at most %d",
+            o->n_start, o->n_temper, o->n_batch, (int)PAL_ANNEAL_MOST_BATCH);
+    if (!(o->ratio_scale > 0 && o->ratio_scale < 1))
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: ratio_scale %g, wanted between 0 and 1", o->ratio_scale);
+    if (!(o->anneal_scale > 0 && isfinite(o->anneal_scale) && rate(o) > 0 && isfinite(rate(o))))
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: anneal_scale %g, wanted above 0", o->anneal_scale);
+    if (!(o->cost_scale > 0 && o->cost_scale * rate(o) > 0 && isfinite(o->cost_scale * rate(o))))
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: cost_scale %g, wanted above 0", o->cost_scale);
+    if (!(o->coldest > 0 && o->coldest < 1))
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: coldest %g, wanted between 0 and 1", o->coldest);
+    if (!(o->difference > 0 && o->difference <= 0.5))
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: difference %g, wanted above 0 and at most 0.5",
+                            o->difference);
+    if (isnan(o->enough) || !o->evaluate)
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: enough is no number, or there is nothing to evaluate");
+    if (o->most_evaluation <= 0 && o->stall <= 0 && !o->step)
+        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: no limit of evaluations, no stall and no step: no end");
+    return PAL_ERR_OK;
+}
+
+static pal_err go(walk *w)
+{
+    PAL_TRY(start(w));
+    if (w->r->best == DBL_MAX)
+        return pal_note_set(w->note, PAL_ERR_NUMERIC, "annealing: none of %lld points had a value",
+                            (long long)w->r->n_evaluation);
+    while (!w->ended) PAL_TRY(advance(w));
+    return PAL_ERR_OK;
+}
+
+pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_note *note)
+{
+    const pal_anneal_options *o = options;
+    *result = (pal_anneal_result){.best = DBL_MAX};
+    PAL_TRY(check_box(o, note));
+    PAL_TRY(check_numbers(o, note));
+    walk w = {.o = o, .r = result, .note = note, .n = o->n_parameter, .n_batch = o->n_batch, .last_cost = DBL_MAX};
+    const size_t n = (size_t)w.n, batch = (size_t)w.n_batch;
+    /* best, last, k, sensitivity and its centre; then the batch */
+    double *memory = calloc(5 + batch, sizeof(double) * n);
+    w.cost = calloc(batch, sizeof *w.cost);
+    pal_err err = PAL_ERR_OK;
+    if (!memory || !w.cost) {
+        err = pal_note_set(note, PAL_ERR_MEMORY, "annealing: no memory for %d points of %d parameters", w.n_batch, w.n);
+    } else {
+        w.best = memory;
+        w.last = memory + n;
+        w.k = memory + 2 * n;
+        w.sensitivity = memory + 3 * n;
+        w.p = memory + 5 * n;
+        for (int i = 0; i < w.n; i++) w.best[i] = o->first ? o->first[i] : 0.5 * o->low[i] + 0.5 * o->high[i];
+        err = go(&w);
+        memcpy(best_p, w.best, sizeof(double) * n);
+        result->temperature = result->best < DBL_MAX ? acceptance_temperature(&w) : 0;
+    }
+    free(w.cost);
+    free(memory);
+    return err;
+}
