@@ -221,6 +221,7 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
         REQUIRE(r.n_evaluation == 213);
+        CHECK_INT(r.n_spent, 213); /* nothing accepted, nothing thrown away, nothing beyond the limit */
         CHECK_INT(r.n_accepted, 0);
         CHECK_INT(r.n_failed, 200);
         CHECK_NEAR(r.best, 3, 0);
@@ -246,25 +247,39 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
     for (int i = 0; i < 3; i++) CHECK_LE(kolmogorov(u[i], n), 1.95);
 }
 
-static void cools_the_acceptance_by_what_was_accepted(void)
+/* T_acc after the given number of evaluations of a cost that sinks by 1 each time, from 1000 */
+static double cooled(double cost_scale, const double *first, int reanneal_accepted, int64_t most)
 {
     static task t;
     pal_anneal_options o = begin(&t, sinking, 2, -1, 1);
     o.n_batch = 1; /* this cost counts its calls */
     o.n_start = 10;
-    o.reanneal_accepted = 0;
-    o.most_evaluation = 10 + 9;
+    o.first = first;
+    o.cost_scale = cost_scale;
+    o.reanneal_accepted = reanneal_accepted;
+    o.most_evaluation = most;
     double p[2];
     pal_anneal_result r;
-    REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
-    CHECK_INT(r.n_accepted, 9);
+    if (pal_anneal(&o, p, &r, NULL)) return -1;
+    CHECK_INT(r.n_accepted + 2 * r.n_reanneal, most - 10 - (first != NULL));
+    CHECK_NEAR(r.best, 1001 - (double)most, 0);
+    return r.temperature;
+}
+
+static void cools_the_acceptance_by_what_was_accepted(void)
+{
     /* T0 = mean of 1000, 999, 998, 997, 996; c = 1.15129; k = 9: T0 exp(-3 c) */
-    CHECK_NEAR(r.temperature, 998 * exp(-3 * 1.1512925465), 1e-6);
-    CHECK_NEAR(r.best, 1000 - 18, 0);
-    o.cost_scale = 2;
-    begin(&t, sinking, 2, -1, 1);
-    REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
-    CHECK_NEAR(r.temperature, 998 * exp(-6 * 1.1512925465), 1e-6);
+    const double c = 1.1512925465, first[2] = {0, 0};
+    CHECK_NEAR(cooled(1, NULL, 0, 19), 998 * exp(-3 * c), 1e-6);
+    CHECK_NEAR(cooled(2, NULL, 0, 19), 998 * exp(-6 * c), 1e-6);
+    CHECK_NEAR(cooled(1, first, 0, 20), 997 * exp(-3 * c), 1e-6); /* the first point is no sample */
+    /* after five accepted, the last 986, two differences, the best 984: T0 = 986, T_acc as it was, its count from it */
+    double k = pow(log(986 / (998 * exp(-sqrt(5) * c))) / c, 2);
+    CHECK_NEAR(cooled(1, NULL, 5, 20), 986 * exp(-sqrt(k + 3) * c), 1e-6);
+    /* colder than last - best = 2: T_acc = 2 */
+    double cold = 998 * exp(-6 * sqrt(5) * c), from = pow(log(986 / fmax(2, cold)) / (6 * c), 2);
+    CHECK(cold < 2);
+    CHECK_NEAR(cooled(6, NULL, 5, 20), 986 * exp(-6 * sqrt(from + 3) * c), 1e-9);
 }
 
 /* two levels, 1 in the left half, 2 in the right one */
