@@ -79,6 +79,41 @@ static pal_err check_support(const pal_body_def *body, int index, pal_note *note
     return PAL_ERR_OK;
 }
 
+pal_err pal_spring_grid_check(const pal_body_def *def, pal_note *note)
+{
+    static const char *const list[3] = {"k_distance_J", "k_area_J", "k_volume_J"};
+    const pal_spring_grid *g = &def->spring_grid;
+    const char *name = def->name;
+    double count = 1;
+    if (!g->n[0] && !g->n[1] && !g->n[2] && !g->k_J[0] && !g->k_J[1] && !g->k_J[2]) return PAL_ERR_OK;
+    if (strcmp(def->model.name, "tet_springs") != 0)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model.grid: model \"%s\" has no springs; \"tet_springs\" takes a grid", name,
+                            def->model.name);
+    for (int c = 0; c < 3; c++) {
+        if (g->n[c] < 1)
+            return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.n[%d]: %d nodes, wanted 1 or more", name,
+                                c, g->n[c]);
+        if (!isfinite(g->low_m[c]) || !isfinite(g->high_m[c]) || (g->n[c] > 1 && !(g->high_m[c] > g->low_m[c])))
+            return pal_note_set(note, PAL_ERR_REFUSED,
+                                "body \"%s\" model.grid: low_m[%d] %g is not below high_m[%d] %g", name, c, g->low_m[c],
+                                c, g->high_m[c]);
+        count *= g->n[c];
+    }
+    if (count > 1 << 20)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, at most %d", name, count,
+                            1 << 20);
+    if (!g->k_J[0] && !g->k_J[1] && !g->k_J[2])
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model.grid: gives neither k_distance_J, k_area_J nor k_volume_J", name);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; g->k_J[k] && i < (int)count; i++)
+            if (!(g->k_J[k][i] >= 1e-60 && g->k_J[k][i] <= 1e60))
+                return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.%s[%d]: %g is outside [1e-60, 1e+60]",
+                                    name, list[k], i, g->k_J[k][i]);
+    return PAL_ERR_OK;
+}
+
 static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
 {
     const pal_body_def *body = &scene->body[index];
@@ -97,6 +132,7 @@ static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
                             PAL_REGION_MAX);
     for (int i = 0; i < body->n_support; i++) PAL_TRY(check_support(body, i, note));
     for (int i = 0; i < body->n_region; i++) PAL_TRY(pal_region_check(body, i, note));
+    PAL_TRY(pal_spring_grid_check(body, note));
     pal_material material = body->material;
     pal_note why = {{0}};
     if (pal_material_check(&material, &why))

@@ -32,7 +32,8 @@ typedef struct pal_region {
 } pal_region;
 
 /* constants of springs that vary over the body (model tet_springs, paper B 3.5): values at the nodes of a grid,
- * trilinear between them; a spring takes the mean over its corners. Numbers are borrowed, x fastest */
+ * trilinear between them, the border's values beyond; a spring takes the mean over its corners at rest. At most 2^20
+ * nodes. Numbers are borrowed, x fastest */
 typedef struct pal_spring_grid {
     int n[3];                   /* nodes; n[0] 0: no grid                               */
     double low_m[3], high_m[3]; /* body frame                                          */
@@ -101,6 +102,9 @@ void pal_material_over(const pal_body_def *def, const pal_material *base, const 
 /* REFUSED names body, regions[index], key and number: a box or grid that is none, numbers out of range or not given.
  * Poisson ratios above 0.4999 and below 0.5 are taken as 0.4999 */
 pal_err pal_region_check(const pal_body_def *def, int index, pal_note *note);
+/* REFUSED names body, axis or list, index and number: a grid of springs that is none, constants that are not above 0,
+ * a model that takes none. A body without one is fine */
+pal_err pal_spring_grid_check(const pal_body_def *def, pal_note *note);
 /* REFUSED names the entry: no body, bad numbers, two bodies of one name, tool radius, step outside [1e-4, 0.1] s */
 pal_err pal_scene_check(const pal_scene *scene, pal_note *note);
 #endif

@@ -116,6 +116,7 @@ typedef struct pal_effect {
     bool implicit; /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
     /* FORCE: adds to sum [n_node] the row's field times volume and to volume_m3 [n_node] the volume it stands for */
     void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
+    unsigned fields;                                         /* what measure gives, 1 << pal_field each */
     void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
     void (*destroy)(void *self); /* what make took beside the arena (threads, factors); NULL: nothing. [load] */
 } pal_effect;

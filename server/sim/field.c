@@ -9,15 +9,16 @@ bool pal_field_given(const pal_plan *plan, int body, pal_field field)
     if (plan->body[body].n_shown == 0) return false;
     bool given = field == PAL_FIELD_DISPLACEMENT_M;
     for (int i = 0; i < plan->n_of[PAL_STAGE_FORCE][body]; i++)
-        given = given || plan->row[plan->first[PAL_STAGE_FORCE][body] + i].effect->measure;
+        given = given || plan->row[plan->first[PAL_STAGE_FORCE][body] + i].effect->fields >> field & 1;
     return given;
 }
 
 static pal_err refuse(const pal_plan *plan, int body, pal_field field, pal_note *note)
 {
     if (body < 0 || body >= plan->n_body) return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist", body);
-    return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" gives no %s: its model has no finite elements",
-                        plan->body[body].name, pal_field_title(field));
+    return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" gives no %s: its model has no %s", plan->body[body].name,
+                        pal_field_title(field),
+                        field == PAL_FIELD_STIFFNESS_J ? "edges that are springs" : "finite elements");
 }
 
 pal_err pal_field_check(const pal_plan *plan, pal_note *note)

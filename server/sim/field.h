@@ -10,7 +10,7 @@ typedef struct pal_field_rows {
     void *self[PAL_BODY_MAX][PAL_FIELD_COUNT];
 } pal_field_rows;
 
-/* displacement of what is shown; stress and energy where a FORCE row can measure */
+/* displacement of what is shown; the others where a FORCE row can measure them */
 bool pal_field_given(const pal_plan *plan, int body, pal_field field);
 /* REFUSED: an entry of the scene asks for what the body's model does not give */
 pal_err pal_field_check(const pal_plan *plan, pal_note *note);

@@ -2,6 +2,7 @@
 #include "server/sim/spring_law.h"
 
 #include "server/base/vec3.h"
+#include "server/num/trilinear.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -25,9 +26,19 @@ static double derived_J(const pal_spring *spring, const pal_material *material, 
 
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out)
 {
-    *out = (pal_spring){.kind = kind, .given = pal_item_has(item, "k_J")};
+    bool on_grid = build->def->spring_grid.k_J[kind] != NULL, given = on_grid || pal_item_has(item, "k_J");
+    const char *weights = given ? "equal" : "volume";
+    *out = (pal_spring){.kind = kind, .given = given, .on_grid = on_grid};
+    if (on_grid && pal_item_has(item, "k_J"))
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.k_J: stands beside a grid that gives the same",
+                            item->path);
+    PAL_TRY(pal_item_text(item, "weights", &weights, build->note));
+    if (strcmp(weights, "equal") != 0 && strcmp(weights, "volume") != 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.weights: \"%s\", wanted \"equal\" or \"volume\"",
+                            item->path, weights);
+    out->by_volume = weights[0] == 'v';
     PAL_TRY(pal_item_bool(item, "without_area", &out->without_area, build->note));
-    out->k_J = derived_J(out, &build->def->material, build->body->h_m);
+    out->k_J = on_grid ? 1 : derived_J(out, &build->def->material, build->body->h_m);
     PAL_TRY(pal_item_number(item, "k_J", 0, 1e60, &out->k_J, build->note));
     PAL_TRY(pal_item_number(item, "c_Js", 0, 1e60, &out->c_Js, build->note));
     PAL_TRY(pal_item_done(item, build->note));
@@ -105,7 +116,7 @@ pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const
                            int n_corner, double *out)
 {
     for (int i = 0; i < n_item; i++) out[i] = 1;
-    if (spring->given) return PAL_ERR_OK;
+    if (!spring->by_volume) return PAL_ERR_OK;
     known *table = calloc((size_t)n_item + 1, sizeof *table);
     if (!table) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_item; i++) {
@@ -122,4 +133,32 @@ pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const
         out[i] *= l2 / (h * h * h * h * h);
     }
     return PAL_ERR_OK;
+}
+
+static double node_constant(const pal_spring_grid *g, pal_spring_kind kind, const double x[3])
+{
+    const pal_grid grid = {{g->n[0], g->n[1], g->n[2]},
+                           {g->low_m[0], g->low_m[1], g->low_m[2]},
+                           {g->high_m[0], g->high_m[1], g->high_m[2]}};
+    return pal_trilinear_at(&grid, g->k_J[kind], x);
+}
+
+void pal_spring_nodes(const pal_spring_grid *grid, pal_spring_kind kind, const pal_body *body, double *out_J)
+{
+    for (int i = 0; i < body->n_node; i++) out_J[i] = node_constant(grid, kind, body->x_rest + 3 * (size_t)i);
+}
+
+void pal_spring_on_grid(pal_spring *spring, const pal_spring_grid *grid, const pal_body *body, const int32_t *item,
+                        int n_item, int n_corner, double *weight)
+{
+    if (!spring->on_grid || n_item == 0) return;
+    double mean_J = 0;
+    for (int i = 0; i < n_item; i++) {
+        double k_J = 0;
+        for (int c = 0; c < n_corner; c++)
+            k_J += node_constant(grid, spring->kind, body->x_rest + 3 * (size_t)item[n_corner * i + c]) / n_corner;
+        weight[i] *= k_J;
+        mean_J += k_J / n_item;
+    }
+    spring->c_Js /= mean_J;
 }

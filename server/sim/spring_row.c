@@ -9,10 +9,13 @@ static void corners_at(const double *x, const int32_t *node, int n, const double
     for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * node[c < n ? c : 0];
 }
 
-static pal_err fill(pal_spring_row *row, const pal_body *body, pal_arena *arena, double *weight)
+static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
 {
+    const pal_body *body = build->body;
+    pal_arena *arena = build->arena;
     PAL_TRY(pal_strips_make(body->slots, row->item, row->n_item, row->n_corner, arena, &row->strips));
     PAL_TRY(pal_spring_weights(&row->spring, body, row->item, row->n_item, row->n_corner, weight));
+    pal_spring_on_grid(&row->spring, &build->def->spring_grid, body, row->item, row->n_item, row->n_corner, weight);
     row->w = PAL_NEW(arena, double, row->strips.n_lane);
     row->q = PAL_NEW(arena, double, row->strips.n_lane);
     if (!row->w || !row->q) return PAL_ERR_MEMORY;
@@ -46,7 +49,7 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
         return PAL_ERR_MEMORY;
     }
     memcpy(out->item, item, n * sizeof *item);
-    pal_err err = fill(out, body, build->arena, weight);
+    pal_err err = fill(out, build, weight);
     free(weight);
     return err;
 }

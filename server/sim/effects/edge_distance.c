@@ -13,7 +13,8 @@
 
 typedef struct edge_distance {
     pal_spring_row row; /* first: see pal_spring_row_material */
-    double *node_bound; /* sum of 2 q / l0^2 over the edges of each node [n_dof] */
+    double *node_bound; /* sum of 2 q / l0^2 over the edges of each node            [n_dof] */
+    double *node_J;     /* constants at the nodes, of a grid; NULL: all are row.k_J [n_dof] */
 } edge_distance;
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -32,6 +33,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     for (int i = 0; i < 2 * e->row.n_item; i++) {
         int lane = e->row.strips.place[i / 2];
         e->node_bound[e->row.item[i]] += 2 * e->row.q[lane] * e->row.w[lane] * e->row.w[lane];
+    }
+    if (e->row.spring.on_grid) {
+        e->node_J = PAL_NEW(build->arena, double, build->body->n_dof);
+        if (!e->node_J) return PAL_ERR_MEMORY;
+        pal_spring_nodes(&build->def->spring_grid, PAL_SPRING_DISTANCE, build->body, e->node_J);
     }
     *self = e;
     return PAL_ERR_OK;
@@ -95,6 +101,18 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
     for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += e->row.spring.c_Js * e->node_bound[i];
 }
 
+/* the constant as the scene gives it, before the springs' weights: those differ from edge to edge of a lattice, and a
+ * uniform body would look chequered */
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    const edge_distance *e = self;
+    if (field != PAL_FIELD_STIFFNESS_J) return;
+    for (int i = 0; i < body->n_dof; i++) {
+        sum[i] += e->node_J ? e->node_J[i] : e->row.spring.k_J;
+        volume_m3[i] += 1;
+    }
+}
+
 const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .stage = PAL_STAGE_FORCE,
                                              .internal = true,
@@ -103,4 +121,6 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .energy = energy,
                                              .stiffness = stiffness,
                                              .damping = damping,
-                                             .material = pal_spring_row_material};
+                                             .material = pal_spring_row_material,
+                                             .measure = measure,
+                                             .fields = 1u << PAL_FIELD_STIFFNESS_J};

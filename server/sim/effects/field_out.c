@@ -1,14 +1,16 @@
-/* A field shown in colour: displacement, von Mises stress or strain energy density at the shown vertices. The row is
+/* A field shown in colour: displacement, von Mises stress, strain energy density or edge stiffness at the shown
+ * vertices. The row is
  * there while somebody looks: pal_world_field adds it to a running world, or the scene has an entry for it. It takes no
  * part in the simulation: nothing that moves reads it.
  *
- * Stress and energy: every FORCE row that can measure adds its value times volume to the nodes of its elements, and the
- * volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of the
- * nodes that it is skinned to, with the skin's own weights (mesh/skin.h), or is a node itself. Displacement is the
+ * All but displacement: every FORCE row that can measure adds its value times volume to the nodes of its elements, and
+ * the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of
+ * the nodes that it is skinned to, with the skin's own weights (mesh/skin.h), or is a node itself. Displacement is the
  * distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
  * diverged is for its guard to say.
  *
- * Keys: field ("displacement" | "von_mises" | "energy"), rate_hz (10): so often in simulated time it is taken anew. */
+ * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness"), rate_hz (10): so often in simulated time it is
+ * taken anew. */
 #include "server/sim/effect_list.h"
 
 #include <math.h>
@@ -33,7 +35,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     pal_field kind = pal_field_find(name);
     if (kind == PAL_FIELD_NONE)
         return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: there is no field \"%s\" (displacement, von_mises, energy)", item->path, name);
+                            "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness)", item->path,
+                            name);
     if (body->n_shown == 0 || !body->surface)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body shows nothing that could be coloured",
                             item->path);

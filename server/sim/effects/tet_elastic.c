@@ -229,4 +229,5 @@ const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
                                            .material = material,
                                            .reset = reset,
                                            .tangent = &tangent,
-                                           .measure = measure};
+                                           .measure = measure,
+                                           .fields = 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3};

@@ -2,11 +2,17 @@
  * volumes (paper B section 4.1, in the corrected form of numerics.md 1 B).
  *
  * Keys: k_distance_J, k_area_J, k_volume_J (absent: derived from E, nu and h; 0: no such row), c_distance_Js,
- * c_area_Js, c_volume_Js (damping of the constraint, default 0). Where k_area_J is 0 the derived constants of edges and
- * volumes give the same moduli without it: a row less, about half the time. The row `viscous` exists when the
+ * c_area_Js, c_volume_Js (damping of the constraint, default 0), weights ("equal": every spring of a row has its
+ * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
+ * are given, volume where they are derived).
+ *
+ * Constants that vary over the body stand on the body's spring_grid (paper B 3.5) in place of their keys; with a grid
+ * there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived constants of
+ * edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous` exists when the
  * material's damping rate is given. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/spring_law.h"
 
 #include <string.h>
 
@@ -23,20 +29,40 @@ static void lump_mass(const pal_tets *tets, double density_kg_m3, double *mass_k
     }
 }
 
-static pal_err add_spring(pal_item *item, const char *effect, const char *k_key, const char *c_key, pal_recipe *out,
+static const char *const effect_name[3] = {"edge_distance", "face_area", "tet_volume"},
+                         *const k_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"},
+                         *const c_key[3] = {"c_distance_Js", "c_area_Js", "c_volume_Js"};
+
+/* no area springs: the others bear their share */
+static pal_err is_without_area(pal_item *item, const pal_spring_grid *grid, bool *out, pal_note *note)
+{
+    bool on_grid = grid->k_J[PAL_SPRING_DISTANCE] || grid->k_J[PAL_SPRING_AREA] || grid->k_J[PAL_SPRING_VOLUME];
+    double k_J = on_grid ? 0 : -1;
+    PAL_TRY(pal_item_number(item, k_key[PAL_SPRING_AREA], 0, 1e60, &k_J, note));
+    *out = k_J == 0 && !grid->k_J[PAL_SPRING_AREA];
+    return PAL_ERR_OK;
+}
+
+static pal_err add_spring(pal_item *item, pal_spring_kind kind, const pal_spring_grid *grid, pal_recipe *out,
                           pal_note *note)
 {
     double k_J = -1, c_Js = 0;
-    PAL_TRY(pal_item_number(item, k_key, 0, 1e60, &k_J, note));
-    PAL_TRY(pal_item_number(item, c_key, 0, 1e60, &c_Js, note));
-    if (k_J == 0) return PAL_ERR_OK;
+    bool without_area = false;
+    const char *weights = NULL;
+    PAL_TRY(pal_item_number(item, k_key[kind], 0, 1e60, &k_J, note));
+    PAL_TRY(pal_item_number(item, c_key[kind], 0, 1e60, &c_Js, note));
+    PAL_TRY(pal_item_text(item, "weights", &weights, note));
+    PAL_TRY(is_without_area(item, grid, &without_area, note));
+    if (grid->k_J[kind] && pal_item_has(item, k_key[kind]))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s.%s: stands beside a grid that gives the same", item->path,
+                            k_key[kind]);
+    if (k_J == 0 || (kind == PAL_SPRING_AREA && without_area)) return PAL_ERR_OK;
     pal_item *row = &out->row[out->n_row++];
-    double k_area_J = -1;
-    pal_item_init(row, item->path, effect);
-    PAL_TRY(pal_item_number(item, "k_area_J", 0, 1e60, &k_area_J, note));
-    if (k_area_J == 0) PAL_TRY(pal_item_put_bool(row, "without_area", true, note));
+    pal_item_init(row, item->path, effect_name[kind]);
+    if (without_area) PAL_TRY(pal_item_put_bool(row, "without_area", true, note));
     if (k_J > 0) PAL_TRY(pal_item_put_number(row, "k_J", k_J, note));
     if (c_Js > 0) PAL_TRY(pal_item_put_number(row, "c_Js", c_Js, note));
+    if (weights) PAL_TRY(pal_item_put_text(row, "weights", weights, note));
     return PAL_ERR_OK;
 }
 
@@ -46,9 +72,9 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     const pal_material *material = &build->def->material;
     pal_body *body = build->body;
     out->n_row = 0;
-    PAL_TRY(add_spring(item, "edge_distance", "k_distance_J", "c_distance_Js", out, build->note));
-    PAL_TRY(add_spring(item, "face_area", "k_area_J", "c_area_Js", out, build->note));
-    PAL_TRY(add_spring(item, "tet_volume", "k_volume_J", "c_volume_Js", out, build->note));
+    PAL_TRY(pal_spring_grid_check(build->def, build->note));
+    for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
+        PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
     PAL_TRY(pal_item_done(item, build->note));
     if (material->damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
     pal_item_init(&out->row[out->n_row++], item->path, "verlet");
