@@ -5,6 +5,8 @@
  * that the surface cuts are scaled by its filled share, at least 0.02 of it, numerics.md part 2 and Meshing).
  *
  * Rows: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver implicit_euler.
+ * Under static_newton a neo_hookean body never untangles on its split, which is another material (corotational, nu 0.3
+ * at most): a corner turned over at a clamped edge is part of the discrete rest state, and the law is sound there.
  * Masses are lumped: equal shares to the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a
  * corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the mesh's own nodes, so
  * that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
@@ -57,6 +59,9 @@ static pal_err list_rows(const pal_item *item, const pal_build *build, const fem
     PAL_TRY(pal_item_put_text(row, "element", choice->element, build->note));
     if (choice->law) PAL_TRY(pal_item_put_text(row, "law", choice->law, build->note));
     PAL_TRY(pal_item_put_bool(row, "fill", choice->fill, build->note));
+    bool own_law =
+        choice->law && !strcmp(choice->law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
+    if (own_law) PAL_TRY(pal_item_put_bool(row, "untangle", false, build->note));
     if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
     pal_item_init(&out->row[out->n_row++], item->path, "implicit_euler");
     return PAL_ERR_OK;

@@ -6,10 +6,16 @@
  *   direct: by a factor of the present K, made anew in every iteration (once for the linear law),
  *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
  *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
- *           made of the present K before the next.
+ *           made of the present K before the next; where that happens again at once, before every one until an
+ *           iteration leaves a tenth of the residual or less.
  * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
- * of forces along each direction, system.h) by conjugate gradients with the same factor, as far as it is positive
- * (truncated Newton; Nash 2000): half the iterations or fewer on a bent beam.
+ * of forces along each direction, system.h) by conjugate gradients with the same factor (truncated Newton; Nash 2000):
+ * half the iterations or fewer on a bent beam. Where that meets a direction of no positive curvature before it has
+ * done its work, what it found is dropped and K taken: far from rest a nearly incompressible body has pressures by
+ * accident, its true stiffness is indefinite, and the ways cut short there led a body of nu 0.499 nowhere.
+ *
+ * The line search asks for a fall of the energy; where the fall to come is lost in the rounding of the energy, it asks
+ * for the slope at the point tried (approximate Wolfe condition; Hager & Zhang 2005).
  *
  * Converged: the Euclidean norm of the residual force at free nodes is at most `tolerance` times the larger of the sums
  * of |load| over all nodes and of |reaction| over held ones. Loads (lasting, contact, gravity) are taken up in
@@ -51,6 +57,8 @@ typedef struct static_newton {
     double *inertia;        /* what balances the loads; NULL: no relief              [n_node][3] */
     double shift_1_s2;      /* eps                                           */
     bool has_factor, stale; /* a factor is there; it is not worth its while  */
+    bool eager;             /* nor was it in the iteration after its own: one is made in every iteration */
+    int age;                /* solves with the factor */
     bool exact;             /* the tangent is too slow here: the true stiffness */
     int calm;               /* iterations left without it */
     int part;               /* of the load, of load_steps                    */
@@ -62,6 +70,10 @@ static const double relief_share = 1e-8, flops_per_nonzero = 20;
 /* an iteration that leaves more than this of the residual was a slow one */
 static const double slow = 0.1;
 static const double most_move_S = 0.2;
+/* what conjugate gradients on the true stiffness may leave of the residual where they are cut short */
+static const double enough = 0.1;
+/* energies that differ by less of their size are level (Hager & Zhang 2005), ways of less of a voxel's edge short */
+static const double level_share = 1e-6, short_h = 1e-4;
 /* iterations by the tangent alone after the true stiffness has led nowhere */
 enum { CALM = 4 };
 
@@ -161,6 +173,7 @@ static pal_err factor(static_newton *row)
     PAL_TRY(pal_warp_factor(&row->warp, &row->blocks));
     row->has_factor = true;
     row->stale = false;
+    row->age = 0;
     return PAL_ERR_OK;
 }
 
@@ -301,45 +314,72 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
     return PAL_ERR_OK;
 }
 
+/* its sum, and the sum of its parts' sizes, which its rounding goes with */
+typedef struct energy {
+    double sum_J, size_J;
+} energy;
+
+static void add_energy(energy *to, double part_J)
+{
+    to->sum_J += part_J;
+    to->size_J += fabs(part_J);
+}
+
 /* energy of the rows less the work of loads since x0, those of inertia relief as of the last residual */
-static double potential(static_newton *row)
+static energy potential(static_newton *row)
 {
     const pal_body *body = row->system.body;
-    double sum = 0, *p = row->cg.p, *q = row->cg.q;
+    energy all = {0};
+    double *p = row->cg.p, *q = row->cg.q;
     for (int i = 0; i < row->system.n_force; i++) {
         const pal_row *force = &row->system.force[i];
-        if (force->effect->internal && force->effect->energy) sum += force->effect->energy(force->self, body);
+        if (force->effect->internal && force->effect->energy)
+            add_energy(&all, force->effect->energy(force->self, body));
     }
     for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
-    sum -= share(row) * pal_sum_products(row->cg.n, row->outer, p);
-    if (row->relieved) sum -= pal_sum_products(row->cg.n, row->inertia, p);
+    add_energy(&all, -share(row) * pal_sum_products(row->cg.n, row->outer, p));
+    if (row->relieved) add_energy(&all, -pal_sum_products(row->cg.n, row->inertia, p));
     if (row->system.has_contact) {
         memset(q, 0, bytes3(row));
         pal_system_contact(&row->system, 1, 0, p, q);
-        sum += 0.5 * pal_sum_products(row->cg.n, p, q);
+        add_energy(&all, 0.5 * pal_sum_products(row->cg.n, p, q));
     }
-    return sum;
+    return all;
 }
 
 /* ---- an iteration ---- */
 
-/* conjugate gradients on K, or on the true stiffness: as far as that is positive along the way */
+/* conjugate gradients on the true stiffness from move = 0; 0: it is not positive along the way, move and cg.r are as
+ * before */
+static int run_true(static_newton *row, double target, double size)
+{
+    memcpy(row->now, row->system.body->x, bytes3(row));
+    row->cg.multiply = multiply_true;
+    int n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
+    row->cg.multiply = multiply;
+    row->report.n_cg += n;
+    if (n == row->iterations || row->cg.residual <= fmax(target, enough * size)) return n;
+    memcpy(row->cg.r, row->force, bytes3(row));
+    memset(row->move, 0, bytes3(row));
+    row->exact = false;
+    row->calm = CALM;
+    return 0;
+}
+
+/* conjugate gradients on K, or on the true stiffness where that is positive */
 static void run_gradients(static_newton *row, double size)
 {
     double target = 0.3 * row->tolerance * row->scale_N;
     if (!row->constant) target = fmax(target, row->cg_tolerance * size);
-    int n = 0;
-    if (row->exact) {
-        memcpy(row->now, row->system.body->x, bytes3(row));
-        row->cg.multiply = multiply_true;
+    int n = row->exact ? run_true(row, target, size) : 0;
+    if (n == 0) {
         n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
-        row->cg.multiply = multiply;
+        row->report.n_cg += n;
     }
-    if (n == 0) n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
     double worth = pal_cholesky_flops(row->warp.factor) /
                    (flops_per_nonzero * (double)(pal_cholesky_nonzeros(row->warp.factor) + 1));
     row->stale = n > fmin(fmax(worth, 10), 100);
-    row->report.n_cg += n;
+    row->eager |= ++row->age == 2 && row->stale;
 }
 
 /* move = K^-1 r */
@@ -348,7 +388,7 @@ static pal_err solve_linear(static_newton *row, double size)
     bool fresh = row->linear == LINEAR_DIRECT && !row->constant;
     bool direct = row->linear == LINEAR_DIRECT && !row->system.has_contact && !row->exact;
     memset(row->move, 0, bytes3(row));
-    if (!row->has_factor || fresh || (row->stale && row->linear == LINEAR_AUTO)) PAL_TRY(factor(row));
+    if (!row->has_factor || fresh || (row->linear == LINEAR_AUTO && (row->stale || row->eager))) PAL_TRY(factor(row));
     pal_warp_turn(&row->warp, &row->turns);
     double before = pal_clock_s();
     if (direct)
@@ -360,18 +400,41 @@ static pal_err solve_linear(static_newton *row, double size)
     return PAL_ERR_OK;
 }
 
+/* from x, along move */
+typedef struct way {
+    energy energy;    /* at x                          */
+    double size_N;    /* |residual| there              */
+    double slope_J;   /* what the energy promises to fall by along all of move, and falls by half of it */
+    double longest_m; /* move of a node                */
+} way;
+
+/* the point tried, at x + move, where energies cannot tell: the forces do. at_start, slope, size: at x */
+static bool is_flat(static_newton *row, pal_step *step, const way *from, double rise_J)
+{
+    const pal_body *body = row->system.body;
+    bool level = fabs(rise_J) <= level_share * from->energy.size_J, short_way = from->longest_m <= short_h * body->h_m;
+    double size;
+    if (!level && !short_way) return false;
+    if (row->relieved) memcpy(row->now, row->inertia, bytes3(row));
+    bool found = !find_residual(row, step, &size) &&
+                 fabs(pal_sum_products(row->cg.n, row->cg.r, row->move)) <= 0.8 * from->slope_J && size <= from->size_N;
+    if (row->relieved && !found) memcpy(row->inertia, row->now, bytes3(row));
+    return found;
+}
+
 /* x += step move with the largest step of 1, 1/2, 1/4 ... that lets the energy fall by a little of what the slope
- * promises; false: none does. at_start, x are those of the step's begin */
-static bool search(static_newton *row, double at_start, double slope)
+ * promises; false: none does */
+static bool search(static_newton *row, pal_step *at, const way *from)
 {
     pal_body *body = row->system.body;
-    double step = 1, done = 0, noise = 1e-12 * fabs(at_start);
+    double step = 1, done = 0, noise = 1e-12 * from->energy.size_J;
     bool found = !row->system.has_energy || row->constant;
     for (;; step *= 0.5) {
         for (int i = 0; i < row->cg.n; i++) body->x[i] += (step - done) * row->move[i];
         done = step;
         if (found) break;
-        found = potential(row) <= at_start - 1e-4 * step * slope + noise;
+        double rise = potential(row).sum_J - from->energy.sum_J;
+        found = rise <= noise - 1e-4 * step * from->slope_J || (step == 1 && is_flat(row, at, from, rise));
         if (found || step < 1e-4) break;
     }
     for (int i = 0; i < row->cg.n && !found; i++) body->x[i] -= done * row->move[i];
@@ -379,26 +442,27 @@ static bool search(static_newton *row, double at_start, double slope)
     return found;
 }
 
-static pal_err iterate(static_newton *row, double size, bool *moved)
+static pal_err iterate(static_newton *row, pal_step *step, double size, bool *moved)
 {
     const pal_body *body = row->system.body;
-    double longest = 0;
+    way from = {.size_N = size};
     memcpy(row->force, row->cg.r, bytes3(row));
     /* before the tangent is taken, which energies may disturb */
-    double at_start = row->constant ? 0 : potential(row);
+    if (!row->constant) from.energy = potential(row);
     pal_system_linearise(&row->system);
     pal_turns_take(&row->turns, &row->system);
     PAL_TRY(solve_linear(row, size));
-    double slope = pal_sum_products(row->cg.n, row->force, row->move);
-    for (int i = 0; i < body->n_node; i++) longest = fmax(longest, pal_norm3(row->move + 3 * i));
+    from.slope_J = pal_sum_products(row->cg.n, row->force, row->move);
+    for (int i = 0; i < body->n_node; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
     /* where the true stiffness nearly vanishes, the way is long and means little */
     double most = most_move_S * body->size_m;
-    if (row->exact && longest > most) {
-        for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / longest;
-        slope *= most / longest;
+    if (row->exact && from.longest_m > most) {
+        for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / from.longest_m;
+        from.slope_J *= most / from.longest_m;
+        from.longest_m = most;
     }
-    *moved = search(row, at_start, slope) && longest > 1e-15 * body->size_m;
+    *moved = search(row, step, &from) && from.longest_m > 1e-15 * body->size_m;
     return PAL_ERR_OK;
 }
 
@@ -408,7 +472,7 @@ static pal_err find_rest(static_newton *row, pal_step *step)
     pal_solve_report *to = &row->report;
     to->n_newton = to->n_cg = 0;
     double before = INFINITY;
-    row->exact = false;
+    row->exact = row->eager = false;
     row->calm = 0;
     for (bool moved = true;;) {
         double size;
@@ -423,9 +487,10 @@ static pal_err find_rest(static_newton *row, pal_step *step)
         if (!moved && row->exact) moved = true, row->calm = CALM;
         row->exact = !row->constant && row->calm == 0 && size > slow * before;
         row->calm -= row->calm > 0;
+        if (size <= slow * before) row->eager = false;
         before = size;
         if (to->converged || !moved || !isfinite(size) || to->n_newton == row->newton) return PAL_ERR_OK;
-        PAL_TRY(iterate(row, size, &moved));
+        PAL_TRY(iterate(row, step, size, &moved));
     }
 }
 
