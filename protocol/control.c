@@ -20,6 +20,7 @@ typedef enum field_type {
     F64,
     BOOL,
     TEXT,    /* char[size]                                      */
+    SAID,    /* the same, left out while it is empty            */
     ROLE,    /* pal_wire_role as its name                       */
     TOOL,    /* int: index, -1 any, none as null or absent      */
     NUMBERS, /* double[max], counted or FIXED                   */
@@ -69,6 +70,7 @@ static const field hello_fields[] = {
     {"session", TEXT, true, AT(pal_wire_hello, session), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
     {"title", TEXT, true, AT(pal_wire_hello, title), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"organ", TEXT, true, AT(pal_wire_hello, organ), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"accuracy", SAID, false, AT(pal_wire_hello, accuracy), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"step_rate_hz", F64, true, AT(pal_wire_hello, step_rate_hz), 0, 0, 0, NULL},
     {"frame_rate_hz", F64, true, AT(pal_wire_hello, frame_rate_hz), 0, 0, 0, NULL},
     {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
@@ -338,13 +340,15 @@ static void add_list(writer *w, const field *f, const uint8_t *base)
 
 static void add_fields(writer *w, const field *f, const uint8_t *base, bool first)
 {
-    for (; f->key && !w->refusal; f++, first = false) {
+    for (; f->key && !w->refusal; f++) {
+        if (f->type == SAID && !base[f->offset]) continue;
         add_key(w, f->key, first);
+        first = false;
         if (f->type == BOOL) {
             bool value;
             memcpy(&value, base + f->offset, sizeof value);
             add(w, value ? "true" : "false", value ? 4 : 5);
-        } else if (f->type == TEXT) {
+        } else if (f->type == TEXT || f->type == SAID) {
             add_text(w, (const char *)base + f->offset, f->size);
         } else if (f->type == OBJECT) {
             add(w, "{", 1);
@@ -516,7 +520,7 @@ static int read_fields(const field *f, const cJSON *object, uint8_t *base)
             const int none = PAL_WIRE_TOOL_NONE;
             if (f->type == TOOL) memcpy(base + f->offset, &none, sizeof none);
             if (f->required) refusal = PAL_REFUSAL_FIELD;
-        } else if (f->type == TEXT) {
+        } else if (f->type == TEXT || f->type == SAID) {
             refusal = read_text(item, (char *)base + f->offset, f->size);
         } else if (f->type == OBJECT) {
             refusal = read_fields(f->sub, item, base);

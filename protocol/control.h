@@ -79,8 +79,10 @@ typedef struct pal_wire_tool_info {
 typedef struct pal_wire_hello {
     uint32_t version; /* PAL_PROTOCOL_VERSION                                        */
     char session[PAL_WIRE_NAME_BYTES];
-    char title[PAL_WIRE_TEXT_BYTES]; /* for people                                                  */
-    char organ[PAL_WIRE_TEXT_BYTES]; /* which organ this is and where from: "liver, abdominal CT"   */
+    char title[PAL_WIRE_TEXT_BYTES];    /* for people                                                  */
+    char organ[PAL_WIRE_TEXT_BYTES];    /* which organ this is and where from: "liver, abdominal CT"   */
+    char accuracy[PAL_WIRE_TEXT_BYTES]; /* how far from its reference: "2.1 % RMS of finite elements"; "": nobody said,
+                                           and then it is not on the wire */
     double step_rate_hz, frame_rate_hz;
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */

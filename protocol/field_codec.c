@@ -10,7 +10,7 @@
 
 #define STAMP_MAX ((uint64_t)1 << 53)
 
-static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none", "displacement", "von_mises", "energy"};
+static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none", "displacement", "von_mises", "energy", "stiffness"};
 
 const char *pal_wire_field_name(pal_wire_field field)
 {

@@ -1,4 +1,4 @@
-/* FIELD: one number per shown vertex of one part, for colouring: displacement, stress, energy (README.md, "FIELD").
+/* FIELD: one number per shown vertex of one part, for colouring: displacement, stress ... (README.md, "FIELD").
  *
  * Values are quantised to one byte between the least and the largest of them and packed in one LZ4 block. A message
  * stands alone and is sent only to clients that asked with `view`. Error of a decoded value: half of (high - low) / 255
@@ -18,9 +18,11 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_DISPLACEMENT_M,
     PAL_WIRE_FIELD_VON_MISES_PA,
     PAL_WIRE_FIELD_ENERGY_J_M3,
+    PAL_WIRE_FIELD_STIFFNESS_J,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
-/* as in `view` and in parts: "none", "displacement", "von_mises", "energy"; never NULL. find: COUNT when unknown */
+/* as in `view` and in parts: "none", "displacement", "von_mises", "energy", "stiffness"; never NULL. find: COUNT when
+ * unknown */
 const char *pal_wire_field_name(pal_wire_field field);
 pal_wire_field pal_wire_field_find(const char *name);
 

@@ -227,7 +227,8 @@ int main(int argc, char **argv)
         {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MOST, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
-        {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL, "ask for displacement | von_mises | energy, check it"},
+        {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL,
+         "ask for displacement | von_mises | energy | stiffness, check it"},
         {"--slow", "BYTES_S", PAL_CLIENT_NUMBER, &slow, 1, 1e9, NULL, "read no faster than this"},
         {"--stall", "S", PAL_CLIENT_TEXT, &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
         {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "one JSON object on stdout"},
@@ -260,7 +261,8 @@ int main(int argc, char **argv)
         return 2;
     }
     if (field && (pal_wire_field_find(field) == PAL_WIRE_FIELD_COUNT || !strcmp(field, "none"))) {
-        fprintf(stderr, "palpate-trainee: --field wants displacement, von_mises or energy, not \"%s\"\n", field);
+        fprintf(stderr, "palpate-trainee: --field wants displacement, von_mises, energy or stiffness, not \"%s\"\n",
+                field);
         return 2;
     }
     signal(SIGINT, main_on_signal);

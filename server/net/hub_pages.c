@@ -66,12 +66,15 @@ static void get_sessions(pal_hub *hub, pal_reply *reply)
     for (int r = 0; r < hub->n_room; r++) {
         const pal_hub_room *room = &hub->room[r];
         const pal_scene *scene = pal_session_scene(room->session);
-        char title[512];
+        char title[512], accuracy[512];
         int n_free = 0;
         for (int t = 0; t < room->members.n_tool; t++) n_free += room->members.holder[t] == 0;
         pal_plain_json(title, sizeof title, scene->title);
-        add(&p, "%s{\"name\":\"%s\",\"title\":\"%s\",\"members\":%d,\"tools\":%d,\"free_tools\":%d,\"parts\":%d}",
-            r ? "," : "", scene->name, title, room->members.n_member, room->members.n_tool, n_free,
+        pal_plain_json(accuracy, sizeof accuracy, scene->accuracy);
+        add(&p,
+            "%s{\"name\":\"%s\",\"title\":\"%s\",\"accuracy\":\"%s\",\"members\":%d,\"tools\":%d,\"free_tools\":%d,"
+            "\"parts\":%d}",
+            r ? "," : "", scene->name, title, accuracy, room->members.n_member, room->members.n_tool, n_free,
             room->stream->n_part);
     }
     add(&p, "]}\n");

@@ -406,6 +406,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
     pal_plain_text(out->session, sizeof out->session, scene->name);
     pal_plain_text(out->title, sizeof out->title, scene->title);
     pal_plain_text(out->organ, sizeof out->organ, scene->source);
+    pal_plain_text(out->accuracy, sizeof out->accuracy, scene->accuracy);
     out->step_rate_hz = 1 / scene->step_s;
     out->frame_rate_hz = pal_stream_rate_hz(stream);
     double size = 0;

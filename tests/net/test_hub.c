@@ -126,6 +126,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     CHECK_TEXT(hello->session, "small");
     CHECK_TEXT(hello->you_name, "Ada");
     CHECK_TEXT(hello->title, "Small \"organ\"");
+    CHECK_TEXT(hello->accuracy, "2 % of \"truth\"");
     CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 && hello->n_row > 0);
     CHECK(hello->box_max_m[0] > hello->box_min_m[0] && hello->tool[0].radius_m > 0 && hello->credit >= 2);
     CHECK_INT(mem_pull(&ada, 1), 1);
@@ -500,8 +501,9 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     mem_join(&bob, road, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_tools > 2 && bob.n_tools > 2, &ada, &bob);
     const pal_wire_hello *hello = &ada.last[PAL_CONTROL_HELLO].hello;
-    CHECK_INT(hello->part[0].n_field, 1);
+    CHECK_INT(hello->part[0].n_field, 2);
     CHECK_TEXT(hello->part[0].field[0], "displacement");
+    CHECK_TEXT(hello->part[0].field[1], "stiffness");
     uint32_t n_row = hello->n_row;
     mem_text(&ada, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(ada.n_field > 0, &ada, &bob);

@@ -234,7 +234,7 @@ static void pages_tell_health_sessions_and_figures(void)
     CHECK_INT(get("/readyz", "", body, sizeof body, &n), 200);
     CHECK_INT(get("/sessions", "", body, sizeof body - 1, &n), 200);
     body[n] = 0;
-    CHECK(strstr(body, "\"name\":\"small\",\"title\":\"Small \\\"organ\\\"\""));
+    CHECK(strstr(body, "\"name\":\"small\",\"title\":\"Small \\\"organ\\\"\",\"accuracy\":\"2 % of \\\"truth\\\"\""));
     CHECK_INT(get("/metrics", "", body, sizeof body - 1, &n), 200);
     body[n] = 0;
     CHECK(strstr(body, "\npalpate_sessions 1\n") && strstr(body, "# TYPE palpate_inputs_total counter\n"));

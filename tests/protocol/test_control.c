@@ -117,7 +117,7 @@ static void refuses_text_beyond_the_limits_before_parsing_it(void)
     CHECK_INT(pal_control_get(text, n, false, &c), PAL_REFUSAL_JSON);
 }
 
-/* what servers and clients of before wrote: parts without fields, status without rows */
+/* what servers and clients of before wrote: parts without fields, no accuracy, status without rows */
 static void reads_messages_of_before_fields(void)
 {
     static const char hello[] =
@@ -131,8 +131,33 @@ static void reads_messages_of_before_fields(void)
         "\"skipped\":0,\"late\":0,\"refused\":0}";
     CHECK_INT(pal_control_get(hello, sizeof hello - 1, true, &c), 0);
     CHECK_INT(c.hello.part[0].n_field, 0);
+    CHECK_TEXT(c.hello.accuracy, "");
     CHECK_INT(pal_control_get(status, sizeof status - 1, true, &c), 0);
     CHECK_INT(c.status.n_row_name, 0);
+}
+
+/* an empty text is as good as none, and is not written */
+static void accuracy_is_said_only_where_there_is_one(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1], other[PAL_CONTROL_OUT_MAX + 1];
+    static pal_control hello;
+    size_t n;
+    golden_control(PAL_CONTROL_HELLO, &hello);
+    REQUIRE(pal_control_put(text, sizeof text, &hello, &n) == 0);
+    CHECK(!strstr(text, "accuracy"));
+    golden_accuracy(&hello.hello);
+    REQUIRE(pal_control_put(text, sizeof text, &hello, &n) == 0);
+    char *at = strstr(text, "\"organ\":"), *said = strstr(text, ",\"accuracy\":\"2.1 % RMS of finite elements");
+    CHECK(at && said && said > at && strstr(said, ",\"step_rate_hz\":500"));
+    REQUIRE(pal_control_get(text, n, true, &c) == 0);
+    CHECK_TEXT(c.hello.accuracy, hello.hello.accuracy);
+    /* a number is no text */
+    REQUIRE(said);
+    n = (size_t)snprintf(other, sizeof other, "%.*s,\"accuracy\":7%s", (int)(said - text), text,
+                         strstr(said, ",\"step_rate_hz\""));
+    CHECK_INT(pal_control_get(other, n, true, &c), PAL_REFUSAL_FIELD);
+    memset(hello.hello.accuracy, 7, 3);
+    CHECK(pal_control_put(text, sizeof text, &hello, &n) != 0);
 }
 
 static void refuses_every_prefix(void)
@@ -171,6 +196,7 @@ static void largest_messages_fit_their_limit(void)
     memset(&full, 0, sizeof full);
     full.type = PAL_CONTROL_HELLO;
     golden_hello(&full.hello);
+    memset(full.hello.accuracy, '"', PAL_WIRE_TEXT_BYTES - 1);
     full.hello.n_part = PAL_WIRE_PART_MAX;
     full.hello.n_tool = PAL_WIRE_TOOL_MAX;
     full.hello.n_row = PAL_WIRE_ROW_MAX;
@@ -215,6 +241,7 @@ int main(void)
     RUN(refuses_what_is_no_message);
     RUN(refuses_text_beyond_the_limits_before_parsing_it);
     RUN(reads_messages_of_before_fields);
+    RUN(accuracy_is_said_only_where_there_is_one);
     RUN(refuses_every_prefix);
     RUN(largest_messages_fit_their_limit);
     RUN(writer_refuses_what_the_reader_would);

@@ -146,6 +146,7 @@ static void names_and_numbers_agree(void)
     CHECK_INT(pal_wire_field_find("stress"), PAL_WIRE_FIELD_COUNT);
     CHECK_INT(pal_wire_field_find(""), PAL_WIRE_FIELD_COUNT);
     CHECK_TEXT(pal_wire_field_name(PAL_WIRE_FIELD_VON_MISES_PA), "von_mises");
+    CHECK_INT(pal_wire_field_find("stiffness"), 4);
     CHECK_TEXT(pal_wire_field_name((pal_wire_field)77), "none");
 }
 

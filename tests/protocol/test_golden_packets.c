@@ -218,16 +218,19 @@ static void control_lines_are_read_and_written_as_committed(void)
     size_t n = 0, n_again = 0;
     char *bytes = (char *)load("control.jsonl", &n), *line = bytes;
     REQUIRE(bytes);
-    for (int type = 0; type < PAL_CONTROL_COUNT; type++) {
+    for (int type = 0; type <= PAL_CONTROL_COUNT; type++) {
+        const pal_control_type kind = type < PAL_CONTROL_COUNT ? (pal_control_type)type : PAL_CONTROL_HELLO;
         char *end = strchr(line, '\n');
         REQUIRE(end);
         *end = 0;
-        CHECK_INT(pal_control_get(line, strlen(line), type < PAL_CONTROL_JOIN, &c), 0);
-        CHECK_INT(c.type, type);
+        CHECK_INT(pal_control_get(line, strlen(line), kind < PAL_CONTROL_JOIN, &c), 0);
+        CHECK_INT(c.type, kind);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.accuracy[0] != 0, type == PAL_CONTROL_COUNT);
         /* what was read writes the same text, and so does the content itself */
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
         CHECK_TEXT(again, line);
-        golden_control((pal_control_type)type, &c);
+        golden_control(kind, &c);
+        if (type == PAL_CONTROL_COUNT) golden_accuracy(&c.hello);
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
         CHECK_TEXT(again, line);
         line = end + 1;

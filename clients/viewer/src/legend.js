@@ -15,6 +15,7 @@ export const FIELDS = Object.freeze({
   displacement: { title: "Displacement", least: 1e-4, units: [["µm", 1e-6], ["mm", 1e-3], ["m", 1]] },
   von_mises: { title: "Von Mises stress", least: 1, units: [["Pa", 1], ["kPa", 1e3], ["MPa", 1e6], ["GPa", 1e9]] },
   energy: { title: "Strain energy density", least: 1e-3, units: [["mJ/m³", 1e-3], ["J/m³", 1], ["kJ/m³", 1e3], ["MJ/m³", 1e6]] },
+  stiffness: { title: "Edge stiffness k_d", least: 1e-9, units: [["nJ", 1e-9], ["µJ", 1e-6], ["mJ", 1e-3], ["J", 1]] },
 });
 
 const STEPS = [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10];
@@ -77,6 +78,6 @@ export function offered(parts) {
 export function missing(parts) {
   const names = offered(parts);
   if (names.length === 0) return "This server sends no fields.";
-  if (names.length < Object.keys(FIELDS).length) return "Stress and energy need a model of finite elements.";
+  if (!names.includes("von_mises") || !names.includes("energy")) return "Stress and energy need a model of finite elements.";
   return parts.some((part) => names.some((name) => !part.fields?.includes(name))) ? "Not every body has every field." : "";
 }

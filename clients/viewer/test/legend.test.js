@@ -61,15 +61,19 @@ test("both ends are said in one unit that suits the larger", () => {
   assert.deepEqual(labels("von_mises", { low: 0, high: 800 }), { low: "0", high: "800", unit: "Pa" });
   assert.deepEqual(labels("energy", { low: 0, high: 0.25 }), { low: "0", high: "250", unit: "mJ/m³" });
   assert.deepEqual(labels("energy", { low: 0, high: 3e6 }), { low: "0", high: "3", unit: "MJ/m³" });
+  assert.deepEqual(labels("stiffness", { low: 0, high: 2.5e-3 }), { low: "0", high: "2.5", unit: "mJ" });
+  assert.deepEqual(labels("stiffness", rangeOf("stiffness", 4e-6, 9e-6, null)), { low: "0", high: "10", unit: "µJ" });
 });
 
 test("only what the session gives is offered, and why there is no more", () => {
-  const springs = { fields: ["displacement"] }, fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
+  const springs = { fields: ["displacement", "stiffness"] }, plain = { fields: ["displacement"] }, fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
   assert.deepEqual(offered([fem]), ["displacement", "von_mises", "energy"]);
-  assert.deepEqual(offered([springs]), ["displacement"]);
+  assert.deepEqual(offered([springs]), ["displacement", "stiffness"]);
+  assert.deepEqual(offered([plain]), ["displacement"]);
   assert.deepEqual(offered([{}]), []);
   assert.equal(missing([fem]), "");
   assert.match(missing([springs]), /finite elements/);
+  assert.match(missing([plain]), /finite elements/);
   assert.match(missing([springs, fem]), /every body/);
   assert.match(missing([{}]), /no fields/);
 });
