@@ -408,11 +408,12 @@ typedef struct way {
     double longest_m; /* move of a node                */
 } way;
 
-/* the point tried, at x + move, where energies cannot tell: the forces do. at_start, slope, size: at x */
+/* the point tried, at x + move, where energies cannot tell: the forces do */
 static bool is_flat(static_newton *row, pal_step *step, const way *from, double rise_J)
 {
     const pal_body *body = row->system.body;
-    bool level = fabs(rise_J) <= level_share * from->energy.size_J, short_way = from->longest_m <= short_h * body->h_m;
+    bool level = fabs(rise_J) <= level_share * from->energy.size_J;
+    bool short_way = from->longest_m <= short_h * body->h_m;
     double size;
     if (!level && !short_way) return false;
     if (row->relieved) memcpy(row->now, row->inertia, bytes3(row));
