@@ -79,14 +79,13 @@ static pal_err make_world(const job *j)
     body->material = (pal_material){.young_Pa = 1, .poisson = 0.4, .density_kg_m3 = c->mean_density};
     body->n_support = c->problem->n_support;
     memcpy(body->support, c->support, sizeof c->support);
-    /* only the weights of the rows are taken: constants that are given make them equal */
+    /* constants of 1 J: only the weights of the rows are taken */
     static const char *const key[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
     pal_item_init(&body->model, "model", "tet_springs");
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < PAL_SPRING_KINDS && !err; k++) {
-        bool absent = k == PAL_SPRING_AREA && c->options.without_area;
-        if (absent || c->options.equal) err = pal_item_put_number(&body->model, key[k], absent ? 0 : 1, j->note);
-    }
+    pal_err err = pal_item_put_text(&body->model, "weights", c->options.equal ? "equal" : "volume", j->note);
+    for (int k = 0; k < PAL_SPRING_KINDS && !err; k++)
+        err =
+            pal_item_put_number(&body->model, key[k], k == PAL_SPRING_AREA && c->options.without_area ? 0 : 1, j->note);
     scene->step_s = 1e-4; /* never taken; springs of 1 J have a limit of their own */
     scene->most_substep = 2000;
     if (!err) err = pal_world_create(scene, j->note, &c->world);

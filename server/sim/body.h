@@ -71,7 +71,7 @@ typedef struct pal_body {
      * with its middle nodes [n_element][n_corner] */
     const int32_t *element;
     int n_element, n_corner;
-    const float *fill; /* share of material in each element; NULL: 1 [n_element] */
+    const float *fill; /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
 
     /* geometry at rest, borrowed from the scene's prepared mesh by the model; NULL when the model has none */
     const pal_tets *tets;       /* its nodes are the body's first ones */

@@ -82,11 +82,12 @@ static void set_known(known *k, const int32_t *node, int n)
     }
 }
 
-/* adds every tetrahedron's volume to its sides with n_corner corners */
-static void add_volumes(const pal_tets *tets, const known *table, size_t n_item, int n_corner, double *out)
+/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) to its sides with n_corner corners */
+static void add_volumes(const pal_tets *tets, const float *fill, const known *table, size_t n_item, int n_corner,
+                        double *out)
 {
     for (int t = 0; t < tets->n_tet; t++) {
-        double volume = tet_volume(tets, t);
+        double volume = tet_volume(tets, t) * (fill ? (double)fill[t] : 1);
         for (unsigned set = 1; set < 16; set++) {
             if (__builtin_popcount(set) != n_corner) continue;
             int32_t node[4];
@@ -125,7 +126,7 @@ pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const
         out[i] = 0;
     }
     qsort(table, (size_t)n_item, sizeof *table, compare_known);
-    add_volumes(body->tets, table, (size_t)n_item, n_corner, out);
+    add_volumes(body->tets, body->fill, table, (size_t)n_item, n_corner, out);
     free(table);
     double h = body->h_m;
     for (int i = 0; i < n_item; i++) {

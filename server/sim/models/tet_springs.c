@@ -4,7 +4,8 @@
  * Keys: k_distance_J, k_area_J, k_volume_J (absent: derived from E, nu and h; 0: no such row), c_distance_Js,
  * c_area_Js, c_volume_Js (damping of the constraint, default 0), weights ("equal": every spring of a row has its
  * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
- * are given, volume where they are derived).
+ * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
+ * shares, weights by volume and masses count only what is inside, as model fem has it).
  *
  * Constants that vary over the body stand on the body's spring_grid (paper B 3.5) in place of their keys; with a grid
  * there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived constants of
@@ -14,17 +15,20 @@
 #include "server/sim/effect_list.h"
 #include "server/sim/spring_law.h"
 
+#include <math.h>
 #include <string.h>
 
-/* quarter of each tetrahedron's mass to its corners */
-static void lump_mass(const pal_tets *tets, double density_kg_m3, double *mass_kg)
+static const float least_fill = 0.02F;
+
+/* quarter of each tetrahedron's mass to its corners; fill [n_tet] may be NULL */
+static void lump_mass(const pal_tets *tets, const float *fill, double density_kg_m3, double *mass_kg)
 {
     for (int t = 0; t < tets->n_tet; t++) {
         const int32_t *c = tets->tet + 4 * t;
         double e[3][3], n[3];
         for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
         pal_cross3(n, e[1], e[2]);
-        double quarter = density_kg_m3 * pal_dot3(e[0], n) / 24;
+        double quarter = density_kg_m3 * pal_dot3(e[0], n) / 24 * (fill ? (double)fill[t] : 1);
         for (int k = 0; k < 4; k++) mass_kg[c[k]] += quarter;
     }
 }
@@ -66,6 +70,30 @@ static pal_err add_spring(pal_item *item, pal_spring_kind kind, const pal_spring
     return PAL_ERR_OK;
 }
 
+/* weights by volume count a cut voxel by its filled share; constants that are equal for all know nothing of shares */
+static pal_err take_fill(pal_item *item, pal_build *build)
+{
+    const pal_prepared *mesh = build->def->mesh;
+    const pal_spring_grid *grid = &build->def->spring_grid;
+    const char *weights = NULL;
+    bool fill = true, given = false;
+    PAL_TRY(pal_item_bool(item, "fill", &fill, build->note));
+    PAL_TRY(pal_item_text(item, "weights", &weights, build->note));
+    for (int k = 0; k < 3; k++) {
+        double k_J = 0;
+        PAL_TRY(pal_item_number(item, k_key[k], 0, 1e60, &k_J, build->note));
+        given |= k_J > 0 || grid->k_J[k];
+    }
+    bool by_volume = weights ? !strcmp(weights, "volume") : !given;
+    if (!fill || !by_volume || !mesh->hexes.measured || mesh->tets.n_tet != 5 * mesh->hexes.n_hex) return PAL_ERR_OK;
+    float *share = PAL_NEW(build->arena, float, mesh->tets.n_tet);
+    if (!share) return PAL_ERR_MEMORY;
+    /* a voxel that is only touched keeps a floor, so that no node is without mass */
+    for (int t = 0; t < mesh->tets.n_tet; t++) share[t] = fmaxf(mesh->hexes.fill[t / 5], least_fill);
+    build->body->fill = share;
+    return PAL_ERR_OK;
+}
+
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
@@ -75,6 +103,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_spring_grid_check(build->def, build->note));
     for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
         PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
+    PAL_TRY(take_fill(item, build));
     PAL_TRY(pal_item_done(item, build->note));
     if (material->damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
     pal_item_init(&out->row[out->n_row++], item->path, "verlet");
@@ -82,7 +111,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
     memcpy(body->x_rest, mesh->tets.x, 3 * sizeof(double) * (size_t)body->n_node);
     memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_node);
-    lump_mass(&mesh->tets, material->density_kg_m3, body->mass_kg);
+    lump_mass(&mesh->tets, body->fill, material->density_kg_m3, body->mass_kg);
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
             return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name, i,
