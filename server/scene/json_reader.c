@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static int line_of(const char *text, size_t at)
@@ -208,4 +209,41 @@ pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *pat
     if (n > most) return pal_json_bad(json, pal_json_key(at, path, key), "%d entries, more than %d", n, most);
     *out = item;
     return PAL_ERR_OK;
+}
+
+enum { DIGITS = 32 };
+
+/* 15 digits where they are enough, as people write them, at most 17; bytes written */
+static int exact(double number, char out[DIGITS])
+{
+    int n = 0;
+    if (!isfinite(number)) return snprintf(out, DIGITS, "null");
+    for (int digits = 15; digits <= 17; digits++) {
+        n = snprintf(out, DIGITS, "%.*g", digits, number);
+        if (strtod(out, NULL) == number) break;
+    }
+    return n;
+}
+
+cJSON *pal_json_exact(double number)
+{
+    char text[DIGITS];
+    exact(number, text);
+    return cJSON_CreateRaw(text);
+}
+
+cJSON *pal_json_exact_list(const double *number, int n)
+{
+    char *text = malloc((DIGITS + 2) * (size_t)n + 3);
+    size_t at = 1;
+    if (!text) return NULL;
+    text[0] = '[';
+    for (int i = 0; i < n; i++) {
+        if (i) text[at++] = ',', text[at++] = ' ';
+        at += (size_t)exact(number[i], text + at);
+    }
+    memcpy(text + at, "]", 2);
+    cJSON *list = cJSON_CreateRaw(text);
+    free(text);
+    return list;
 }

@@ -1,5 +1,5 @@
 /* Checked reading of a JSON tree for scene files (private to this room): every refusal is "file: entry.path: sentence".
- * Thread: [load]. */
+ * And numbers for a tree that is written. Thread: [load]. */
 #ifndef PAL_SCENE_JSON_READER_H
 #define PAL_SCENE_JSON_READER_H
 #include "server/base/err.h"
@@ -40,4 +40,9 @@ pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *pat
 /* a list of at most `most` entries, NULL when the key is absent */
 pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int most,
                       const cJSON **out);
+
+/* a number, a list of n numbers, with as many digits as give the same bits when they are read again (cJSON's own may
+ * differ in the last place); null when it is not finite. NULL: no memory. The caller puts it into a tree */
+cJSON *pal_json_exact(double number);
+cJSON *pal_json_exact_list(const double *number, int n);
 #endif

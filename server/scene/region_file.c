@@ -1,4 +1,4 @@
-/* Material regions: boxes, labels of a volume, values on a grid.
+/* Material regions: boxes, labels of a volume, values on a grid. Springs: constants on a grid.
  *
  * A label volume may lie turned or mirrored in its file's frame. What the simulation gets is always a grid along the
  * body's axes: the voxels themselves where the volume's axes are those of the frame in some order and sense, else
@@ -14,78 +14,91 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { GRID_MOST = 65536, PATH = 1600 };
+enum { PATH = 1600 };
 static const double voxels_most = 512e6;
 
 /* ---- reading ---- */
 
 static const char *const value_key[3] = {"young_Pa", "poisson", "density_kg_m3"};
 static const double value_low[3] = {1e-6, -0.9999, 1e-3}, value_high[3] = {1e12, 0.5, 1e6};
+static const char *const spring_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"};
+static const double spring_low = 1e-60, spring_high = 1e60;
 
-static pal_err read_box(const pal_json *json, const cJSON *object, const char *path, bool may_be_flat, pal_region *out)
+/* may_be_flat: along which axes */
+static pal_err read_box(const pal_json *json, const cJSON *object, const char *path, const bool may_be_flat[3],
+                        double low_m[3], double high_m[3])
 {
     static const char *const needed[] = {"low_m", "high_m"};
     char at[PAL_JSON_PATH];
     for (int k = 0; k < 2; k++)
         if (!cJSON_GetObjectItemCaseSensitive(object, needed[k]))
             return pal_json_bad(json, pal_json_key(at, path, needed[k]), "is missing");
-    PAL_TRY(pal_json_vector(json, object, path, "low_m", out->low_m));
-    PAL_TRY(pal_json_vector(json, object, path, "high_m", out->high_m));
-    for (int c = 0; c < 3; c++) {
-        bool flat_here = may_be_flat || out->n[c] == 1;
-        if (out->low_m[c] > out->high_m[c] || (!flat_here && out->low_m[c] == out->high_m[c]))
-            return pal_json_bad(json, path, "low_m[%d] %g is not below high_m[%d] %g", c, out->low_m[c], c,
-                                out->high_m[c]);
-    }
+    PAL_TRY(pal_json_vector(json, object, path, "low_m", low_m));
+    PAL_TRY(pal_json_vector(json, object, path, "high_m", high_m));
+    for (int c = 0; c < 3; c++)
+        if (low_m[c] > high_m[c] || (!may_be_flat[c] && low_m[c] == high_m[c]))
+            return pal_json_bad(json, path, "low_m[%d] %g is not below high_m[%d] %g", c, low_m[c], c, high_m[c]);
     return PAL_ERR_OK;
 }
 
 /* one list of a grid; NULL when the key is absent */
-static pal_err read_values(const pal_json *json, const cJSON *grid, const char *path, int which, int n, double *to,
-                           const double **out)
+static pal_err read_values(const pal_json *json, const cJSON *grid, const char *path, const char *key, double low,
+                           double high, int n, double *to, const double **out)
 {
     char at[PAL_JSON_PATH];
     const cJSON *list;
-    PAL_TRY(pal_json_list(json, grid, path, value_key[which], GRID_MOST, &list));
+    PAL_TRY(pal_json_list(json, grid, path, key, PAL_GRID_MOST, &list));
     *out = list ? to : NULL;
     if (!list) return PAL_ERR_OK;
-    pal_json_key(at, path, value_key[which]);
+    pal_json_key(at, path, key);
     if (cJSON_GetArraySize(list) != n)
         return pal_json_bad(json, at, "%d numbers, wanted %d (n[0] n[1] n[2])", cJSON_GetArraySize(list), n);
     int k = 0;
     for (const cJSON *child = list->child; child; child = child->next, k++) {
-        to[k] = cJSON_IsNumber(child) ? child->valuedouble : NAN;
-        if (!(to[k] >= value_low[which] && to[k] <= value_high[which]))
-            return pal_json_bad(json, at, "number %d, %g, is outside %g .. %g", k + 1, to[k], value_low[which],
-                                value_high[which]);
+        if (!cJSON_IsNumber(child)) return pal_json_bad(json, at, "entry %d is not a number", k + 1);
+        to[k] = child->valuedouble;
+        if (!(to[k] >= low && to[k] <= high))
+            return pal_json_bad(json, at, "number %d, %g, is outside %g .. %g", k + 1, to[k], low, high);
     }
+    return PAL_ERR_OK;
+}
+
+/* nodes and extent of a grid, room for three lists of its numbers */
+static pal_err read_nodes(const pal_json *json, const cJSON *grid, const char *path, int out_n[3], double low_m[3],
+                          double high_m[3], double **own)
+{
+    char at[PAL_JSON_PATH];
+    double n[3] = {0, 0, 0};
+    bool flat[3];
+    PAL_TRY(pal_json_vector(json, grid, path, "n", n));
+    for (int c = 0; c < 3; c++) {
+        if (!(n[c] >= 1 && n[c] <= PAL_GRID_MOST && n[c] == floor(n[c])))
+            return pal_json_bad(json, pal_json_key(at, path, "n"), "number %d, %g, is not a count from 1", c + 1, n[c]);
+        out_n[c] = (int)n[c];
+        flat[c] = n[c] == 1;
+    }
+    if (n[0] * n[1] * n[2] > PAL_GRID_MOST)
+        return pal_json_bad(json, pal_json_key(at, path, "n"), "%g values, more than %d", n[0] * n[1] * n[2],
+                            PAL_GRID_MOST);
+    PAL_TRY(read_box(json, grid, path, flat, low_m, high_m));
+    *own = malloc(3 * (size_t)(out_n[0] * out_n[1] * out_n[2]) * sizeof **own);
+    if (!*own) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for its grid", path);
     return PAL_ERR_OK;
 }
 
 static pal_err read_grid(const pal_json *json, const cJSON *region, const char *above, pal_region *out, double **own)
 {
     static const char *const known[] = {"n", "low_m", "high_m", "young_Pa", "poisson", "density_kg_m3", NULL};
-    char path[PAL_JSON_PATH], at[PAL_JSON_PATH];
-    double n[3] = {0, 0, 0};
+    char path[PAL_JSON_PATH];
     const cJSON *grid = cJSON_GetObjectItemCaseSensitive(region, "grid");
+    const double **const value[3] = {&out->grid_young_Pa, &out->grid_poisson, &out->grid_density_kg_m3};
     pal_json_key(path, above, "grid");
     PAL_TRY(pal_json_object(json, grid, path, known));
-    PAL_TRY(pal_json_vector(json, grid, path, "n", n));
-    for (int c = 0; c < 3; c++) {
-        if (!(n[c] >= 1 && n[c] <= GRID_MOST && n[c] == floor(n[c])))
-            return pal_json_bad(json, pal_json_key(at, path, "n"), "number %d, %g, is not a count from 1", c + 1, n[c]);
-        out->n[c] = (int)n[c];
-    }
-    if (n[0] * n[1] * n[2] > GRID_MOST)
-        return pal_json_bad(json, pal_json_key(at, path, "n"), "%g values, more than %d", n[0] * n[1] * n[2],
-                            GRID_MOST);
-    PAL_TRY(read_box(json, grid, path, false, out));
+    PAL_TRY(read_nodes(json, grid, path, out->n, out->low_m, out->high_m, own));
     int count = out->n[0] * out->n[1] * out->n[2];
-    *own = malloc(3 * (size_t)count * sizeof **own);
-    if (!*own) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for its grid", path);
-    PAL_TRY(read_values(json, grid, path, 0, count, *own, &out->grid_young_Pa));
-    PAL_TRY(read_values(json, grid, path, 1, count, *own + count, &out->grid_poisson));
-    PAL_TRY(read_values(json, grid, path, 2, count, *own + 2 * count, &out->grid_density_kg_m3));
+    for (int k = 0; k < 3; k++)
+        PAL_TRY(read_values(json, grid, path, value_key[k], value_low[k], value_high[k], count, *own + k * count,
+                            value[k]));
     if (!out->grid_young_Pa && !out->grid_poisson && !out->grid_density_kg_m3)
         return pal_json_bad(json, path, "needs young_Pa, poisson or density_kg_m3");
     return PAL_ERR_OK;
@@ -222,7 +235,7 @@ static pal_err read_region(const pal_json *json, const cJSON *object, const char
         const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
         out->kind = PAL_REGION_BOX;
         PAL_TRY(pal_json_object(json, box, pal_json_key(at, path, "box"), corners));
-        return read_box(json, box, at, true, out);
+        return read_box(json, box, at, (const bool[3]){true, true, true}, out->low_m, out->high_m);
     }
     if (has[1]) {
         out->kind = PAL_REGION_LABEL;
@@ -257,6 +270,40 @@ void pal_region_free(pal_loaded_scene *scene, int index)
     }
 }
 
+pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const char *above, pal_loaded_scene *scene,
+                             int index)
+{
+    static const char *const known[] = {"n", "low_m", "high_m", "k_distance_J", "k_area_J", "k_volume_J", NULL};
+    char path[PAL_JSON_PATH], at[PAL_JSON_PATH];
+    pal_body_def *def = &scene->scene.body[index];
+    pal_spring_grid *out = &def->spring_grid;
+    const cJSON *grid = cJSON_GetObjectItemCaseSensitive(model, "grid");
+    if (!grid) return PAL_ERR_OK;
+    pal_json_key(path, above, "grid");
+    if (strcmp(def->model.name, "tet_springs") != 0)
+        return pal_json_bad(json, path, "model \"%s\" has no springs; model \"tet_springs\" takes a grid",
+                            def->model.name);
+    PAL_TRY(pal_json_object(json, grid, path, known));
+    PAL_TRY(read_nodes(json, grid, path, out->n, out->low_m, out->high_m, &scene->spring_grid[index]));
+    int count = out->n[0] * out->n[1] * out->n[2];
+    for (int k = 0; k < 3; k++) {
+        PAL_TRY(read_values(json, grid, path, spring_key[k], spring_low, spring_high, count,
+                            scene->spring_grid[index] + k * count, &out->k_J[k]));
+        if (out->k_J[k] && pal_item_has(&def->model, spring_key[k]))
+            return pal_json_bad(json, pal_json_key(at, above, spring_key[k]),
+                                "stands beside a grid that gives the same");
+    }
+    if (!out->k_J[0] && !out->k_J[1] && !out->k_J[2])
+        return pal_json_bad(json, path, "needs k_distance_J, k_area_J or k_volume_J");
+    return PAL_ERR_OK;
+}
+
+void pal_spring_grid_free(pal_loaded_scene *scene, int index)
+{
+    free(scene->spring_grid[index]);
+    scene->spring_grid[index] = NULL;
+}
+
 /* ---- writing ---- */
 
 void pal_region_volume(const char *stem, int region, char *out, size_t n_byte)
@@ -266,19 +313,28 @@ void pal_region_volume(const char *stem, int region, char *out, size_t n_byte)
 
 static void add_constant(cJSON *object, const char *key, double value)
 {
-    if (!isnan(value)) cJSON_AddNumberToObject(object, key, value);
+    if (!isnan(value)) cJSON_AddItemToObject(object, key, pal_json_exact(value));
 }
 
-static void add_grid(cJSON *object, const pal_region *r)
+static void add_box(cJSON *object, const double low_m[3], const double high_m[3])
 {
-    const double *const value[3] = {r->grid_young_Pa, r->grid_poisson, r->grid_density_kg_m3};
+    cJSON_AddItemToObject(object, "low_m", pal_json_exact_list(low_m, 3));
+    cJSON_AddItemToObject(object, "high_m", pal_json_exact_list(high_m, 3));
+}
+
+static void add_grid(cJSON *object, const int n[3], const double low_m[3], const double high_m[3],
+                     const char *const key[3], const double *const value[3])
+{
     cJSON *grid = cJSON_AddObjectToObject(object, "grid");
-    cJSON_AddItemToObject(grid, "n", cJSON_CreateIntArray(r->n, 3));
-    cJSON_AddItemToObject(grid, "low_m", cJSON_CreateDoubleArray(r->low_m, 3));
-    cJSON_AddItemToObject(grid, "high_m", cJSON_CreateDoubleArray(r->high_m, 3));
+    cJSON_AddItemToObject(grid, "n", cJSON_CreateIntArray(n, 3));
+    add_box(grid, low_m, high_m);
     for (int k = 0; k < 3; k++)
-        if (value[k])
-            cJSON_AddItemToObject(grid, value_key[k], cJSON_CreateDoubleArray(value[k], r->n[0] * r->n[1] * r->n[2]));
+        if (value[k]) cJSON_AddItemToObject(grid, key[k], pal_json_exact_list(value[k], n[0] * n[1] * n[2]));
+}
+
+void pal_spring_grid_add(cJSON *model, const pal_spring_grid *g)
+{
+    if (g->n[0] > 0) add_grid(model, g->n, g->low_m, g->high_m, spring_key, g->k_J);
 }
 
 void pal_region_add(cJSON *object, const pal_body_def *body, const char *stem)
@@ -292,15 +348,15 @@ void pal_region_add(cJSON *object, const pal_body_def *body, const char *stem)
         cJSON_AddItemToArray(list, entry);
         if (r->kind == PAL_REGION_BOX) {
             cJSON *box = cJSON_AddObjectToObject(entry, "box");
-            cJSON_AddItemToObject(box, "low_m", cJSON_CreateDoubleArray(r->low_m, 3));
-            cJSON_AddItemToObject(box, "high_m", cJSON_CreateDoubleArray(r->high_m, 3));
+            add_box(box, r->low_m, r->high_m);
         } else if (r->kind == PAL_REGION_LABEL) {
             cJSON *label = cJSON_AddObjectToObject(entry, "label");
             pal_region_volume(stem, k, name, sizeof name);
             cJSON_AddStringToObject(label, "volume", name);
             cJSON_AddNumberToObject(label, "is", 1);
         } else {
-            add_grid(entry, r);
+            const double *const value[3] = {r->grid_young_Pa, r->grid_poisson, r->grid_density_kg_m3};
+            add_grid(entry, r->n, r->low_m, r->high_m, value_key, value);
         }
         add_constant(entry, "young_Pa", r->young_Pa);
         add_constant(entry, "poisson", r->poisson);

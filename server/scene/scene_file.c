@@ -14,7 +14,8 @@
 
 enum { FOLDER = 1024 };
 
-static pal_err read_item(const pal_json *json, const cJSON *object, const char *path, pal_item *out)
+/* other: a key that somebody else reads, may be NULL */
+static pal_err read_item(const pal_json *json, const cJSON *object, const char *path, const char *other, pal_item *out)
 {
     char at[PAL_JSON_PATH], name[PAL_ITEM_TEXT] = "";
     pal_note why = {""};
@@ -26,7 +27,7 @@ static pal_err read_item(const pal_json *json, const cJSON *object, const char *
         double number[PAL_ITEM_NUMBERS];
         char text[PAL_ITEM_TEXT];
         pal_err err = PAL_ERR_OK;
-        if (!strcmp(child->string, "name")) continue;
+        if (!strcmp(child->string, "name") || (other && !strcmp(child->string, other))) continue;
         pal_json_key(at, path, child->string);
         if (cJSON_IsNumber(child)) {
             err = pal_item_put_number(out, child->string, child->valuedouble, &why);
@@ -55,7 +56,17 @@ static pal_err read_item_at(const pal_json *json, const cJSON *object, const cha
 {
     char at[PAL_JSON_PATH];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-    return item ? read_item(json, item, pal_json_key(at, path, key), out) : PAL_ERR_OK;
+    return item ? read_item(json, item, pal_json_key(at, path, key), NULL, out) : PAL_ERR_OK;
+}
+
+static pal_err read_model(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index)
+{
+    char at[PAL_JSON_PATH];
+    const cJSON *model = cJSON_GetObjectItemCaseSensitive(body, "model");
+    if (!model) return PAL_ERR_OK;
+    pal_json_key(at, path, "model");
+    PAL_TRY(read_item(json, model, at, "grid", &scene->scene.body[index].model));
+    return pal_spring_grid_read(json, model, at, scene, index);
 }
 
 static pal_err read_material(const pal_json *json, const cJSON *body, const char *path, pal_material *m)
@@ -149,7 +160,7 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
     if (list) body->n_effect = 0;
     pal_json_key(at, path, "effects");
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, body->n_effect++)
-        PAL_TRY(read_item(json, child, pal_json_entry(entry, at, body->n_effect), &body->effect[body->n_effect]));
+        PAL_TRY(read_item(json, child, pal_json_entry(entry, at, body->n_effect), NULL, &body->effect[body->n_effect]));
     /* default entries get their place in this scene as well */
     for (int k = 0; k < body->n_effect && !list; k++)
         snprintf(body->effect[k].path, sizeof body->effect[k].path, "%.40s", pal_json_entry(entry, at, k));
@@ -170,7 +181,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     pal_body_def *body = &scene->scene.body[index];
     pal_body_default(body, name, &scene->mesh[index]);
     PAL_TRY(read_material(json, object, path, &body->material));
-    PAL_TRY(read_item_at(json, object, path, "model", &body->model));
+    PAL_TRY(read_model(json, object, path, scene, index));
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
@@ -204,8 +215,8 @@ static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *sc
 
 static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
 {
-    static const char *const known[] = {"name",         "title",        "source", "step_s", "up",
-                                        "gravity_m_s2", "most_substep", "bodies", "tools",  NULL};
+    static const char *const known[] = {"name",         "title",        "source", "accuracy", "step_s", "up",
+                                        "gravity_m_s2", "most_substep", "bodies", "tools",    NULL};
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
     const cJSON *list;
@@ -216,6 +227,7 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     if (strcmp(plain, scene->name)) return pal_json_bad(json, "name", "has other characters than a-z 0-9 _ -");
     PAL_TRY(pal_json_text(json, root, "", "title", true, scene->title, sizeof scene->title));
     PAL_TRY(pal_json_text(json, root, "", "source", true, scene->source, sizeof scene->source));
+    PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
     PAL_TRY(pal_json_number(json, root, "", "step_s", 1e-4, 0.1, &scene->step_s));
     PAL_TRY(pal_json_number(json, root, "", "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
     PAL_TRY(pal_json_count(json, root, "", "most_substep", 1, 1000000, &scene->most_substep));
@@ -270,6 +282,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
     if (!loaded) return;
     for (int k = 0; k < PAL_BODY_MAX; k++) {
         pal_region_free(loaded, k);
+        pal_spring_grid_free(loaded, k);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

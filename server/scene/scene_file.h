@@ -2,7 +2,9 @@
  * ("scene.json: bodies[0].material.young_Pa: ..."); an unknown key is an error. Thread: [load].
  *
  * {
- *   "name": "liver", "title": "Liver, abdominal CT", "source": "...", "step_s": 0.0166667,
+ *   "name": "liver", "title": "Liver, abdominal CT", "source": "...",
+ *   "accuracy": "2.1 % RMS of finite elements",           shown beside the title, at most 127 bytes
+ *   "step_s": 0.0166667,
  *   "up": [0, 0, 1],
  *   "bodies": [{
  *     "name": "liver", "mesh": "liver.palmesh"            (relative to the scene file; or "surface": "x.stl" with
@@ -17,7 +19,10 @@
  *       {"grid": {"n": [3, 2, 2], "low_m": [..], "high_m": [..], "young_Pa": [12 numbers, x fastest], "poisson": [..],
  *                 "density_kg_m3": [..]}}                  trilinear between its nodes, the border's values beyond
  *     ],
- *     "model": {"name": "tet_springs", "k_distance_J": ...},
+ *     "model": {"name": "tet_springs", "k_distance_J": ...}, (the keys stand in sim/models, one file each)
+ *               or {"name": "tet_springs", "weights": "volume", "grid": {"n": [5, 5, 3], "low_m": [..], "high_m": [..],
+ *                   "k_distance_J": [75 numbers, x fastest], "k_area_J": [..], "k_volume_J": [..]}}
+ *                                                          constants of springs that vary over the body
  *               or {"name": "fem", "element": "hex8_bbar", "law": "corotational", "fill": true} (sim/models/fem.c)
  *     "solver": {"name": "verlet"},
  *               or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
@@ -40,11 +45,12 @@ typedef struct pal_loaded_region {
     double *grid;
 } pal_loaded_region;
 
-/* a scene with the meshes and regions it owns; the address of `scene` stays */
+/* a scene with the meshes, regions and grids it owns; the address of `scene` stays */
 typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
+    double *spring_grid[PAL_BODY_MAX]; /* what a body's spring_grid borrows, from malloc; NULL: none */
     int n_mesh;
 } pal_loaded_scene;
 
@@ -92,7 +98,8 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note);
 /* writes DIR/scene.json, DIR/NAME.palmesh for every body and NAME_regionK.nii for every label region, scene.json last;
- * makes DIR; IO, and then nothing that this call wrote is left */
+ * makes DIR; numbers come back with the same bits. IO, REFUSED (scene.json longer than pal_scene_load takes), and then
+ * nothing that this call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
 /* other texts than those from the file's name; NULL keeps one. name becomes the only body's name as well. REFUSED for
  * characters that a scene may not hold or too many of them, and then nothing changed */

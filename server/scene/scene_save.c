@@ -39,7 +39,12 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
     snprintf(out + n, MESH_NAME - n, ".palmesh");
 }
 
-static void add_item(cJSON *parent, const char *key, const pal_item *item)
+static void add_number(cJSON *object, const char *key, double number)
+{
+    cJSON_AddItemToObject(object, key, pal_json_exact(number));
+}
+
+static cJSON *add_item(cJSON *parent, const char *key, const pal_item *item)
 {
     cJSON *object = key ? cJSON_AddObjectToObject(parent, key) : cJSON_CreateObject();
     if (!key) cJSON_AddItemToArray(parent, object);
@@ -48,7 +53,7 @@ static void add_item(cJSON *parent, const char *key, const pal_item *item)
         const pal_value *v = &item->value[k];
         switch (v->kind) {
         case PAL_VALUE_NUMBER:
-            cJSON_AddNumberToObject(object, v->key, v->number[0]);
+            add_number(object, v->key, v->number[0]);
             break;
         case PAL_VALUE_BOOL:
             cJSON_AddBoolToObject(object, v->key, v->flag);
@@ -57,10 +62,11 @@ static void add_item(cJSON *parent, const char *key, const pal_item *item)
             cJSON_AddStringToObject(object, v->key, v->text);
             break;
         case PAL_VALUE_NUMBERS:
-            cJSON_AddItemToObject(object, v->key, cJSON_CreateDoubleArray(v->number, v->n_number));
+            cJSON_AddItemToObject(object, v->key, pal_json_exact_list(v->number, v->n_number));
             break;
         }
     }
+    return object;
 }
 
 static void add_supports(cJSON *object, const pal_body_def *body)
@@ -71,12 +77,12 @@ static void add_supports(cJSON *object, const pal_body_def *body)
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddItemToArray(list, entry);
         if (s->lowest) {
-            cJSON_AddNumberToObject(entry, "lowest", s->fraction);
+            add_number(entry, "lowest", s->fraction);
             continue;
         }
         cJSON *box = cJSON_AddObjectToObject(entry, "box");
-        cJSON_AddItemToObject(box, "low_m", cJSON_CreateDoubleArray(s->low_m, 3));
-        cJSON_AddItemToObject(box, "high_m", cJSON_CreateDoubleArray(s->high_m, 3));
+        cJSON_AddItemToObject(box, "low_m", pal_json_exact_list(s->low_m, 3));
+        cJSON_AddItemToObject(box, "high_m", pal_json_exact_list(s->high_m, 3));
     }
 }
 
@@ -90,13 +96,13 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     cJSON_AddStringToObject(object, "name", body->name);
     cJSON_AddStringToObject(object, "mesh", name);
     cJSON *material = cJSON_AddObjectToObject(object, "material");
-    cJSON_AddNumberToObject(material, "young_Pa", body->material.young_Pa);
-    cJSON_AddNumberToObject(material, "poisson", body->material.poisson);
-    cJSON_AddNumberToObject(material, "density_kg_m3", body->material.density_kg_m3);
-    cJSON_AddNumberToObject(material, "damping_1_s", body->material.damping_1_s);
+    add_number(material, "young_Pa", body->material.young_Pa);
+    add_number(material, "poisson", body->material.poisson);
+    add_number(material, "density_kg_m3", body->material.density_kg_m3);
+    add_number(material, "damping_1_s", body->material.damping_1_s);
     stem_of(scene, index, name);
     pal_region_add(object, body, name);
-    add_item(object, "model", &body->model);
+    pal_spring_grid_add(add_item(object, "model", &body->model), &body->spring_grid);
     if (body->solver.name[0]) add_item(object, "solver", &body->solver);
     add_item(object, "output", &body->output);
     add_supports(object, body);
@@ -111,10 +117,11 @@ static char *scene_text(const pal_scene *scene)
     cJSON_AddStringToObject(root, "name", scene->name);
     cJSON_AddStringToObject(root, "title", scene->title);
     cJSON_AddStringToObject(root, "source", scene->source);
-    cJSON_AddNumberToObject(root, "step_s", scene->step_s);
-    cJSON_AddItemToObject(root, "up", cJSON_CreateDoubleArray(scene->up, 3));
-    cJSON_AddNumberToObject(root, "gravity_m_s2", scene->gravity_m_s2);
-    cJSON_AddNumberToObject(root, "most_substep", scene->most_substep);
+    if (scene->accuracy[0]) cJSON_AddStringToObject(root, "accuracy", scene->accuracy);
+    add_number(root, "step_s", scene->step_s);
+    cJSON_AddItemToObject(root, "up", pal_json_exact_list(scene->up, 3));
+    add_number(root, "gravity_m_s2", scene->gravity_m_s2);
+    add_number(root, "most_substep", scene->most_substep);
     cJSON *bodies = cJSON_AddArrayToObject(root, "bodies");
     for (int k = 0; k < scene->n_body; k++) add_body(bodies, scene, k);
     cJSON *tools = cJSON_AddArrayToObject(root, "tools");
@@ -122,8 +129,8 @@ static char *scene_text(const pal_scene *scene)
         cJSON *tool = cJSON_CreateObject();
         cJSON_AddItemToArray(tools, tool);
         cJSON_AddStringToObject(tool, "name", scene->tool[k].name);
-        cJSON_AddNumberToObject(tool, "radius_m", scene->tool[k].radius_m);
-        cJSON_AddNumberToObject(tool, "force_cap_N", scene->tool[k].force_cap_N);
+        add_number(tool, "radius_m", scene->tool[k].radius_m);
+        add_number(tool, "force_cap_N", scene->tool[k].force_cap_N);
     }
     char *text = cJSON_Print(root);
     cJSON_Delete(root);
@@ -155,7 +162,11 @@ pal_err pal_scene_make_folder(const char *folder, pal_note *note)
 static pal_err save_body(const pal_scene *scene, int index, const char *folder, int *n_file, pal_note *note)
 {
     const pal_body_def *body = &scene->body[index];
+    const int *n = body->spring_grid.n;
     char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
+    if ((double)n[0] * n[1] * n[2] > PAL_GRID_MOST)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, more than %d", body->name,
+                            (double)n[0] * n[1] * n[2], PAL_GRID_MOST);
     mesh_name(scene, index, name);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     PAL_TRY(pal_prepared_save(body->mesh, path, note));
@@ -203,6 +214,9 @@ pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_n
     char *text = err ? NULL : scene_text(scene);
     if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for scene.json", folder);
     snprintf(path, sizeof path, "%s/scene.json", folder);
+    if (!err && strlen(text) > PAL_JSON_MOST)
+        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
+                           PAL_JSON_MOST);
     if (!err) err = pal_file_write(path, text, strlen(text), note);
     cJSON_free(text);
     if (err) remove_files(scene, folder, n_file);

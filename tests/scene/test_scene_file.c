@@ -89,6 +89,11 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"name\": \"0123456789012345678901234567890123456789012345678\"}", "name: 49 bytes of text, more than 47"},
         {"{\"title\": \"a\\u0007\"}", "title: has a control character"},
         {"{\"title\": \"a\\u202e\"}", "title: has a control character"},
+        {"{\"accuracy\": 2.1}", "accuracy: is not a text"},
+        {"{\"accuracy\": \"a\\n\"}", "accuracy: has a control character"},
+        {"{\"accuracy\": \"0123456789012345678901234567890123456789012345678901234567890123"
+         "0123456789012345678901234567890123456789012345678901234567890123\"}",
+         "accuracy: 128 bytes of text, more than 127"},
         {"{\"step_s\": \"fast\"}", "step_s: is not a number"},
         {"{\"step_s\": 1}", "step_s: 1 is outside 0.0001 .. 0.1"},
         {"{\"step_s\": 1e999}", "step_s: inf is outside"},
@@ -149,6 +154,44 @@ static void every_bad_scene_has_its_sentence(void)
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) expect_refusal(bad[k].text, bad[k].sentence);
 }
 
+#define GRID(grid)                                                                                                     \
+    "{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"model\": {\"name\": \"tet_springs\", \"grid\": " grid "}}]}"
+#define CELL "\"n\": [2, 1, 1], \"low_m\": [0, 0, 0], \"high_m\": [1, 0, 0]"
+
+static void every_bad_grid_of_springs_has_its_sentence(void)
+{
+    static const struct {
+        const char *text, *sentence;
+    } bad[] = {
+        {GRID("7"), "bodies[0].model.grid: is not an object"},
+        {GRID("{}"), "bodies[0].model.grid.n: number 1, 0, is not a count"},
+        {GRID("{" CELL ", \"k_J\": [1]}"), "bodies[0].model.grid.k_J: unknown key; known are n, low_m"},
+        {GRID("{" CELL "}"), "bodies[0].model.grid: needs k_distance_J, k_area_J or k_volume_J"},
+        {GRID("{\"n\": [2, 1.5, 1]}"), "bodies[0].model.grid.n: number 2, 1.5, is not a count"},
+        {GRID("{\"n\": [2, 1, -1]}"), "bodies[0].model.grid.n: number 3, -1, is not a count"},
+        {GRID("{\"n\": [2, 1]}"), "bodies[0].model.grid.n: is not a list of three numbers"},
+        {GRID("{\"n\": [300, 300, 1]}"), "bodies[0].model.grid.n: 90000 values, more than 65536"},
+        {GRID("{\"n\": [2, 1, 1]}"), "bodies[0].model.grid.low_m: is missing"},
+        {GRID("{\"n\": [2, 1, 1], \"low_m\": [0, 0, 0], \"high_m\": [0, 0, 0]}"),
+         "bodies[0].model.grid: low_m[0] 0 is not below high_m[0] 0"},
+        {GRID("{" CELL ", \"k_distance_J\": 1}"), "bodies[0].model.grid.k_distance_J: is not a list"},
+        {GRID("{" CELL ", \"k_distance_J\": [1]}"), "bodies[0].model.grid.k_distance_J: 1 numbers, wanted 2"},
+        {GRID("{" CELL ", \"k_distance_J\": [1, 2, 3]}"), "bodies[0].model.grid.k_distance_J: 3 numbers, wanted 2"},
+        {GRID("{" CELL ", \"k_volume_J\": [1, \"x\"]}"), "bodies[0].model.grid.k_volume_J: entry 2 is not a number"},
+        {GRID("{" CELL ", \"k_area_J\": [-1, 1]}"), "bodies[0].model.grid.k_area_J: number 1, -1, is outside"},
+        {GRID("{" CELL ", \"k_area_J\": [1, 0]}"), "bodies[0].model.grid.k_area_J: number 2, 0, is outside"},
+        {GRID("{" CELL ", \"k_area_J\": [1, 1e999]}"), "bodies[0].model.grid.k_area_J: number 2, inf, is outside"},
+        {"{\"bodies\": [{\"model\": {\"name\": \"fem\", \"grid\": {" CELL "}}}]}",
+         "bodies[0].model.grid: model \"fem\" has no springs"},
+        {"{\"bodies\": [{\"model\": {\"name\": \"tet_springs\", \"k_area_J\": 1, \"grid\": {" CELL
+         ", \"k_area_J\": [1, 1]}}}]}",
+         "bodies[0].model.k_area_J: stands beside a grid that gives the same"},
+        {"{\"bodies\": [{\"solver\": {\"name\": \"verlet\", \"grid\": {}}}]}",
+         "bodies[0].solver.grid: is not a number, text"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) expect_refusal(bad[k].text, bad[k].sentence);
+}
+
 static void absent_keys_take_the_defaults(void)
 {
     const char *text = "{\"bodies\": [{\"mesh\": \"ball.palmesh\"}]}";
@@ -180,7 +223,8 @@ static void absent_keys_take_the_defaults(void)
 static void given_keys_arrive(void)
 {
     const char *text =
-        "{\"name\": \"two-1\", \"title\": \"Zwei K\xc3\xb6rper\", \"source\": \"here\", \"step_s\": 0.002, \"up\": [0, "
+        "{\"name\": \"two-1\", \"title\": \"Zwei K\xc3\xb6rper\", \"source\": \"here\", \"accuracy\": \"2 %\", "
+        "\"step_s\": 0.002, \"up\": [0, "
         "1, "
         "0], \"gravity_m_s2\": 1.62, \"most_substep\": 77, \"tools\": [{\"name\": \"hook\", \"radius_m\": 0.003, "
         "\"force_cap_N\": 2}], \"bodies\": [{\"name\": \"a b\", \"mesh\": \"ball.palmesh\", \"material\": "
@@ -198,6 +242,7 @@ static void given_keys_arrive(void)
     const pal_body_def *b = &s->body[0];
     CHECK_TEXT(s->name, "two-1");
     CHECK_TEXT(s->title, "Zwei K\xc3\xb6rper");
+    CHECK_TEXT(s->accuracy, "2 %");
     CHECK_NEAR(s->step_s, 0.002, 0);
     CHECK_NEAR(s->up[1], 1, 0);
     CHECK_NEAR(s->gravity_m_s2, 1.62, 0);
@@ -270,6 +315,77 @@ static void a_saved_scene_loads_to_the_same_world_for_100_steps(void)
     out->scene.body[0].material.young_Pa *= 1.0001;
     CHECK(hash_after(&out->scene, 100) != before);
     pal_scene_free(out);
+    free(in);
+}
+
+/* numbers without a short decimal: thirds, neighbours of 0.1, the largest and least allowed */
+static void constants_of_springs_come_back_bit_for_bit(void)
+{
+    enum { N = 3 * 2 * 2 };
+    pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
+    pal_note note = {""};
+    double k_J[2][N];
+    REQUIRE(in != NULL);
+    in->scene = plain;
+    pal_body_def *def = &in->scene.body[0];
+    uint64_t seed = 1;
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < N; i++) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            k_J[k][i] = 1e-4 * pow(2, (double)(seed >> 11) * 0x1p-53 * 8);
+        }
+    k_J[1][0] = 1e-60, k_J[1][1] = 1e60, k_J[1][2] = nextafter(0.1, 1), k_J[1][3] = nextafter(0.1, 0),
+    k_J[1][4] = 1.0 / 3, k_J[1][5] = nextafter(1, 2), k_J[1][6] = 3;
+    def->spring_grid = (pal_spring_grid){
+        {3, 2, 2}, {-0.05, -0.1 / 3, nextafter(-0.05, 0)}, {0.05, 0.1 / 3, 0.05}, {k_J[0], NULL, k_J[1]}};
+    pal_item_put_text(&def->model, "weights", "volume", NULL);
+    pal_item_put_number(&def->model, "k_area_J", nextafter(0.002, 1), NULL);
+    snprintf(in->scene.accuracy, sizeof in->scene.accuracy, "2.1 %% RMS \xc2\xb1 \"0.3\"");
+    char where[600];
+    snprintf(where, sizeof where, "%s/springs", folder);
+    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    snprintf(where, sizeof where, "%s/springs/scene.json", folder);
+    pal_err err = pal_scene_load(where, &out, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    const pal_spring_grid *a = &def->spring_grid, *b = &out->scene.body[0].spring_grid;
+    CHECK_TEXT(out->scene.accuracy, in->scene.accuracy);
+    CHECK(memcmp(a->n, b->n, sizeof a->n) == 0);
+    CHECK(memcmp(a->low_m, b->low_m, sizeof a->low_m) == 0 && memcmp(a->high_m, b->high_m, sizeof a->high_m) == 0);
+    REQUIRE(b->k_J[0] && !b->k_J[1] && b->k_J[2]);
+    CHECK(memcmp(b->k_J[0], k_J[0], sizeof k_J[0]) == 0 && memcmp(b->k_J[2], k_J[1], sizeof k_J[1]) == 0);
+    double area_J = 0;
+    CHECK_INT(pal_item_number(&out->scene.body[0].model, "k_area_J", 0, 1, &area_J, &note), 0);
+    CHECK_NEAR(area_J, nextafter(0.002, 1), 0);
+    /* and both make the same body */
+    k_J[1][0] = k_J[1][1] = 1e-3;
+    double *k_volume_J = out->spring_grid[0] + 2 * N;
+    k_volume_J[0] = k_volume_J[1] = 1e-3;
+    for (int i = 0; i < N; i++) k_J[1][i] = k_volume_J[i] = fmin(k_J[1][i], 2e-3);
+    uint64_t before = hash_after(&in->scene, 20);
+    CHECK(before != 0);
+    CHECK(hash_after(&out->scene, 20) == before);
+    k_volume_J[3] *= 1.01;
+    CHECK(hash_after(&out->scene, 20) != before);
+    pal_scene_free(out);
+
+    /* what could not be read again is not written */
+    def->spring_grid.n[0] = 1 << 15;
+    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_IO); /* a file stands where the folder would */
+    snprintf(where, sizeof where, "%s/too_many", folder);
+    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "model.grid.n: 131072 nodes, more than 65536") != NULL);
+    double *many = malloc(sizeof *many << 16);
+    REQUIRE(many != NULL);
+    for (int i = 0; i < 1 << 16; i++) many[i] = 1.0 / 3;
+    def->spring_grid.n[0] = 1 << 14;
+    def->spring_grid.k_J[0] = def->spring_grid.k_J[2] = many;
+    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "scene.json: would have 2") != NULL);
+    struct stat facts;
+    snprintf(where, sizeof where, "%s/too_many/ball.palmesh", folder);
+    CHECK(stat(where, &facts) != 0);
+    free(many);
     free(in);
 }
 
@@ -496,9 +612,11 @@ int main(void)
     RUN(what_is_not_json_is_refused_with_its_line);
     RUN(big_files_are_refused_before_they_are_parsed);
     RUN(every_bad_scene_has_its_sentence);
+    RUN(every_bad_grid_of_springs_has_its_sentence);
     RUN(absent_keys_take_the_defaults);
     RUN(given_keys_arrive);
     RUN(a_saved_scene_loads_to_the_same_world_for_100_steps);
+    RUN(constants_of_springs_come_back_bit_for_bit);
     RUN(two_bodies_of_like_names_get_two_files);
     RUN(a_save_that_fails_leaves_nothing);
     RUN(a_bare_surface_becomes_a_scene_of_about_13000_tets);
