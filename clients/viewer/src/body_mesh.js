@@ -62,6 +62,22 @@ diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`)
   return material;
 }
 
+/**
+ * Is the surface closed, its triangles outward? Then no back side is ever seen.
+ * @param {Float32Array} x [n][3] @param {Uint32Array} triangles [m][3]
+ */
+function isClosed(x, triangles) {
+  const n = x.length / 3, edges = new Set();
+  let volume = 0; // sixfold
+  for (let t = 0; t < triangles.length; t += 3) {
+    const a = triangles[t], b = triangles[t + 1], c = triangles[t + 2], i = 3 * a, j = 3 * b, k = 3 * c;
+    volume += x[i] * (x[j + 1] * x[k + 2] - x[j + 2] * x[k + 1]) + x[i + 1] * (x[j + 2] * x[k] - x[j] * x[k + 2]) + x[i + 2] * (x[j] * x[k + 1] - x[j + 1] * x[k]);
+    // an edge and its like in the other direction take one another away
+    for (const [from, to] of [[a, b], [b, c], [c, a]]) if (!edges.delete(to * n + from)) edges.add(from * n + to);
+  }
+  return edges.size === 0 && volume > 0;
+}
+
 export class BodyMesh {
   /**
    * @param {THREE.Scene} scene
@@ -78,6 +94,7 @@ export class BodyMesh {
     /** @type {{low: number, high: number} | null} of the values shown */
     this.values = null;
     this.valuesAt = 0;
+    this.shown = false; // a frame has been taken: normals are there
     this.geometry = new THREE.BufferGeometry();
     this.position = new THREE.BufferAttribute(rest.slice(), 3).setUsage(THREE.DynamicDrawUsage);
     this.normal = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
@@ -91,8 +108,16 @@ export class BodyMesh {
     this.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     this.geometry.computeBoundingSphere();
     this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.uniforms));
+    if (isClosed(rest, triangles)) this.mesh.material.side = THREE.FrontSide;
     this.mesh.frustumCulled = false;
     scene.add(this.mesh);
+  }
+
+  /** does a frame lie within `least` m of what is shown, in every coordinate? @param {Float32Array} positions @param {number} least */
+  near(positions, least) {
+    const x = this.position.array;
+    for (let i = 0; i < x.length; i++) if (Math.abs(x[i] - positions[i]) > least) return false;
+    return this.shown;
   }
 
   /**
@@ -102,6 +127,7 @@ export class BodyMesh {
    */
   take(positions, normals) {
     const old = { positions: /** @type {Float32Array} */ (this.position.array), normals: /** @type {Float32Array} */ (this.normal.array) };
+    this.shown = true;
     this.position.array = positions;
     this.normal.array = normals;
     this.position.needsUpdate = true;

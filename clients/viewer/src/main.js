@@ -6,13 +6,14 @@ import { FIELDS, labels, missing, offered, rangeOf } from "./legend.js";
 import { PlanPanel } from "./plan_panel.js";
 import { Stage } from "./stage.js";
 import { ToolInput } from "./tool_input.js";
-import { ToolMarks } from "./tool_marks.js";
+import { sameTools, ToolMarks } from "./tool_marks.js";
 
 /** @param {string} id @returns {any} */
 const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const POSE_MS = 16; // poses while a tool moves
 const HOLD_MS = 50; // and while it rests: a silent tool is let go by the server
 const GRAB_MS = 1500; // longest wait for the server to take hold
+const NEAR = 2e-5; // of the scene's size: what moves less is drawn as it was
 const TOLD_MS = 4000; // how long the server's answer to a refused wish is shown
 /** timer of a notice that goes by itself, 0: none */
 let told = 0;
@@ -54,6 +55,7 @@ const input = new ToolInput(
   },
   (wish) => {
     state.wish = wish;
+    stage.dirty = true;
     sendPose(true);
   },
 );
@@ -132,6 +134,8 @@ function showTitle() {
   document.title = state.hello.title + " · Palpate";
   byId("title").textContent = state.hello.title;
   byId("source").textContent = state.hello.organ;
+  byId("accuracy").textContent = state.hello.accuracy ?? "";
+  byId("accuracy").hidden = !state.hello.accuracy;
 }
 
 function showTool() {
@@ -245,6 +249,7 @@ const control = {
     if (me && state.myTool < 0 && me.role !== "viewer" && free >= 0) worker.postMessage({ type: "control", message: { type: "take", tool: -1 } });
     panel.people(m.members, state.me);
     showTool();
+    stage.dirty = true; // names beside tools
   },
   error(m) {
     if (m.code === "tool_taken") return;
@@ -293,8 +298,8 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
       break;
     }
     case "tools":
+      if (!sameTools(marks.drawn, data.tools, NEAR * stage.size)) stage.dirty = true;
       state.tools = data.tools;
-      stage.dirty = true;
       break;
     case "figures":
       Object.assign(state.here, data.figures);
@@ -309,30 +314,40 @@ function showForce() {
   byId("force-value").textContent = force.toFixed(2);
 }
 
+/** the newest frames, where they differ from what is shown @returns {boolean} some do */
+function takeFrames() {
+  let fresh = false;
+  for (const [part, frame] of state.frames) {
+    const body = state.bodies.get(part);
+    if (!body || body.rest.length !== frame.positions.length) continue;
+    state.frames.delete(part);
+    const differs = !body.near(frame.positions, NEAR * stage.size);
+    const old = differs ? body.take(frame.positions, frame.normals) : frame;
+    worker.postMessage({ type: "reuse", part, ...old }, [old.positions.buffer, old.normals.buffer]);
+    fresh ||= differs;
+  }
+  return fresh;
+}
+
 let fpsSince = performance.now();
 function picture() {
   requestAnimationFrame(picture);
   input.tick();
   sendPose(false);
-  let fresh = false;
-  for (const [part, frame] of state.frames) {
-    const body = state.bodies.get(part);
-    if (!body || body.rest.length !== frame.positions.length) continue;
-    const old = body.take(frame.positions, frame.normals);
-    worker.postMessage({ type: "reuse", part, ...old }, [old.positions.buffer, old.normals.buffer]);
-    state.frames.delete(part);
-    stage.dirty = true;
-    fresh = true;
-  }
-  if (fresh) state.drawn++;
-  for (const body of state.bodies.values()) if (body.blend(performance.now())) stage.dirty = true;
-  if (stage.dirty) {
-    marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
-    stage.draw();
-    marks.placeLabels();
-    showForce();
-  }
   const now = performance.now();
+  if (stage.ready()) {
+    if (takeFrames()) {
+      stage.dirty = true;
+      state.drawn++;
+    }
+    for (const body of state.bodies.values()) if (body.blend(now)) stage.dirty = true;
+    if (stage.dirty) {
+      marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
+      stage.draw();
+      marks.placeLabels();
+      showForce();
+    }
+  }
   if (now - fpsSince > 1000) {
     state.here.fps = (1000 * state.drawn) / (now - fpsSince);
     state.drawn = 0;

@@ -1,5 +1,19 @@
 // The stage: renderer, light, camera and its orbit. Lengths are metres of the scene frame; `up` is the scene's.
+import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
+
+const LEAST_RATIO = 0.4; // drawn pixels per pixel of the page, where drawing is slow
+const POLL_MS = 2; // between questions whether a picture is there
+
+/** does the processor draw in place of a graphics card? Some browsers say so, others only name what draws */
+function softwareDraws() {
+  const context = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  if (!context) return true;
+  const named = context.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? String(context.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
 
 /**
  * A studio of soft light panels, rendered once into an environment map: wet tissue needs something to reflect.
@@ -34,7 +48,8 @@ export class Stage {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    const software = softwareDraws();
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.0;
     this.scene = new THREE.Scene();
@@ -53,8 +68,8 @@ export class Stage {
     this.scene.environment = makeStudio(this.renderer);
     this.scene.environmentIntensity = 0.8;
     this.dirty = true;
-    this.sharpness = 1; // of the screen's pixels; less where drawing is slow
-    this.slowFrames = 0;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    this.pace = new Pace(LEAST_RATIO / ratio, software ? 0.6 / ratio : 1);
     new ResizeObserver(() => this.resize()).observe(canvas);
     // a window that moves to a screen of other pixels keeps its size
     window.addEventListener("resize", () => this.resize());
@@ -85,7 +100,7 @@ export class Stage {
   }
 
   pixelRatio() {
-    return Math.max(0.75, this.sharpness * Math.min(window.devicePixelRatio || 1, 2));
+    return Math.max(LEAST_RATIO, this.pace.sharpness * Math.min(window.devicePixelRatio || 1, 2));
   }
 
   resize() {
@@ -152,19 +167,31 @@ export class Stage {
     this.rim.target.updateMatrixWorld();
   }
 
-  /** draws when something changed; sharpness gives way when drawing is slow */
+  /** is the last picture there, and its pause over? */
+  ready() {
+    return this.pace.ready(performance.now());
+  }
+
+  /** draws when something changed */
   draw() {
     if (!this.dirty) return;
     this.dirty = false;
     this.placeCamera();
-    const begin = performance.now();
+    this.pace.begin(performance.now());
     this.renderer.render(this.scene, this.camera);
-    this.slowFrames = performance.now() - begin > 30 ? this.slowFrames + 1 : 0;
-    if (this.slowFrames > 20 && this.pixelRatio() > 0.75) {
-      this.sharpness /= 1.5;
-      this.slowFrames = 0;
-      this.resize();
-    }
+    // drawing goes on after render returns: the fence tells when it is over
+    const gl = /** @type {WebGL2RenderingContext} */ (this.renderer.getContext());
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const ask = () => {
+      if (fence && !gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
+        setTimeout(ask, POLL_MS);
+        return;
+      }
+      gl.deleteSync(fence);
+      if (this.pace.done(performance.now())) this.resize();
+    };
+    setTimeout(ask, POLL_MS);
   }
 
   /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */

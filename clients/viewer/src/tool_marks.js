@@ -3,6 +3,19 @@ import * as THREE from "./three.js";
 
 /** @typedef {import("./wire.js").Tool} Tool */
 
+/**
+ * Do two states of the tools look alike: same flags, holders and colours, places within `least` m, forces within 5 mN?
+ * @param {Tool[]} a @param {Tool[]} b @param {number} least
+ */
+export function sameTools(a, b, least) {
+  const near = (/** @type {number[]} */ u, /** @type {number[]} */ v, /** @type {number} */ limit) => u.every((c, k) => Math.abs(c - v[k]) <= limit);
+  return a.length === b.length && a.every((t, i) => {
+    const u = b[i];
+    const same = t.flags === u.flags && t.holder === u.holder && t.colour === u.colour && t.radius === u.radius;
+    return same && near(t.position, u.position, least) && near(t.force, u.force, 0.005);
+  });
+}
+
 export class ToolMarks {
   /** @param {import("./stage.js").Stage} stage @param {HTMLElement} labels */
   constructor(stage, labels) {
@@ -10,6 +23,8 @@ export class ToolMarks {
     this.labels = labels;
     /** @type {{ball: THREE.Mesh, arrow: THREE.ArrowHelper, label: HTMLSpanElement, at: THREE.Vector3, shown: boolean}[]} */
     this.marks = [];
+    /** @type {Tool[]} as last drawn */
+    this.drawn = [];
   }
 
   /** @param {number} index */
