@@ -29,6 +29,7 @@ struct pal_bridge_net {
     double radius_m;
     uint32_t generation, pose_seq, echo_seq, model_seq, model_newest, event_seq, status_seq;
     uint64_t joined_ns, model_ns, model_first_seq, n_status;
+    bool placed; /* the workspace is where it belongs */
     pal_servo_view view;
     pal_servo_timing timing;
     struct {
@@ -57,11 +58,14 @@ static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
     pal_servo_put_model(n->servo, model, n->generation, now);
 }
 
-/* where the tool's centre is when it touches the organ at rest from above */
+/* where the tool's centre is when it touches the organ at rest from above; until then no pose goes out, for it would be
+ * one within the organ or anywhere */
 static void net_place(pal_bridge_net *n)
 {
     double point[3];
-    if (n->o.has_origin || !n->asset || !n->asset->ready) return;
+    if (n->o.has_origin || !n->asset || !(n->asset->ready || n->asset->failed)) return;
+    n->placed = true;
+    if (!n->asset->ready) return;
     if (!pal_asset_furthest(n->asset->asset, n->o.up, point)) return;
     pal_axpy3(point, n->radius_m, n->o.up);
     pal_servo_put_origin(n->servo, point);
@@ -93,7 +97,10 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
                           ? hello->tool[hello->you_tool].radius_m
                           : 0.01;
         net_joined(n);
-        if (hello->n_part > 0) n->asset = pal_asset_store_want(n->store, hello->part[0].asset);
+        if (hello->n_part > 0)
+            n->asset = pal_asset_store_want(n->store, hello->part[0].asset);
+        else
+            n->placed = true;
         net_place(n);
         pal_log(PAL_LOG_INFO, "joined", "%s with tool %d", hello->session, hello->you_tool);
     }
@@ -163,7 +170,7 @@ static void net_send_pose(void *user)
     n->view = *fresh;
     const pal_servo_view *v = &n->view;
     const int tool = n->lcm ? n->o.tool : n->count.tool;
-    if (tool < 0) return;
+    if (tool < 0 || !n->placed) return;
     pal_wire_pose pose = {.tool = (uint16_t)tool,
                           .seq = n->pose_seq + 1,
                           .flags = v->flags,
@@ -327,6 +334,7 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     n->o = *options;
     n->count.tool = PAL_WIRE_TOOL_NONE;
     const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);
+    n->placed = bus || options->has_origin;
     if (bus && n->o.tool < 0) n->o.tool = 0;
     if (bus) n->count.tool = n->o.tool;
     pal_err err = bus ? net_open_lcm(n, note) : net_open_ws(n, note);

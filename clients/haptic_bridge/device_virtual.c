@@ -20,6 +20,7 @@
 #define VISCOUS_NS_M    0.05
 #define TOUCH_FELT_N    0.1
 #define TOUCH_REST_M_S  0.005 /* a hand this slow feels what it touches, no damping */
+#define TOUCH_TICKS     20    /* of the servo, which a late one answers with old forces */
 #define APPROACH_M_S    0.04
 
 typedef struct virtual_device {
@@ -55,6 +56,7 @@ typedef struct virtual_state {
     double depth_m, height_m, wait_s, lag_s;
     double viscous, coulomb;
     bool virtual_clock, touched;
+    int n_felt; /* advances in a row at whose end the resting hand felt something */
     long n_read, fail_at;
     double time_s, touched_s, rest_s; /* rest: time not yet turned into whole sub-steps */
     double touched_z;
@@ -73,7 +75,7 @@ static void virtual_intend(virtual_state *s)
         const bool felt = pal_norm3(s->applied) > TOUCH_FELT_N;
         if (!felt && s->time_s > s->wait_s)
             s->xd[2] = fmax(s->xd[2] - APPROACH_M_S * SUB_STEP_S, -0.9 * s->device->radius_m);
-        if (felt && pal_norm3(s->v) < TOUCH_REST_M_S) {
+        if (s->n_felt >= TOUCH_TICKS) {
             s->touched = true;
             s->touched_s = s->time_s;
             s->touched_z = s->xd[2];
@@ -126,6 +128,8 @@ void pal_virtual_advance(void *handle, double dt_s)
         s->time_s += SUB_STEP_S;
         s->rest_s -= SUB_STEP_S;
     }
+    const bool felt = pal_norm3(s->applied) > TOUCH_FELT_N && pal_norm3(s->v) < TOUCH_REST_M_S;
+    s->n_felt = felt ? s->n_felt + 1 : 0;
     if (!off) pal_copy3(s->command, s->next);
 }
 

@@ -62,7 +62,7 @@ export const launch = () => chromium.launch({ executablePath: process.env.CHROMI
 /** a page that shows the organ */
 export async function open(browser, address, name, viewport) {
   const page = await browser.newPage({ viewport });
-  page.setDefaultTimeout(90000);
+  page.setDefaultTimeout(180000);
   page.on("console", (m) => m.type() === "error" && troubles.push(`${name}: ${m.text()}`));
   page.on("pageerror", (e) => troubles.push(`${name}: ${e.message}`));
   await page.goto(`${address}?name=${name}`);
@@ -84,8 +84,8 @@ export const organPixel = (page) => page.evaluate(() => {
   return null;
 });
 
-/** waits until test(await read()) or the time is over, gives the last value */
-export async function until(read, test, ms = 20000) {
+/** waits until test(await read()) or the time is over, gives the last value; long, for machines whose cores others have too */
+export async function until(read, test, ms = 90000) {
   const end = Date.now() + ms;
   for (;;) {
     const value = await read();
