@@ -12,8 +12,8 @@
 #include <string.h>
 
 enum { WIDE = 400, TALLEST = 360, LOWEST = 150, PAD = 14, TITLE = 34, LEGEND = 22, FOOT = 66, MARGIN = 14 };
-enum { PIECES_A_FILE = 20000, ARROWS_MOST = 60, CORNERS_MOST = 50000000 };
-static const double arrow_share = 0.2; /* longest arrow over the diagonal of what is drawn */
+enum { PIECES_A_FILE = 16000, ARROWS_MOST = 60, CORNERS_MOST = 50000000 };
+static const double arrow_share = 0.17; /* longest arrow over the diagonal of what is drawn */
 
 static const uint8_t plain[3] = {0xd8, 0xcc, 0xc4};
 static const char *const held_ink = "#1f5fd6", *const load_ink = "#0b7a2a";
@@ -294,8 +294,7 @@ static void pen_down(path_pen *pen, int ink)
     pen_up(pen);
     pen->ink = ink;
     if (ink >= OUTLINE) {
-        fprintf(pen->to, "<path fill=\"none\" stroke=\"%s\" stroke-width=\"%d\" d=\"",
-                ink == OUTLINE ? outline_ink : crease_ink, ink == OUTLINE ? 12 : 7);
+        fprintf(pen->to, "<path class=\"%s\" d=\"", ink == OUTLINE ? "outline" : "crease");
         return;
     }
     int class = ink / PAL_PICTURE_SHADES + PAL_PICTURE_GREY, shade = ink % PAL_PICTURE_SHADES;
@@ -344,31 +343,17 @@ static dot *make_dots(const sheet *page, const panel *g, int *n)
         if (!p->held[i]) continue;
         double at[3];
         pal_picture_project(&g->axes, p->x + 3 * i, at);
-        d[*n].depth = at[2] + 0.02 * g->span_m;
+        d[*n].depth = at[2] + 0.04 * g->span_m;
         place(page, g, at, d[(*n)++].at);
     }
     if (d) qsort(d, (size_t)*n, sizeof *d, by_depth);
     return d;
 }
 
-static pal_err draw_body(const sheet *page, const panel *g, FILE *to)
+static void draw_ghost(const sheet *page, const panel *g, const char *more, FILE *to)
 {
-    int n_dot = 0, done = 0;
-    dot *d = make_dots(page, g, &n_dot);
-    if (!d) return PAL_ERR_MEMORY;
-    path_pen pen = {to, OFF};
-    for (int i = 0; i <= g->n_piece; i++) {
-        for (; done < n_dot && (i == g->n_piece || d[done].depth < g->piece[i].depth); done++) {
-            pen_up(&pen);
-            fprintf(to, "<circle cx=\"%d\" cy=\"%d\" r=\"%d\" fill=\"%s\" stroke=\"#fff\"/>\n", d[done].at[0],
-                    d[done].at[1], n_dot > 300 ? 18 : 26, held_ink);
-        }
-        if (i < g->n_piece) draw_piece(page, g, &pen, &g->piece[i]);
-    }
-    pen_up(&pen);
-    free(d);
-    if (g->n_ghost == 0) return PAL_ERR_OK;
-    fprintf(to, "<path fill=\"none\" stroke=\"%s\" stroke-width=\"11\" d=\"", rest_ink);
+    if (g->n_ghost == 0) return;
+    fprintf(to, "<path class=\"rest\"%s d=\"", more);
     for (int i = 0; i < g->n_ghost; i++) {
         int a[2], b[2];
         place(page, g, g->ghost[i].from, a);
@@ -376,6 +361,27 @@ static pal_err draw_body(const sheet *page, const panel *g, FILE *to)
         fprintf(to, "M%d %dL%d %d", a[0], a[1], b[0], b[1]);
     }
     fputs("\"/>\n", to);
+}
+
+/* the shape at rest stands behind, and shines through a little */
+static pal_err draw_body(const sheet *page, const panel *g, FILE *to)
+{
+    int n_dot = 0, done = 0;
+    dot *d = make_dots(page, g, &n_dot);
+    if (!d) return PAL_ERR_MEMORY;
+    path_pen pen = {to, OFF};
+    draw_ghost(page, g, "", to);
+    for (int i = 0; i <= g->n_piece; i++) {
+        for (; done < n_dot && (i == g->n_piece || d[done].depth < g->piece[i].depth); done++) {
+            pen_up(&pen);
+            fprintf(to, "<circle class=\"held\" cx=\"%d\" cy=\"%d\" r=\"%d\"/>\n", d[done].at[0], d[done].at[1],
+                    n_dot > 300 ? 18 : 26);
+        }
+        if (i < g->n_piece) draw_piece(page, g, &pen, &g->piece[i]);
+    }
+    pen_up(&pen);
+    free(d);
+    draw_ghost(page, g, " opacity=\"0.35\"", to);
     return PAL_ERR_OK;
 }
 
@@ -424,6 +430,18 @@ static void draw_loads(const sheet *page, const panel *g, FILE *to)
 
 /* ---- around the drawing ---- */
 
+static void draw_styles(FILE *to)
+{
+    fprintf(to,
+            "<style>.outline,.crease,.rest{fill:none}.outline{stroke:%s;stroke-width:12}"
+            ".crease{stroke:%s;stroke-width:7}.rest{stroke:%s;stroke-width:11}.held{fill:%s;stroke:#fff}</style>\n",
+            outline_ink, crease_ink, rest_ink, held_ink);
+    fputs("<linearGradient id=\"map\">", to);
+    for (int i = 0; i < 9; i++)
+        fprintf(to, "<stop offset=\"%g\" stop-color=\"#%02x%02x%02x\"/>", i / 8.0, stop[i][0], stop[i][1], stop[i][2]);
+    fputs("</linearGradient>\n", to);
+}
+
 static void draw_axes(const panel *g, double x, double y, FILE *to)
 {
     fputs("<g stroke=\"#555\" stroke-width=\"1.3\" font-size=\"11\">\n", to);
@@ -440,14 +458,8 @@ static void draw_axes(const panel *g, double x, double y, FILE *to)
 
 static void draw_bar(const panel *g, double x, double y, double wide, FILE *to)
 {
-    enum { STEPS = PAL_PICTURE_CLASSES };
     const pal_body_picture *p = g->p;
-    for (int i = 0; i < STEPS; i++) {
-        uint8_t c[3];
-        pal_body_picture_colour((double)i / (STEPS - 1), c);
-        fprintf(to, "<path d=\"M%.2f %.1fh%.2fv11h-%.2fz\" fill=\"#%02x%02x%02x\"/>\n", x + wide * i / STEPS, y,
-                wide / STEPS + (i + 1 < STEPS ? 0.5 : 0), wide / STEPS + (i + 1 < STEPS ? 0.5 : 0), c[0], c[1], c[2]);
-    }
+    fprintf(to, "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"11\" rx=\"2\" fill=\"url(#map)\"/>\n", x, y, wide);
     double value[PAL_SVG_TICKS], last = -INFINITY;
     int n = p->log ? pal_svg_log_ticks(g->from, g->to, value)
                    : pal_svg_ticks(g->from, g->to, pal_svg_step(g->to - g->from, 5), value);
@@ -482,10 +494,10 @@ static void draw_legend(const sheet *page, const panel *g, double y, FILE *to)
     }
     if (most > 0 && page->load_most_N > 0) {
         char text[48];
-        snprintf(text, sizeof text, "up to %.3g N", most);
+        int length = snprintf(text, sizeof text, "up to %.3g N", most);
         fprintf(to, "<path d=\"M%.1f %.1fh12v-3.5l7 4.2l-7 4.2v-3.5h-12z\" fill=\"%s\"/>\n", x, y - 4.7, load_ink);
         pal_svg_text(to, x + 24, y, "start", small, text, 0);
-        x += 100;
+        x += 40 + 6.2 * length;
     }
     if (p->rest) {
         fprintf(to, "<path d=\"M%.1f %.1fh18\" stroke=\"%s\" stroke-width=\"1.4\"/>\n", x, y - 4, rest_ink);
@@ -507,7 +519,7 @@ static pal_err draw_panel(const sheet *page, const panel *g, FILE *to)
                      g->p->title, 50);
     if (page->legend) draw_legend(page, g, y - 8, to);
     fprintf(to,
-            "<g transform=\"translate(%.0f %.0f) scale(0.1)\" stroke-width=\"7\" stroke-linejoin=\"round\" "
+            "<g transform=\"translate(%.0f %.0f) scale(0.1)\" stroke-width=\"10\" stroke-linejoin=\"round\" "
             "stroke-linecap=\"round\">\n",
             g->left, y);
     PAL_TRY(draw_body(page, g, to));
@@ -550,6 +562,7 @@ static pal_err draw(sheet *page, const char *path, pal_note *note)
     pal_svg svg;
     PAL_TRY(
         pal_svg_begin(&svg, MARGIN + page->n * (WIDE + MARGIN), page->panel[0].top + page->tall + FOOT + MARGIN, note));
+    draw_styles(svg.to);
     for (int i = 0; i < page->n && !err; i++) err = draw_panel(page, &page->panel[i], svg.to);
     if (err) {
         fclose(svg.to);

@@ -4,7 +4,7 @@
  * and frame, those of the same quantity their range of colours, so that they can be compared.
  *
  * Hidden parts go by painter's order (picture_faces.h). A file stays below 1.5 MB: surfaces with more to see than
- * 20,000 triangles in all are drawn coarser. Thread: [load]. */
+ * 16,000 triangles in all are drawn coarser. Thread: [load]. */
 #ifndef PAL_LAB_BODY_PICTURE_H
 #define PAL_LAB_BODY_PICTURE_H
 #include "server/base/err.h"

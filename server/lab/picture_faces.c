@@ -206,6 +206,7 @@ pal_err pal_picture_mesh_settle(pal_picture_mesh *m, const pal_picture_axes *axe
     for (; seen > most && size > 0; size *= 1.2) {
         PAL_TRY(join_cells(m, low, size));
         m->closed = closed; /* cells fold a closed surface but open none */
+        m->joined = true;
         seen = count_seen(m, axes);
     }
     return PAL_ERR_OK;
@@ -246,21 +247,21 @@ static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, 
 }
 
 /* is the edge of these k triangles an outline of positions x seen from the eye: an end of the surface, or the border
- * between what looks at the eye and what does not? */
+ * between what looks at the eye and what does not? Not where joining vertices has folded the surface */
 static bool is_outline(const pal_picture_mesh *m, const double *x, const double eye[3], const edge *e, int k)
 {
     double normal[2][3];
-    if (k != 2) return true;
+    if (k != 2) return !m->joined;
     for (int i = 0; i < 2; i++) face_normal(x, m->tri + 3 * e[i].tri, normal[i]);
-    double a = pal_dot3(normal[0], eye), b = pal_dot3(normal[1], eye);
-    if (e[0].turned == e[1].turned) b = -b;
-    return (a > 0) != (b > 0);
+    if (e[0].turned == e[1].turned) pal_scale3(normal[1], -1, normal[1]);
+    bool folded = pal_dot3(normal[0], normal[1]) < -0.3 * pal_norm3(normal[0]) * pal_norm3(normal[1]);
+    return (pal_dot3(normal[0], eye) > 0) != (pal_dot3(normal[1], eye) > 0) && !(m->joined && folded);
 }
 
 static bool is_crease(const pal_picture_mesh *m, const edge *e, int k)
 {
     double normal[2][3];
-    if (k != 2) return false;
+    if (k != 2 || m->joined) return false;
     for (int i = 0; i < 2; i++) {
         face_normal(m->x, m->tri + 3 * e[i].tri, normal[i]);
         if (!pal_unit3(normal[i], normal[i], 0)) return false;

@@ -29,6 +29,7 @@ typedef struct pal_picture_mesh {
     double *value;    /* [n_vertex]                   */
     int32_t *tri;     /* [n_tri][3]                   */
     bool closed;      /* every edge has two triangles */
+    bool joined;      /* drawn coarser than it is: edges of folds are no outlines */
 } pal_picture_mesh;
 void pal_picture_mesh_free(pal_picture_mesh *mesh);
 /* joins vertices within cells until at most `most` triangles can be seen; finds closed and turns what is inside out */
