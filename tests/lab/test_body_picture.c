@@ -127,13 +127,16 @@ static void a_cube_shows_three_faces_from_a_corner_and_one_from_the_front(void)
     int32_t inward[12][3];
     for (int i = 0; i < 12; i++)
         inward[i][0] = cube_tri[i][1], inward[i][1] = cube_tri[i][0], inward[i][2] = cube_tri[i][2];
-    p.view[1] = p.view[2] = 0;
+    double value[8];
+    for (int v = 0; v < 8; v++) value[v] = cube_x[v][0];
+    p.view[1] = p.view[2] = 0, p.value = value, p.high = 1;
     for (int turn = 0; turn < 2; turn++) {
         if (turn) p.tri = inward[0];
         text = draw(&p, 1);
         REQUIRE(text);
         CHECK_INT(read_triangles(text, t, 16), 2);
         CHECK_NEAR(area(&t[0]) + area(&t[1]), 332.0 * 332, 100);
+        CHECK_INT(t[0].fill, 0xfde725); /* x = 1, not the inner side of x = 0 */
         free(text);
     }
     /* an open box is seen from inside too */
