@@ -6,10 +6,11 @@
  * weights V_i l_i^2/h^5 when the scene asks for them, and derived ones none when it asks for that. With these weights
  * the five-tetrahedra lattice is exactly isotropic, which equal constants cannot make it (their shear modulus along the
  * grid is 0.4 of that across), and springs on the boundary count for the volume they have, so that thin bodies are not
- * too stiff. Moduli of the lattice, per E, derived by summing the springs of a periodic cell: shear  G = 2/3 f_d + 4/9
- * f_a        bulk  K = 10/9 f_d + 80/27 f_a + f_v f_a takes half of the bulk modulus that edges alone lack (they have K
- * = 5/3 G, nu = 0.25), at most half of the shear modulus; f_v the rest. A body without area springs takes f_a = 0: the
- * same moduli from two rows. A Poisson ratio below 0.26 is simulated as 0.26.
+ * too stiff. Moduli of the lattice, per E, derived by summing the springs of a periodic cell:
+ *   shear  G = 2/3 f_d + 4/9 f_a        bulk  K = 10/9 f_d + 80/27 f_a + f_v
+ * f_a takes half of the bulk modulus that edges alone lack (they have K = 5/3 G, nu = 0.25), at most half of the shear
+ * modulus; f_v the rest. A body without area springs takes f_a = 0: the same moduli from two rows. A Poisson ratio
+ * below 0.26 is simulated as 0.26.
  *
  * Constants on a grid (paper B 3.5): k_i is the weight times the mean over the spring's corners of the grid's value
  * there. Thread: [load], pal_spring_material [sim]. */
