@@ -11,6 +11,8 @@ static const pal_command_entry command[] = {
     {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
     {"replay", "run a recorded input log again and compare the world's hashes", command_replay},
     {"solve", "solve a load case with finite elements and compare it with a reference", command_solve},
+    {"calibrate", "fit springs to finite elements or measured displacements, and write a scene of them",
+     command_calibrate},
     {"bench", "measure mesh preparation, springs and protocol on this machine", command_bench},
 };
 enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };

@@ -109,7 +109,8 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
 {
     const pal_curve *c = &plot->curve[k];
     const char *dash = c->dashed ? " stroke-dasharray=\"6 4\"" : "";
-    fprintf(to, "<path fill=\"none\" stroke-width=\"2\" stroke=\"%s\"%s d=\"", colour[k % N_COLOUR], dash);
+    const char *width = c->thin ? "0.8\" stroke-opacity=\"0.6" : "2";
+    fprintf(to, "<path fill=\"none\" stroke-width=\"%s\" stroke=\"%s\"%s d=\"", width, colour[k % N_COLOUR], dash);
     bool pen = false;
     for (int i = 0; i < c->n; i++) {
         bool on = drawable(plot, c, i);
@@ -120,8 +121,8 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
     for (int i = 0; i < c->n && !c->bare; i++)
         if (drawable(plot, c, i)) mark(to, k, place(x, c->x[i]), place(y, c->y[i]));
     double at = TOP + 14 + 22.0 * k, from = WIDE - RIGHT + 16;
-    fprintf(to, "<path stroke-width=\"2\" stroke=\"%s\"%s d=\"M%.1f %.1fh28\"/>\n", colour[k % N_COLOUR], dash, from,
-            at);
+    fprintf(to, "<path stroke-width=\"%s\" stroke=\"%s\"%s d=\"M%.1f %.1fh28\"/>\n", width, colour[k % N_COLOUR], dash,
+            from, at);
     if (!c->bare) mark(to, k, from + 14, at);
     label(to, from + 36, at + 4, "start", "", c->name);
 }

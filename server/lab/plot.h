@@ -12,8 +12,8 @@ enum { PAL_PLOT_CURVES = 12 };
 typedef struct pal_curve {
     const char *name; /* in the legend; borrowed                             */
     int n;
-    const double *x, *y; /* borrowed; points that are not finite, or not positive on a log axis, are left out [n] */
-    bool dashed, bare;   /* bare: no marks                                      */
+    const double *x, *y;     /* borrowed; points that are not finite, or not positive on a log axis, are left out [n] */
+    bool dashed, bare, thin; /* bare: no marks; thin: a fine pale line, for what stands behind the others */
 } pal_curve;
 
 typedef struct pal_plot {

@@ -101,6 +101,8 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
  * makes DIR; numbers come back with the same bits. IO, REFUSED (scene.json longer than pal_scene_load takes), and then
  * nothing that this call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
+/* the same with the scene in a file of any name in a folder that is there, and the meshes beside it */
+pal_err pal_scene_save_file(const pal_loaded_scene *scene, const char *path, pal_note *note);
 /* other texts than those from the file's name; NULL keeps one. name becomes the only body's name as well. REFUSED for
  * characters that a scene may not hold or too many of them, and then nothing changed */
 pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *title, const char *source,

@@ -203,17 +203,14 @@ static void remove_files(const pal_scene *scene, const char *folder, int n_file)
     }
 }
 
-pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
+/* meshes into the folder, then the scene's text to path, which lies in it */
+static pal_err save_to(const pal_scene *scene, const char *folder, const char *path, pal_note *note)
 {
-    const pal_scene *scene = &loaded->scene;
-    char path[PATH];
     int n_file = 0;
-    pal_err err = pal_scene_make_folder(folder, note);
-    if (err) return err;
+    pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, note);
     char *text = err ? NULL : scene_text(scene);
-    if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for scene.json", folder);
-    snprintf(path, sizeof path, "%s/scene.json", folder);
+    if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     if (!err && strlen(text) > PAL_JSON_MOST)
         err = pal_note_set(note, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
                            PAL_JSON_MOST);
@@ -221,4 +218,24 @@ pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_n
     cJSON_free(text);
     if (err) remove_files(scene, folder, n_file);
     return err;
+}
+
+pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
+{
+    char path[PATH];
+    PAL_TRY(pal_scene_make_folder(folder, note));
+    snprintf(path, sizeof path, "%s/scene.json", folder);
+    return save_to(&loaded->scene, folder, path, note);
+}
+
+pal_err pal_scene_save_file(const pal_loaded_scene *loaded, const char *path, pal_note *note)
+{
+    char folder[PATH];
+    const char *slash = strrchr(path, '/');
+    int n = slash == path ? snprintf(folder, sizeof folder, "/")
+            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
+                          : snprintf(folder, sizeof folder, ".");
+    if (n < 0 || (size_t)n >= sizeof folder || strlen(path) >= PATH || !path[0] || (slash && !slash[1]))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s: not the name of a file", path);
+    return save_to(&loaded->scene, folder, path, note);
 }

@@ -1,0 +1,377 @@
+/* `palpate calibrate`: springs that come to rest where finite elements do -> a scene that serve runs, with its error
+ * stated (paper B 3). */
+#include "server/base/clock.h"
+#include "server/commands/calibrate_run.h"
+#include "server/commands/commands.h"
+
+#include <errno.h>
+#include <float.h>
+#include <limits.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char about[] =
+    "Finds constants of springs (edges, faces, volumes) that make a body come to rest where finite elements, or "
+    "measured\n"
+    "displacements, say it does, and writes a scene that palpate serve runs. PROBLEM.json is that of palpate solve.\n"
+    "A name of --case is a load case, whose truth is found by finite elements, or a reference, whose CSV is the "
+    "truth.\n"
+    "The error is the RMS distance in per cent of the truth's largest displacement, the mean over the fitted cases.\n"
+    "Ctrl-C ends the search and writes the best so far; once more ends at once.\n"
+    "Example: palpate calibrate deploy/problems/gear.json --case twist --verify push -o gear/scene.json\n"
+    "Example: palpate calibrate deploy/problems/cube.json --case push --grid 5x5x5 --picture cube.svg -o cube.json\n";
+
+/* words as they were given */
+typedef struct words {
+    const char *problem, *grid, *method, *weights, *area;
+    double budget_s;
+    int evaluations, seed;
+} words;
+
+/* ---- Ctrl-C ---- */
+
+static volatile sig_atomic_t stop_asked;
+
+static void on_stop(int number)
+{
+    (void)number;
+    stop_asked = 1;
+}
+
+/* the first is a wish, the next one ends the process */
+static void watch_stop(void)
+{
+    struct sigaction action = {.sa_handler = on_stop, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+/* ---- progress ---- */
+
+static bool show_making(const char *what, double fraction, void *user)
+{
+    pal_report_progress(what, fraction, user);
+    return !stop_asked;
+}
+
+static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
+{
+    static double shown_s;
+    char text[160], best[32] = "none yet", left[48] = "";
+    double now = pal_clock_s(), end = INFINITY;
+    if (now - shown_s < 0.1) return;
+    shown_s = now;
+    if (step->best_percent < DBL_MAX) snprintf(best, sizeof best, "%.4g %%", step->best_percent);
+    if (run->fit.budget_s > 0) end = run->fit.budget_s;
+    if (run->fit.most_evaluation > 0 && step->evaluation > 0)
+        end = fmin(end, step->seconds * (double)run->fit.most_evaluation / (double)(step->evaluation + 1));
+    if (isfinite(end)) snprintf(left, sizeof left, ", at most %.0f s left", fmax(0, end - step->seconds));
+    snprintf(text, sizeof text, "%s: best error %s, %lld evaluations, %.0f s%s", pal_calibrate_method(run), best,
+             (long long)step->evaluation + 1, step->seconds, left);
+    pal_report_progress(text, 0, &run->common);
+}
+
+/* keeps the trail; without memory for it the search goes on */
+static bool take_step(void *user, const pal_fit_step *step)
+{
+    pal_calibrate_run *run = user;
+    if (run->n_trail == run->most_trail) {
+        int more = run->most_trail > 0 ? 2 * run->most_trail : 256;
+        double *error = realloc(run->error, (size_t)more * sizeof *error);
+        if (error) run->error = error;
+        double *best = error ? realloc(run->best, (size_t)more * sizeof *best) : NULL;
+        if (best) run->best = best;
+        if (best) run->most_trail = more;
+    }
+    if (run->n_trail < run->most_trail) {
+        run->error[run->n_trail] = step->error_percent;
+        run->best[run->n_trail++] = step->best_percent;
+    }
+    show_fit(run, step);
+    return !stop_asked;
+}
+
+/* ---- words ---- */
+
+const char *pal_calibrate_method(const pal_calibrate_run *run)
+{
+    return run->annealing ? "annealing" : "adjoint";
+}
+
+const char *pal_calibrate_key(const pal_calibrate_run *run, int k, bool brief)
+{
+    static const char *const name[PAL_SPRING_KINDS][2] = {
+        {"k_distance_J", "k_d"}, {"k_area_J", "k_a"}, {"k_volume_J", "k_v"}};
+    return name[run->info.kind[k]][brief];
+}
+
+double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_value *value, bool fit)
+{
+    double sum = 0;
+    int n = 0;
+    for (int k = 0; k < run->set.n; k++) {
+        if (run->set.list[k].fit != fit) continue;
+        if (!(value->case_percent[k] < DBL_MAX)) return DBL_MAX;
+        sum += value->case_percent[k];
+        n++;
+    }
+    return n > 0 ? sum / n : NAN;
+}
+
+/* "5x3x5"; false: it is none */
+static bool read_grid(const char *text, int grid[3])
+{
+    const char *at = text;
+    for (int a = 0; a < 3; a++) {
+        char *end;
+        if (*at < '0' || *at > '9') return false;
+        long n = strtol(at, &end, 10);
+        if (n < 1 || n > 1024 || *end != (a < 2 ? 'x' : 0)) return false;
+        grid[a] = (int)n;
+        at = end + 1;
+    }
+    return true;
+}
+
+static bool is_one(const char *word, const char *a, const char *b)
+{
+    return !word || !strcmp(word, a) || !strcmp(word, b);
+}
+
+/* what the words say; NULL: fine, else the sentence */
+static const char *take_words(pal_calibrate_run *run, const words *w)
+{
+    if (!run->wish.fit || !*run->wish.fit) return "--case ID is missing: what shall be fitted?";
+    if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
+    if (!is_one(w->method, "adjoint", "annealing")) return "--method: is not adjoint or annealing";
+    if (!is_one(run->wish.kinematics, "finite", "linear")) return "--kinematics: is not finite or linear";
+    if (!is_one(w->weights, "volume", "equal")) return "--weights: is not volume or equal";
+    if (!is_one(w->area, "on", "off")) return "--area-springs: is not on or off";
+    if (w->grid && !read_grid(w->grid, run->options.grid))
+        return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
+    run->annealing = w->method && !strcmp(w->method, "annealing");
+    run->options.equal = w->weights && !strcmp(w->weights, "equal");
+    if (w->area) run->options.without_area = !strcmp(w->area, "off");
+    run->fit.budget_s = w->budget_s;
+    run->fit.most_evaluation = w->evaluations;
+    run->fit.seed = (uint64_t)w->seed;
+    return NULL;
+}
+
+/* ---- files that will be written ---- */
+
+/* can a file of this name be written, and is it not one of those that are read? Said before the work, not after it */
+static pal_err check_target(const pal_calibrate_run *run, const char *flag, const char *path, pal_note *note)
+{
+    char folder[PAL_CALIBRATE_PATH], own[PATH_MAX], other[PATH_MAX];
+    struct stat facts;
+    if (!path) return PAL_ERR_OK;
+    const char *slash = strrchr(path, '/');
+    int n = slash == path ? snprintf(folder, sizeof folder, "/")
+            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
+                          : snprintf(folder, sizeof folder, ".");
+    if (n < 0 || (size_t)n + 64 >= sizeof folder || !path[0] || (slash && !slash[1]))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
+    if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
+    if (access(folder, W_OK))
+        return pal_note_set(note, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
+    if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
+    if (realpath(path, own) && realpath(run->wish.problem, other) && !strcmp(own, other))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is the problem itself", flag, path);
+    return PAL_ERR_OK;
+}
+
+static pal_err check_targets(const pal_calibrate_run *run, pal_note *note)
+{
+    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
+    static const char *const flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
+    for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
+        PAL_TRY(check_target(run, flag[a], path[a], note));
+        for (int b = 0; b < a && path[a]; b++)
+            if (path[b] && !strcmp(path[a], path[b]))
+                return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", flag[a], path[a],
+                                    flag[b]);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- work ---- */
+
+static pal_err make(pal_calibrate_run *run, pal_note *note)
+{
+    pal_note why = {""};
+    run->options.progress = show_making;
+    run->options.user = &run->common;
+    pal_err err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
+                                         &run->calibration, &why);
+    if (err) return pal_note_set(note, err, "%s: %s", run->wish.problem, why.text);
+    pal_calibration_info_of(run->calibration, &run->info);
+    run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
+    if (!run->theta || pal_calibration_seat_create(run->calibration, &run->seat))
+        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
+    return pal_calibrate_cases_check(&run->set, run->info.mesh, note);
+}
+
+static pal_err search(pal_calibrate_run *run, pal_note *note)
+{
+    enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
+    const pal_calibration *c = run->calibration;
+    size_t n = sizeof *run->theta * (size_t)run->info.n_parameter;
+    pal_calibration_by_hand(c, run->theta);
+    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->hand, NULL, note));
+    memcpy(run->theta, run->info.start, n);
+    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->start, NULL, note));
+    run->fit.step = take_step;
+    run->fit.user = run;
+    pal_note why = {""};
+    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &why)
+                                 : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &why);
+    if (err) return pal_note_set(note, err, "%s: %s", run->wish.problem, why.text);
+    return pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->last, NULL, note);
+}
+
+/* how the springs move when they run */
+static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+{
+    pal_settle_load load[PAL_CALIBRATE_CASES];
+    size_t n = 3 * (size_t)run->info.n_node;
+    double begin = pal_clock_s(), *u = malloc(n * (size_t)run->set.n * sizeof *u);
+    pal_settle_options options;
+    pal_settle_default(&options);
+    options.progress = show_making;
+    options.user = &run->common;
+    if (!u) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
+    for (int k = 0; k < run->set.n; k++) {
+        bool rests = pal_calibration_moved(run->calibration, run->seat, k, u + n * (size_t)k);
+        load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
+                                    .u = rests ? u + n * (size_t)k : NULL};
+    }
+    pal_err err =
+        stop_asked ? PAL_ERR_STATE : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, note);
+    run->settled = !err;
+    run->settle_s = pal_clock_s() - begin;
+    free(u);
+    if (run->settled) scene->scene.body[0].material.damping_1_s = run->live.damping_1_s;
+    return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene's own damping has to do */
+}
+
+static pal_err write_files(pal_calibrate_run *run, const pal_loaded_scene *scene, pal_note *note)
+{
+    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
+    pal_err err = pal_scene_save_file(scene, run->scene, note);
+    if (!err && run->trajectory) err = pal_calibrate_draw_trajectory(run, run->trajectory, note);
+    if (!err && run->picture) err = pal_calibrate_draw_body(run, run->picture, note);
+    if (!err && run->vtk) err = pal_calibrate_write_vtk(run, run->vtk, note);
+    for (int k = 0; k < PAL_CALIBRATE_FILES && !err; k++)
+        if (path[k]) snprintf(run->file[run->n_file++], PAL_CALIBRATE_PATH, "%s", path[k]);
+    return err;
+}
+
+static pal_err work(pal_calibrate_run *run, pal_note *note)
+{
+    pal_loaded_scene *scene = NULL;
+    PAL_TRY(check_targets(run, note));
+    PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, note));
+    PAL_TRY(make(run, note));
+    PAL_TRY(search(run, note));
+    PAL_TRY(pal_calibrate_scene(run, &scene, note));
+    pal_err err = settle(run, scene, note);
+    if (!err) {
+        pal_calibrate_accuracy(run, scene->scene.accuracy, sizeof scene->scene.accuracy);
+        err = write_files(run, scene, note);
+    }
+    pal_scene_free(scene);
+    return err;
+}
+
+static int start(pal_calibrate_run *run)
+{
+    pal_note note = {""};
+    double begin = pal_clock_s();
+    watch_stop();
+    pal_err err = work(run, &note);
+    run->total_s = pal_clock_s() - begin;
+    pal_report_progress(NULL, 0, &run->common);
+    int code = err                ? pal_report_refusal(&run->common, err, &note)
+               : run->common.json ? pal_report_json(&run->common, pal_calibrate_json(run))
+                                  : 0;
+    if (!err && !run->common.json && !run->common.quiet) pal_calibrate_print(run);
+    pal_calibration_seat_destroy(run->seat);
+    pal_calibration_destroy(run->calibration);
+    pal_calibrate_cases_free(&run->set);
+    free(run->theta);
+    free(run->error);
+    free(run->best);
+    return code;
+}
+
+int command_calibrate(int argc, char **argv)
+{
+    static pal_calibrate_run run;
+    words w = {0};
+    pal_calibrate_options *o = &run.options;
+    pal_calibrate_default(o);
+    o->voxel.resolution = 16;
+    const pal_flag flag[] = {
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.fit, 0, 0, "load cases or references to fit"},
+        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.verify, 0, 0, "others, whose error is only reported"},
+        {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &w.grid, 0, 0,
+         "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
+        {"--method", "WORD", PAL_FLAG_TEXT, &w.method, 0, 0,
+         "adjoint (L-BFGS with exact slopes) or annealing (adaptive simulated annealing) (adjoint)"},
+        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &w.budget_s, 0.01, 1e7, "ends the search after so long (no limit)"},
+        {"--evaluations", "N", PAL_FLAG_COUNT, &w.evaluations, 1, 1e9,
+         "ends the search after so many (1000; annealing 4000)"},
+        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.enough_percent, 1e-9, 1e9,
+         "ends the search when the error is no more"},
+        {"--seed", "S", PAL_FLAG_COUNT, &w.seed, 0, INT_MAX, "of annealing; the same gives the same result (0)"},
+        {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
+         "threads of annealing; the result is the same for any number (one per core)"},
+        {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200, "voxels on the longest axis (16)"},
+        {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
+         "finite elements of the truth: every voxel as K x K x K of them (2)"},
+        {"--kinematics", "WORD", PAL_FLAG_TEXT, &run.wish.kinematics, 0, 0,
+         "finite: neo-Hookean truth, springs as they move; linear: both linearised (a reference's, or finite)"},
+        {"--truth", "WORD", PAL_FLAG_TEXT, &run.wish.truth, 0, 0,
+         "fem, reference (the CSV of the reference that answers a load case), or a file U.csv of x,y,z,ux,uy,uz for\n"
+         "the one case that is fitted"},
+        {"--weights", "WORD", PAL_FLAG_TEXT, &w.weights, 0, 0,
+         "volume: springs count for the volume around them; equal: all of a kind are the same, as in the paper "
+         "(volume)"},
+        {"--area-springs", "WORD", PAL_FLAG_TEXT, &w.area, 0, 0, "on, or off: edges and volumes alone (on)"},
+        {"--decades", "D", PAL_FLAG_NUMBER, &o->decades, 0.01, 20,
+         "how far a constant may go from its start either way, powers of ten (3)"},
+        {"--smooth", "W", PAL_FLAG_NUMBER, &o->smooth, 0, 1e9,
+         "weight of differences between neighbours on the grid, for a map without specks (0.03)"},
+        {"--pull", "W", PAL_FLAG_NUMBER, &o->pull, 0, 1e9,
+         "weight of the distance from the start's ratios of edges, faces and volumes (0.03)"},
+        {"--trajectory", "FILE.svg", PAL_FLAG_TEXT, &run.trajectory, 0, 0, "draws the error of every evaluation"},
+        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &run.picture, 0, 0,
+         "draws the body at rest, its truth, and how far start and result are from it; constants on a grid"},
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &run.vtk, 0, 0,
+         "writes a legacy VTK file with constants, and displacements of truth and springs"},
+        {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.scene, 0, 0, "the scene to write; its mesh goes beside it"},
+    };
+    const pal_flag_table table = {.usage = "calibrate PROBLEM.json --case ID -o SCENE.json [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .least_operand = 1,
+                                  .most_operand = 1};
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.wish.problem, &n);
+    if (code >= 0) return code;
+    const char *sentence = take_words(&run, &w);
+    if (sentence) {
+        fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", argv[0], sentence, argv[0]);
+        return 2;
+    }
+    return start(&run);
+}
