@@ -35,8 +35,8 @@ typedef struct pal_calibrate_options {
     bool without_area;    /* edges and volumes only                                                    */
     int grid[3];          /* nodes; 0 0 0: homogeneous                                                 */
     double decades;       /* bounds: theta within this many decades of the start; 3                    */
-    double smooth;        /* weight of differences of theta along the grid's edges, per cent^2          */
-    double pull;          /* weight of the distance from the start's ratios of constants, per cent^2    */
+    double smooth;        /* weight of differences of theta along the grid's edges: 0.1 (objective below) */
+    double pull;          /* weight of the distance from the start's ratios of constants, on a grid: 0.1 */
     bool (*progress)(const char *what, double fraction, void *user); /* while truths are solved; may be NULL */
     void *user;
 } pal_calibrate_options;
@@ -81,7 +81,8 @@ typedef struct pal_calibration_value {
     double error_percent;                     /* E over the fitted cases; DBL_MAX: a case has no stable rest   */
     double case_percent[PAL_CALIBRATE_CASES]; /* e_L; DBL_MAX: none; NaN: not asked for                        */
     double smooth, pull;                      /* the two regularisers, before their weights                    */
-    double objective;                         /* mean e_L^2 + smooth and pull with their weights, per cent^2; DBL_MAX */
+    double objective; /* ln (mean e_L^2) + smooth and pull with their weights: what adjoint minimises; the logarithm
+                         makes a weight mean the same for 10 % and for 0.1 % of error; DBL_MAX: no value          */
     int n_newton;
 } pal_calibration_value;
 

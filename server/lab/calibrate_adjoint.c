@@ -92,7 +92,7 @@ static double see(unsigned n, const double *theta, double *slope, void *user)
         f->good_objective = value;
         return value;
     }
-    double far = 0, steep = 10 * fmax(f->good_objective, 1e-12);
+    double far = 0, steep = 10;
     for (unsigned i = 0; i < n; i++) {
         double d = theta[i] - f->good[i];
         far += d * d;
@@ -110,7 +110,7 @@ static pal_err search(fit *f, double *theta)
     nlopt_set_lower_bounds(f->opt, c->low);
     nlopt_set_upper_bounds(f->opt, c->high);
     nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
-    nlopt_set_ftol_rel(f->opt, 1e-7);
+    nlopt_set_ftol_abs(f->opt, 3e-4);
     double least;
     nlopt_optimize(f->opt, theta, &least);
     nlopt_destroy(f->opt);
@@ -137,7 +137,7 @@ static pal_err run(fit *f, double *theta)
         memcpy(f->good, f->best, n);
         f->good_objective = f->best_objective;
         PAL_TRY(search(f, theta));
-        if (!(f->best_objective < before * (1 - 1e-3))) break;
+        if (!(f->best_objective < before - 1e-2)) break;
     }
     return PAL_ERR_OK;
 }

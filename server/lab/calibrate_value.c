@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* of mean e_L^2: below a thousandth of a per cent nobody asks for more */
+static const double floor_percent2 = 1e-6;
+
 /* ---- seat ---- */
 
 static pal_err make_seat(const pal_calibration *c, pal_calibration_seat *s)
@@ -182,7 +185,7 @@ static pal_err evaluate_case(pal_calibration_seat *s, const double *theta, int i
 static void regularise(const pal_calibration *c, const double *theta, pal_calibration_value *out, double *slope)
 {
     double smooth = c->n_edge > 0 ? 1.0 / (c->n_edge * c->n_kind) : 0;
-    double pull = c->n_kind > 1 ? 1.0 / (c->n_used * (c->n_kind - 1)) : 0;
+    double pull = c->n_kind > 1 && c->has_grid ? 1.0 / (c->n_used * (c->n_kind - 1)) : 0;
     for (int k = 0; k < c->n_kind; k++) {
         int at = k * c->n_used;
         for (int e = 0; e < c->n_edge; e++) {
@@ -191,7 +194,7 @@ static void regularise(const pal_calibration *c, const double *theta, pal_calibr
             out->smooth += smooth * d * d;
             if (slope) slope[a] += 2 * c->options.smooth * smooth * d, slope[b] -= 2 * c->options.smooth * smooth * d;
         }
-        for (int i = 0; i < c->n_used && k > 0; i++) {
+        for (int i = 0; i < c->n_used && k > 0 && pull > 0; i++) {
             double d = theta[at + i] - theta[i] - (c->theta[at + i] - c->theta[i]);
             out->pull += pull * d * d;
             if (slope) slope[at + i] += 2 * c->options.pull * pull * d, slope[i] -= 2 * c->options.pull * pull * d;
@@ -199,8 +202,8 @@ static void regularise(const pal_calibration *c, const double *theta, pal_calibr
     }
 }
 
-/* sums up; false: no value */
-static bool add_up(const pal_calibration *c, pal_calibration_value *out)
+/* sums up; *scale: d ln (mean e_L^2) / d (mean e_L^2); false: no value */
+static bool add_up(const pal_calibration *c, pal_calibration_value *out, double *scale)
 {
     double mean = 0, square = 0;
     out->error_percent = out->objective = DBL_MAX;
@@ -211,10 +214,11 @@ static bool add_up(const pal_calibration *c, pal_calibration_value *out)
         mean += e / c->n_fit;
         square += e * e / c->n_fit;
     }
-    double objective = square + c->options.smooth * out->smooth + c->options.pull * out->pull;
+    double objective = log(square + floor_percent2) + c->options.smooth * out->smooth + c->options.pull * out->pull;
     if (!isfinite(objective)) return false;
     out->error_percent = mean;
     out->objective = objective;
+    *scale = 1 / (square + floor_percent2);
     return true;
 }
 
@@ -240,8 +244,17 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
         if (err == PAL_ERR_MEMORY) return pal_note_set(note, err, "no memory to evaluate load case %d", i);
         lost |= fit && err;
     }
-    regularise(c, theta, out, slope ? seat->gradient : NULL);
-    if (ask & PAL_CALIBRATION_FIT && !lost && add_up(c, out) && slope) memcpy(slope, seat->gradient, n);
+    double scale = 1;
+    if (!slope) {
+        regularise(c, theta, out, NULL);
+        if (ask & PAL_CALIBRATION_FIT && !lost) add_up(c, out, &scale);
+        return PAL_ERR_OK;
+    }
+    regularise(c, theta, out, slope);
+    if (ask & PAL_CALIBRATION_FIT && !lost && add_up(c, out, &scale))
+        for (int i = 0; i < c->n_parameter; i++) slope[i] += scale * seat->gradient[i];
+    else
+        memset(slope, 0, n);
     return PAL_ERR_OK;
 }
 
