@@ -1,7 +1,7 @@
 #!/bin/sh
 # The browser tests: real Chromium on a real server. usage: run.sh pull|fields|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
-#   fields    displacement, stress and energy in colours, asked for and looked away from
+#   fields    displacement, stress, energy and edge stiffness in colours, asked for and looked away from
 #   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.
 set -u
