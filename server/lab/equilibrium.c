@@ -15,7 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PAIRS_MOST = 10, MOST_HALVING = 30, MOST_SHIFT = 8 };
+enum { MOST_HALVING = 30, MOST_SHIFT = 8 };
+static const double MOST_LINEAR = 1e-6; /* residual of a linear solve, relative */
 
 struct pal_seat {
     const pal_lattice *lattice;
@@ -338,11 +339,21 @@ static bool advance(const search *s, double *x, double *energy, double *size)
     return false;
 }
 
+/* what rounding leaves of the forces of springs at rest, N: the target of a body without load */
+static double rounding(const search *s)
+{
+    const pal_springs *edge = &s->seat->lattice->kind[PAL_SPRING_DISTANCE];
+    double most = 0;
+    for (int i = 0; i < edge->n_item; i++)
+        most = fmax(most, edge->q[i] * edge->w[i] * fabs(s->k_J[PAL_SPRING_DISTANCE][i]));
+    return 1e-14 * sqrt(s->seat->lattice->n_free) * most;
+}
+
 static pal_err newton(const search *s, double *x)
 {
     pal_seat *seat = s->seat;
     const pal_lattice *l = seat->lattice;
-    double target = s->o->tolerance * norm(l, s->force_N), load = norm(l, s->force_N);
+    double load = norm(l, s->force_N), target = load > 0 ? s->o->tolerance * load : rounding(s);
     double energy = residual(s, x, seat->r), size = norm(l, seat->r);
     bool stable = false;
     for (int k = 0;; k++) {
@@ -380,6 +391,14 @@ static pal_err linear(const search *s, double *x)
     if (!err) err = pal_cholesky_solve(seat->factor, s->force_N, seat->p);
     if (err) return pal_note_set(s->note, err, "no rest: no factor at rest (%s)", pal_err_text(err));
     if (!isfinite(norm(l, seat->p))) return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: not finite");
+    /* constants too far apart for the factor leave a residual */
+    double load = norm(l, s->force_N);
+    memcpy(seat->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
+    pal_blocks_multiply(&seat->matrix, -1, seat->p, seat->r);
+    s->report->residual = load > 0 ? norm(l, seat->r) / load : 0;
+    if (!(s->report->residual < MOST_LINEAR))
+        return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
+                            s->report->residual);
     for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->held[i / 3] ? 0 : seat->p[i]);
     s->report->energy_J = 0.5 * dot(l, s->force_N, seat->p);
     return PAL_ERR_OK;
@@ -396,7 +415,7 @@ pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS
     size_t n = 3 * (size_t)l->n_node;
     search s = {seat, k_J, force_N, options, report, note};
     for (size_t i = 0; i < n; i++)
-        if (!isfinite(force_N[i]) || !isfinite(x[i]))
+        if (!isfinite(force_N[i]) || (!options->linear && !isfinite(x[i])))
             return pal_note_set(note, PAL_ERR_NUMERIC, "node %zu: its load or position is not finite", i / 3);
     if (options->linear) return linear(&s, x);
     double *at = malloc(n * sizeof(double));
