@@ -22,7 +22,7 @@ typedef struct job {
 void pal_calibrate_default(pal_calibrate_options *options)
 {
     *options = (pal_calibrate_options){
-        .voxel = {.resolution = 12, .fill = true, .align = true}, .split = 2, .decades = 3, .smooth = 0.1, .pull = 0.1};
+        .voxel = {.resolution = 20, .fill = true, .align = true}, .split = 2, .decades = 3, .smooth = 0.1, .pull = 0.1};
 }
 
 static pal_err no_memory(const job *j, const char *what)

@@ -29,7 +29,7 @@ typedef struct pal_calibrate_case {
 } pal_calibrate_case;
 
 typedef struct pal_calibrate_options {
-    pal_voxel_wish voxel; /* of the springs: 12 voxels, fill, align                                    */
+    pal_voxel_wish voxel; /* of the springs: 20 voxels, fill, align                                    */
     int split;            /* finite elements of the truth: every voxel as split^3; 2                   */
     bool equal;           /* every spring of a kind has the same k_J (paper); false: weighted by V l^2 (spring_law.h) */
     bool without_area;    /* edges and volumes only                                                    */

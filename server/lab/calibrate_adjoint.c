@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVALUATION = 1000, MEMORY_PAIRS = 30, MOST_ROUND = 4 };
+enum { MOST_EVALUATION = 1000, MEMORY_PAIRS = 30, MOST_ROUND = 4, FEW_PARAMETERS = 16 };
 
 typedef struct fit {
     const pal_calibration *c;
@@ -110,7 +110,8 @@ static pal_err search(fit *f, double *theta)
     nlopt_set_lower_bounds(f->opt, c->low);
     nlopt_set_upper_bounds(f->opt, c->high);
     nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
-    nlopt_set_ftol_abs(f->opt, 3e-4);
+    /* of the logarithm: a few constants are followed to the end of their valley, many are not worth it */
+    nlopt_set_ftol_abs(f->opt, c->n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
     double least;
     nlopt_optimize(f->opt, theta, &least);
     nlopt_destroy(f->opt);
