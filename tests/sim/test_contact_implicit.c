@@ -189,7 +189,7 @@ static void friction_drags_and_slides(void)
 int main(void)
 {
     RUN(rests_where_the_static_answer_is);
-    RUN(publishes_the_slope_of_slow_pressing);
+    RUN_LONG(publishes_the_slope_of_slow_pressing);
     RUN(pulls_what_it_grabbed_and_holds_still);
     RUN(two_tools_share_a_place);
     RUN(keeps_to_its_cap);

@@ -49,6 +49,6 @@ static void starts_inside_without_harm(void)
 int main(void)
 {
     RUN(a_tool_that_jumps_does_not_strike);
-    RUN(starts_inside_without_harm);
+    RUN_LONG(starts_inside_without_harm);
     return check_report();
 }

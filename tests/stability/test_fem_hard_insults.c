@@ -41,7 +41,7 @@ static void a_meganewton_on_a_vertex_is_capped_and_forgotten(void)
         const int n[3] = {4, 2, 2};
         int node = box_node(n, 4, 1, 2);
         double far = 0, back = 0;
-        for (int axis = 0; axis < 6; axis++) {
+        for (int axis = 0; axis < CHECK_REPEATS(6, 1); axis++) {
             pal_world_reset(b.world);
             double force[3] = {0, 0, 0};
             force[axis % 3] = axis < 3 ? 1e6 : -1e6;
@@ -133,7 +133,7 @@ static void quarter_and_half_turns_store_nothing(void)
 static void a_support_that_turns_takes_the_body_along(void)
 {
     for (int k = 0; k < HARD_KINDS; k++)
-        for (int way = 0; way < 4; way++) {
+        for (int way = 0; way < CHECK_REPEATS(4, 1); way++) {
             double degrees = way & 1 ? 180 : 90, rise_s = way & 2 ? 0 : 0.5;
             fem_beam b;
             hard_make(&b, &hard_kinds[k], 4, 2, 2, false);

@@ -78,7 +78,7 @@ static void a_tool_that_jumps_into_the_body_gives_no_more_than_cap_times_clamp(v
         fem_scene f;
         double worst = 0;
         REQUIRE(fem_ball(&f, resolution_of(k), 1, 0.01, 15) && open_tools(&f, &hard_kinds[k]));
-        for (int way = 0; way < 3; way++) {
+        for (int way = 0; way < CHECK_REPEATS(3, 1); way++) {
             pal_world_reset(f.s.world);
             move_tool(&f.s, 0, 0, 0, f.s.body->size_m - 0.05, false);
             REQUIRE(step_world(&f.s, 12));

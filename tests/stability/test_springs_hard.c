@@ -281,8 +281,9 @@ static void any_scale_of_length_and_stiffness_gives_the_same_scaled_answer(void)
     double expect[3], x[3];
     REQUIRE(scaled(0.01, 5000, expect));
     CHECK(fabs(expect[0]) > 1e-6);
-    for (int l = 0; l < 4; l++)
-        for (int e = 0; e < 4; e++) {
+    const int every = CHECK_REPEATS(1, 3);
+    for (int l = 0; l < 4; l += every)
+        for (int e = 0; e < 4; e += every) {
             CHECK(scaled(length[l], young[e], x));
             for (int c = 0; c < 3; c++) CHECK_NEAR(x[c], expect[c], 1e-4);
         }
