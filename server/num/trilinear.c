@@ -6,6 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* share of a cell below which a point stands on a plane of nodes: rounding must not make a node count that the body
+ * does not reach */
+static const double ON_PLANE = 1e-10;
+
 void pal_trilinear(const pal_grid *grid, const double x[3], int64_t node[8], double weight[8])
 {
     int64_t at[3];
@@ -16,6 +20,8 @@ void pal_trilinear(const pal_grid *grid, const double x[3], int64_t node[8], dou
         g = g > 0 ? fmin(g, n - 1) : 0;
         at[c] = g < n - 1 ? (int64_t)g : (n > 1 ? n - 2 : 0);
         t[c] = g - (double)at[c];
+        if (t[c] < ON_PLANE) t[c] = 0;
+        if (t[c] > 1 - ON_PLANE) t[c] = 1;
     }
     for (int k = 0; k < 8; k++) {
         int64_t step = 1;

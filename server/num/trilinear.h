@@ -12,8 +12,8 @@ typedef struct pal_grid {
     double low[3], high[3];
 } pal_grid;
 
-/* the nodes around x and their weights, which sum to 1; weights of nodes that do not exist (n = 1) are 0 and their
- * node is one that exists */
+/* the nodes around x and their weights, which sum to 1; a point within 1e-10 of a cell of a plane of nodes stands on
+ * it; weights of nodes that do not exist (n = 1) are 0 and their node is one that exists */
 void pal_trilinear(const pal_grid *grid, const double x[3], int64_t node[8], double weight[8]);
 /* value at x of a field given at the nodes [n[2]][n[1]][n[0]] */
 double pal_trilinear_at(const pal_grid *grid, const double *value, const double x[3]);
