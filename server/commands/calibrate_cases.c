@@ -13,6 +13,8 @@
 /* points farther outside the surface's box, as a share of its diagonal, are of another body */
 static const double most_outside = 0.05;
 
+enum { ENOUGH_NODES = 700, FINEST = 64 };
+
 /* what every function of one reading shares */
 typedef struct job {
     const pal_calibrate_wish *wish;
@@ -202,6 +204,21 @@ static pal_err check_box(const job *j, int index)
             "truth \"%s\": point %d (%g, %g, %g) m is %.3g m outside of the body: is it of another one?",
             s->truth_name[index], i + 1, at[0], at[1], at[2], out);
     }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
+                                       pal_note *note)
+{
+    pal_voxel_wish wish = *voxel;
+    for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
+        pal_prepared mesh = {0};
+        PAL_TRY(pal_case_voxels(set->problem, &set->surface, &wish, &mesh, note));
+        int n_node = mesh.tets.n_node;
+        pal_prepared_free(&mesh);
+        if (n_node > ENOUGH_NODES) break;
+    }
+    *out = wish.resolution;
     return PAL_ERR_OK;
 }
 

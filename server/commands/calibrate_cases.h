@@ -29,6 +29,10 @@ typedef struct pal_calibrate_set {
  * references of different materials, no reference that answers, supports that move, points that lie outside the body;
  * IO, MEMORY. *out is to be freed in any case */
 pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_note *note);
+/* the least even number of voxels on the longest axis whose lattice has more than 700 nodes, as the paper's bodies
+ * have; at most 64. Errors are those of pal_case_voxels */
+pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
+                                       pal_note *note);
 /* are the points of the truths in or near these voxels? REFUSED names the case: more than 1 % of them are farther than
  * two voxels from any */
 pal_err pal_calibrate_cases_check(const pal_calibrate_set *set, const pal_prepared *mesh, pal_note *note);

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { MANY_SUBSTEPS = 200 };
+
 static const char *truth_of(const pal_calibrate_run *run, int index)
 {
     const char *name = run->set.list[index].truth_name;
@@ -108,8 +110,11 @@ static void print_live(const pal_calibrate_run *run)
         printf("live: steady after %.2f s with damping %g 1/s, where it differs from Newton's rest as the table says\n",
                run->live.seconds, damping);
     else
-        printf("live: no steady state within %g s of simulated time; damping %g 1/s\n", run->live.load[0].seconds,
+        printf("live: no steady state within %.3g s of simulated time; damping %g 1/s\n", run->live.load[0].seconds,
                damping);
+    if (run->n_substep > MANY_SUBSTEPS)
+        printf("live: stiff and light: a step of 1/60 s takes %d sub-steps (palpate plan says how long that is here)\n",
+               run->n_substep);
 }
 
 void pal_calibrate_print(const pal_calibrate_run *run)
@@ -202,6 +207,7 @@ static void add_live(const pal_calibrate_run *run, cJSON *o)
     }
     cJSON *live = cJSON_AddObjectToObject(o, "live"), *ladder;
     cJSON_AddBoolToObject(live, "steady", steady);
+    cJSON_AddNumberToObject(live, "substeps", run->n_substep);
     double most = 0;
     for (int k = 0; k < run->set.n; k++) {
         double d = run->live.load[k].difference_percent;

@@ -29,6 +29,7 @@ typedef struct pal_calibrate_run {
     int n_trail, most_trail;
     bool settled; /* live is known */
     pal_settle_report live;
+    int n_substep; /* that a step of the scene takes at rest */
     double settle_s, total_s;
     char file[PAL_CALIBRATE_FILES][PAL_CALIBRATE_PATH];
     int n_file;
@@ -43,8 +44,8 @@ double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_va
 /* ---- calibrate_scene.c ---- */
 
 /* the scene that serve runs, with everything but damping and accuracy as they will be; borrows mesh and supports of the
- * calibration; pal_scene_free. MEMORY, REFUSED */
-pal_err pal_calibrate_scene(const pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note);
+ * calibration; pal_scene_free; sets n_substep. MEMORY, REFUSED */
+pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note);
 /* "0.5 % RMS of finite elements (twist), 3.5 % (push, not fitted)" */
 void pal_calibrate_accuracy(const pal_calibrate_run *run, char *out, size_t n_byte);
 

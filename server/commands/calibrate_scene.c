@@ -33,7 +33,10 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
     const pal_problem *p = run->set.problem;
     const pal_tets *t = &run->info.mesh->tets;
     double poisson = 0, density = 0;
-    for (int e = 0; e < t->n_tet; e++) {
+    out->young_Pa = p->n_material > 1 ? run->info.mean_young_Pa : p->material[0].young_Pa;
+    out->poisson = fmin(p->material[0].poisson, 0.4999);
+    out->density_kg_m3 = p->material[0].density_kg_m3;
+    for (int e = 0; e < t->n_tet && p->n_material > 1; e++) {
         const pal_problem_material *m = &p->material[0];
         double x[3];
         pal_copy3(x, t->origin_m);
@@ -43,7 +46,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
         poisson += m->poisson / t->n_tet;
         density += m->density_kg_m3 / t->n_tet;
     }
-    out->young_Pa = run->info.mean_young_Pa;
+    if (p->n_material == 1) return;
     out->poisson = fmin(poisson, 0.4999);
     out->density_kg_m3 = density;
 }
@@ -103,7 +106,7 @@ static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
 }
 
 /* stiff constants may want more sub-steps than a scene usually has */
-static pal_err allow_substeps(pal_scene *scene, pal_note *note)
+static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_note *note)
 {
     pal_world *world = NULL;
     pal_err err = pal_world_create(scene, note, &world);
@@ -111,11 +114,12 @@ static pal_err allow_substeps(pal_scene *scene, pal_note *note)
         scene->most_substep = 2 * scene->most_substep < MOST_SUBSTEP ? 2 * scene->most_substep : MOST_SUBSTEP;
         err = pal_world_create(scene, note, &world);
     }
+    if (!err) *n_substep = pal_world_substeps(world);
     pal_world_destroy(world);
     return err;
 }
 
-static pal_err fill(const pal_calibrate_run *run, pal_loaded_scene *loaded, pal_note *note)
+static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_note *note)
 {
     static const char *const effects[] = {"tool_push", "tool_grab", "finite_guard"};
     pal_scene *scene = &loaded->scene;
@@ -144,10 +148,10 @@ static pal_err fill(const pal_calibrate_run *run, pal_loaded_scene *loaded, pal_
     put_tools(run, scene);
     PAL_TRY(pal_scene_rename(loaded, name, run->set.problem->name, source, note));
     PAL_TRY(put_model(run, loaded, note));
-    return allow_substeps(scene, note);
+    return allow_substeps(scene, &run->n_substep, note);
 }
 
-pal_err pal_calibrate_scene(const pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note)
+pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note)
 {
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     pal_note why = {""};

@@ -208,10 +208,14 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_note *note)
 static pal_err make(pal_calibrate_run *run, pal_note *note)
 {
     pal_note why = {""};
+    pal_voxel_wish *voxel = &run->options.voxel;
     run->options.progress = show_making;
     run->options.user = &run->common;
-    pal_err err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
-                                         &run->calibration, &why);
+    pal_err err = PAL_ERR_OK;
+    if (voxel->resolution == 0) err = pal_calibrate_cases_resolution(&run->set, voxel, &voxel->resolution, &why);
+    if (!err)
+        err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
+                                     &run->calibration, &why);
     if (err) return pal_note_set(note, err, "%s: %s", run->wish.problem, why.text);
     pal_calibration_info_of(run->calibration, &run->info);
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
@@ -319,7 +323,7 @@ int command_calibrate(int argc, char **argv)
     words w = {0};
     pal_calibrate_options *o = &run.options;
     pal_calibrate_default(o);
-    o->voxel.resolution = 16;
+    o->voxel.resolution = 0;
     const pal_flag flag[] = {
         {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.fit, 0, 0, "load cases or references to fit"},
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.verify, 0, 0, "others, whose error is only reported"},
@@ -335,7 +339,8 @@ int command_calibrate(int argc, char **argv)
         {"--seed", "S", PAL_FLAG_COUNT, &w.seed, 0, INT_MAX, "of annealing; the same gives the same result (0)"},
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
          "threads of annealing; the result is the same for any number (one per core)"},
-        {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200, "voxels on the longest axis (16)"},
+        {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200,
+         "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
          "finite elements of the truth: every voxel as K x K x K of them (2)"},
         {"--kinematics", "WORD", PAL_FLAG_TEXT, &run.wish.kinematics, 0, 0,

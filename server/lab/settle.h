@@ -2,10 +2,11 @@
  * rest, stepped until all is still (paper B 3.3), and the damping that is still soonest. Where it comes to rest is
  * compared with Newton's rest: the springs that were fitted are those that run.
  *
- * Still: over the free nodes |v| is at most 3e-4 U/s and 1e-4 U/s in the mean, |a| at most 1e-2 U/s^2 and 1e-3 U/s^2 in
- * the mean, for a quarter of a second without a break; U is the largest displacement at that time. Relative to U, not
- * to the body's size, since what creeps at v may still have v/rate to go, and that is to be small beside what it has
- * gone. Time is simulated time; what comes out depends on the scene alone, not on the machine's speed.
+ * Still: over the free nodes |v| is at most 1e-4 U/T and 3e-5 U/T in the mean, |a| at most 1e-2 A and 1e-3 A in the
+ * mean, for a quarter of a second without a break. U is the largest displacement at that time, A the sum of the loads'
+ * sizes over the mass of the free nodes, T = sqrt(U/A) the time in which such a body swings: thresholds that are the
+ * same for a light load and a heavy one, for a stiff body and a soft one. Time is simulated time; what comes out
+ * depends on the scene alone, not on the machine's speed.
  * Thread: [load]. */
 #ifndef PAL_LAB_SETTLE_H
 #define PAL_LAB_SETTLE_H
@@ -23,7 +24,7 @@ typedef struct pal_settle_load {
 
 typedef struct pal_settle_options {
     double most_s;    /* simulated, per load; 60                                                              */
-    double most_work; /* sub-steps times tetrahedra, of all runs together; 2e9 (20 to 60 s of one core)       */
+    double most_work; /* sub-steps times tetrahedra, of all runs together; 1.5e9 (20 s of one core)       */
     bool (*progress)(const char *what, double fraction, void *user); /* false: stop; may be NULL */
     void *user;
 } pal_settle_options;
@@ -49,9 +50,9 @@ typedef struct pal_settle_report {
     pal_settle_run load[PAL_SETTLE_LOADS]; /* at the rate that was taken */
 } pal_settle_report;
 
-/* tries the rates on a scene of one body with the model tet_springs, from 4/s outwards; a rate is given up when its
- * mean can not be the least any more. REFUSED: no loads or too many, a scene of none or several bodies; what
- * pal_world_create gives; STATE, MEMORY */
+/* tries the rates on a scene of one body with the model tet_springs: from the one nearest to 2/T (4/s where no u
+ * is given) upwards while that is sooner, else downwards; a rate is given up when its mean can not be the least any
+ * more. REFUSED: no loads or too many, a scene of none or several bodies; what pal_world_create gives; STATE, MEMORY */
 pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, int n_load,
                            const pal_settle_options *options, pal_settle_report *out, pal_note *note);
 #endif
