@@ -213,8 +213,9 @@ pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_v
     pal_voxel_wish wish = *voxel;
     for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
         pal_prepared mesh = {0};
-        PAL_TRY(pal_case_voxels(set->problem, &set->surface, &wish, &mesh, note));
-        int n_node = mesh.tets.n_node;
+        pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, note);
+        if (err && (err != PAL_ERR_REFUSED || wish.resolution + 2 >= FINEST)) return err;
+        int n_node = err ? 0 : mesh.tets.n_node; /* refused: thinner than such voxels */
         pal_prepared_free(&mesh);
         if (n_node > ENOUGH_NODES) break;
     }
@@ -236,12 +237,12 @@ pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared
         for (int i = 0; i < samples->n; i++) {
             pal_sub3(x, samples->x + 3 * i, mesh->tets.origin_m);
             pal_locate_point(locate, x, local, &out);
-            n_far += out > 2 * mesh->tets.h_m;
+            n_far += out > mesh->tets.h_m;
             most = fmax(most, out);
         }
         if (n_far > 0.01 * samples->n)
             err = pal_note_set(note, PAL_ERR_REFUSED,
-                               "truth \"%s\": %d of %d points are more than two voxels outside of the body (by up to "
+                               "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
                                "%.3g m): is it of another one?",
                                s->truth_name[k], n_far, samples->n, most);
     }

@@ -34,7 +34,7 @@ pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_s
 pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
                                        pal_note *note);
 /* are the points of the truths in or near these voxels? REFUSED names the case: more than 1 % of them are farther than
- * two voxels from any */
+ * a voxel from any (those of a body that does not fit its voxels stay within half of one) */
 pal_err pal_calibrate_cases_check(const pal_calibrate_set *set, const pal_prepared *mesh, pal_note *note);
 void pal_calibrate_cases_free(pal_calibrate_set *set); /* a zeroed struct is fine */
 #endif

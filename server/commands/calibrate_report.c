@@ -103,15 +103,19 @@ static void print_constants(const pal_calibrate_run *run)
 
 static void print_live(const pal_calibrate_run *run)
 {
-    double damping = run->live.damping_1_s;
+    double damping = run->damping_1_s;
+    bool linear = false;
+    for (int k = 0; k < run->set.n; k++) linear |= run->set.list[k].linear;
     if (!run->settled)
         printf("live: stopped before its damping was looked for\n");
     else if (run->live.steady)
-        printf("live: steady after %.2f s with damping %g 1/s, where it differs from Newton's rest as the table says\n",
-               run->live.seconds, damping);
+        printf(
+            "live: steady after %.2f s with damping %g 1/s, as far from the rest that Newton finds as the table says\n",
+            run->live.seconds, damping);
     else
         printf("live: no steady state within %.3g s of simulated time; damping %g 1/s\n", run->live.load[0].seconds,
                damping);
+    if (run->settled && linear) printf("live: springs bend as they do, where a linear case is linearised\n");
     if (run->n_substep > MANY_SUBSTEPS)
         printf("live: stiff and light: a step of 1/60 s takes %d sub-steps (palpate plan says how long that is here)\n",
                run->n_substep);
@@ -199,7 +203,7 @@ static void add_constants(const pal_calibrate_run *run, cJSON *o)
 static void add_live(const pal_calibrate_run *run, cJSON *o)
 {
     bool steady = run->settled && run->live.steady;
-    add_number(o, "damping_1_s", run->live.damping_1_s);
+    add_number(o, "damping_1_s", run->damping_1_s);
     add_number(o, "steady_s", steady ? run->live.seconds : NAN);
     if (!run->settled) {
         cJSON_AddNullToObject(o, "live");

@@ -29,7 +29,8 @@ typedef struct pal_calibrate_run {
     int n_trail, most_trail;
     bool settled; /* live is known */
     pal_settle_report live;
-    int n_substep; /* that a step of the scene takes at rest */
+    double damping_1_s; /* as it was written */
+    int n_substep;      /* that a step of the scene takes at rest */
     double settle_s, total_s;
     char file[PAL_CALIBRATE_FILES][PAL_CALIBRATE_PATH];
     int n_file;

@@ -26,6 +26,8 @@ static const char about[] =
     "Example: palpate calibrate deploy/problems/gear.json --case twist --verify push -o gear/scene.json\n"
     "Example: palpate calibrate deploy/problems/cube.json --case push --grid 5x5x5 --picture cube.svg -o cube.json\n";
 
+enum { MOST_GRID = 16000 }; /* three numbers of 20 characters each within a scene file's 1 MiB */
+
 /* words as they were given */
 typedef struct words {
     const char *problem, *grid, *method, *weights, *area;
@@ -180,8 +182,12 @@ static pal_err check_target(const pal_calibrate_run *run, const char *flag, cons
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
     if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
-    if (access(folder, W_OK))
+    snprintf(folder + n, sizeof folder - (size_t)n, "/.palpate_XXXXXX");
+    int file = mkstemp(folder);
+    if (file < 0)
         return pal_note_set(note, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
+    close(file);
+    unlink(folder);
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
     if (realpath(path, own) && realpath(run->wish.problem, other) && !strcmp(own, other))
@@ -191,6 +197,11 @@ static pal_err check_target(const pal_calibrate_run *run, const char *flag, cons
 
 static pal_err check_targets(const pal_calibrate_run *run, pal_note *note)
 {
+    const int *grid = run->options.grid;
+    if ((int64_t)grid[0] * grid[1] * grid[2] > MOST_GRID)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0], grid[1],
+                            grid[2], MOST_GRID);
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     static const char *const flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
@@ -264,6 +275,7 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note 
     run->settle_s = pal_clock_s() - begin;
     free(u);
     if (run->settled) scene->scene.body[0].material.damping_1_s = run->live.damping_1_s;
+    run->damping_1_s = scene->scene.body[0].material.damping_1_s;
     return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene's own damping has to do */
 }
 

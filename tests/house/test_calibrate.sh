@@ -1,0 +1,211 @@
+#!/bin/sh
+# palpate calibrate as a person runs it: what it says and writes, that a seed gives the same bytes on any number of
+# cores, that Ctrl-C and budgets keep the best, and that bad input is refused in one line. Small bodies: the figures of
+# the paper are in tests/accuracy. Prints "N passed, N failed"; exit 1 when a check failed.
+# usage: test_calibrate.sh PALPATE
+set -u
+palpate=$(realpath "$1")
+problems=$(realpath "$(dirname "$0")/../../deploy/problems")
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+passed=0 failed=0 bad=0
+
+check() { # check SENTENCE CONDITION...: the condition is a command
+    what=$1
+    shift
+    if "$@"; then return 0; fi
+    echo "  $name: $what"
+    bad=1
+}
+run() { # run ARGS...: into out, err, code
+    timeout 120 "$palpate" "$@" >out 2>err </dev/null
+    code=$?
+}
+begin() { name=$1 bad=0; }
+end() {
+    if [ "$bad" -eq 0 ]; then
+        passed=$((passed + 1))
+        echo "ok   $name"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $name"
+        sed 's/^/    err: /' err
+    fi
+}
+code_is() { [ "$code" -eq "$1" ]; }
+lines_are() { [ "$(wc -l <"$1" | tr -d ' ')" -eq "$2" ]; }
+is_empty() { [ ! -s "$1" ]; }
+has() { grep -q -- "$2" "$1"; }
+same() { cmp -s "$1" "$2"; }
+number() { # number KEY: the first number of that key in out
+    sed -n "s/.*\"$1\":\(-\{0,1\}[0-9.e+-]*\)[,}].*/\1/p" out | head -n 1
+}
+at_most() { # at_most A B: numbers
+    awk "BEGIN { exit !($1 <= $2) }" </dev/null
+}
+refused() { # refused CODE TEXT: exit code, one line on stderr that has the text, nothing on stdout, no file
+    check "exit code $code, wanted $1" code_is "$1"
+    check "more or less than one line on stderr" lines_are err 1
+    check "stderr does not say \"$2\"" has err "$2"
+    check "something is on stdout" is_empty out
+    check "a file was left" [ ! -e no.json ]
+    check "a mesh was left" [ ! -e no.palmesh ]
+}
+refuse() { # refuse CODE TEXT ARGS...
+    wanted=$1 text=$2
+    shift 2
+    begin "refuses: $text"
+    run calibrate "$@"
+    refused "$wanted" "$text"
+    end
+}
+
+beam=$problems/beam.json bar=$problems/bar.json
+small="--resolution 8 --split 1"
+
+# ---- what comes out ----
+# shellcheck disable=SC2086
+begin "a fit is better than its start, says so, and plan runs its scene"
+run calibrate "$bar" --case bend --verify twist_pull $small --json -o bend.json --trajectory t.svg --picture p.svg \
+    --vtk v.vtk
+check "exit code $code" code_is 0
+check "something is on stderr" is_empty err
+check "not one line" lines_are out 1
+for key in ok problem cases error_percent start_percent hand_percent verify_percent method evaluations rejected spent \
+    ended constants nodes tets springs damping_1_s steady_s live files seconds; do
+    check "no key $key" has out "\"$key\":"
+done
+check "the error is not below the start's" at_most "$(number error_percent)" "$(number start_percent) * 0.9"
+check "the live rest is elsewhere" at_most "$(number difference_percent)" 0.1
+check "no mesh" [ -s bend.palmesh ]
+check "the scene has no constants" has bend.json k_distance_J
+check "the scene has no weights" has bend.json '"volume"'
+check "the scene does not say how accurate it is" has bend.json 'RMS of finite elements (bend)'
+check "the scene does not tell what was not fitted" has bend.json 'twist_pull, not fitted'
+check "no trajectory" has t.svg '<svg'
+check "no picture" has p.svg '<svg'
+check "vtk without constants" has v.vtk k_distance_J
+check "vtk without displacements" has v.vtk springs_twist_pull_m
+run plan bend.json --json
+check "plan refuses the scene" code_is 0
+end
+
+begin "on a grid the scene holds a grid and no constant besides"
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --grid 3x2x2 --evaluations 10 --json -o grid.json
+check "exit code $code" code_is 0
+check "no grid in the report" has out '"grid":{"n":\[3,2,2\],"used":12'
+check "no grid in the scene" has grid.json '"grid"'
+check "not ended by evaluations" has out '"ended":"evaluations"'
+run plan grid.json
+check "plan refuses the scene" code_is 0
+end
+
+begin "people get a table"
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --evaluations 5 -o text.json
+check "exit code $code" code_is 0
+check "no table" has out calibrated
+check "no constants" has out 'k_d .* J, .* times the start'
+check "no file" has out 'wrote text.json'
+end
+
+# ---- the same again ----
+anneal() { # anneal NAME WORKERS
+    mkdir -p "$1"
+    # shellcheck disable=SC2086
+    run calibrate "$bar" --case bend $small --method annealing --kinematics linear --evaluations 150 --seed 7 \
+        --workers "$2" --json -o "$1/s.json"
+}
+begin "annealing with one seed writes the same bytes, on one core or two"
+anneal one 1
+check "exit code $code" code_is 0
+check "worse than the start" at_most "$(number error_percent)" "$(number start_percent)"
+anneal again 1
+anneal two 2
+check "the same seed gave another scene" same one/s.json again/s.json
+check "two workers gave another scene" same one/s.json two/s.json
+check "the mesh differs" same one/s.palmesh two/s.palmesh
+end
+
+# ---- ends ----
+begin "Ctrl-C keeps the best so far"
+# shellcheck disable=SC2086
+"$palpate" calibrate "$bar" --case bend $small --method annealing --evaluations 100000000 --json -o stop.json \
+    >out 2>err </dev/null &
+pid=$!
+sleep 2
+kill -INT "$pid"
+wait "$pid"
+code=$?
+check "exit code $code" code_is 0
+check "does not say that it was stopped" has out '"ended":"stopped"'
+check "worse than the start" at_most "$(number error_percent)" "$(number start_percent)"
+run plan stop.json
+check "plan refuses the scene" code_is 0
+end
+
+begin "a budget ends the search"
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --method annealing --evaluations 100000000 --budget 0.3 --json -o budget.json
+check "exit code $code" code_is 0
+check "does not say so" has out '"ended":"budget"'
+check "worse than the start" at_most "$(number error_percent)" "$(number start_percent)"
+end
+
+begin "a reference is its own truth"
+run calibrate "$beam" --case timoshenko --evaluations 3 --resolution 16 --json -o ref.json
+check "exit code $code" code_is 0
+check "not the reference" has out '"truth":"timoshenko","kinematics":"linear"'
+end
+
+# ---- refusals ----
+refuse 2 "--case ID is missing" "$bar" -o no.json
+refuse 2 "-o SCENE.json is missing" "$bar" --case bend
+refuse 1 'no load case or reference "nothing"; known are bend, twist_pull' "$bar" --case nothing -o no.json
+refuse 2 "--grid: is not" "$bar" --case bend --grid 0x3x3 -o no.json
+refuse 2 "--grid: is not" "$bar" --case bend --grid 5x5 -o no.json
+refuse 2 "--grid: is not" "$bar" --case bend --grid 5x5x5x5 -o no.json
+refuse 1 "--grid: 50 x 50 x 50 nodes" "$bar" --case bend --grid 50x50x50 -o no.json
+refuse 1 "is fitted" "$bar" --case bend --verify bend -o no.json
+refuse 1 "stands there twice" "$bar" --case bend,bend -o no.json
+refuse 1 "there is no folder nowhere" "$bar" --case bend -o nowhere/no.json
+refuse 2 "--budget: 0 is outside" "$bar" --case bend --budget 0 -o no.json
+refuse 2 "--method: is not adjoint or annealing" "$bar" --case bend --method foo -o no.json
+refuse 2 "--kinematics: is not finite or linear" "$bar" --case bend --kinematics foo -o no.json
+refuse 1 "no reference answers" "$bar" --case bend --truth reference -o no.json
+refuse 1 "is linear, --kinematics says finite" "$beam" --case timoshenko --kinematics finite -o no.json
+refuse 1 "outside of the body: is it of another one?" "$problems/cube.json" --case push --resolution 8 \
+    --truth "$problems/beam_timoshenko.csv" -o no.json
+
+cp "$problems/bar.obj" "$problems/beam.obj" .
+begin "does not write over the problem"
+cp "$bar" no.json
+run calibrate no.json --case bend -o no.json
+check "exit code $code" code_is 1
+check "says something else" has err "is the problem itself"
+check "the problem changed" same no.json "$bar"
+rm -f no.json
+end
+
+problem() { # problem SUPPORTS LOADS: problem.json, a beam
+    cat >problem.json <<END
+{"format": "palpate-reference-1", "name": "made up", "surface": "beam.obj",
+ "materials": [{"id": "a", "region": {"type": "all"}, "E": 80000, "nu": 0.3}],
+ "supports": [$1], "load_cases": [{"id": "c", "loads": [$2]}]}
+END
+}
+end_box='{"type": "box", "min": [-1, -1, -1], "max": [0.000001, 1, 1]}'
+tip='{"type": "point", "point": [0.32, 0, 0], "force": [0, 0, -0.01]}'
+problem "" "$tip"
+refuse 1 "nothing holds the body" problem.json --case c --resolution 16 -o no.json
+problem "{\"type\": \"fixed\", \"region\": $end_box}" '{"type": "point", "point": [0.32, 0, 0], "force": [0, 0, 0]}'
+refuse 1 "nothing to fit" problem.json --case c --resolution 16 -o no.json
+problem "{\"type\": \"fixed\", \"region\": $end_box}" '{"type": "point", "point": [0, 0, 0], "force": [0, 0, -1]}'
+refuse 1 "on nodes that a support holds" problem.json --case c --resolution 16 -o no.json
+problem "{\"type\": \"moved\", \"region\": $end_box, \"move\": [0, 0, 0.01]}" "$tip"
+refuse 1 "supports\[0\]: moves" problem.json --case c --resolution 16 -o no.json
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
