@@ -7,28 +7,32 @@
 
 int command_bench(int argc, char **argv)
 {
-    const pal_flag_table table = {.usage = "bench mesh [SURFACE.ply] | springs | fem | protocol | latency [flags]",
-                                  .about = "Measures this machine, medians of several runs:\n"
-                                           "  mesh      preparation of tetrahedra at several resolutions (of a "
-                                           "procedural organ without SURFACE)\n"
-                                           "  springs   forces, integration and skinning against the machine's limits\n"
-                                           "  fem       live steps and static solves of finite elements\n"
-                                           "  protocol  encoding and decoding of frames\n"
-                                           "  latency   from a pose put into a session to the frame that shows it\n",
-                                  .least_operand = 1,
-                                  .most_operand = 2};
+    const pal_flag_table table = {
+        .usage = "bench mesh [SURFACE.ply] | springs | fem | calibrate [FOLDER] | protocol | latency [flags]",
+        .about = "Measures this machine, medians of several runs:\n"
+                 "  mesh      preparation of tetrahedra at several resolutions (of a "
+                 "procedural organ without SURFACE)\n"
+                 "  springs   forces, integration and skinning against the machine's limits\n"
+                 "  fem       live steps and static solves of finite elements\n"
+                 "  calibrate springs fitted to finite elements, by gradient and by "
+                 "annealing (FOLDER: deploy/problems)\n"
+                 "  protocol  encoding and decoding of frames\n"
+                 "  latency   from a pose put into a session to the frame that shows it\n",
+        .least_operand = 1,
+        .most_operand = 2};
     pal_flag_common common;
     const char *word[2] = {NULL, NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
-    bool mesh = !strcmp(word[0], "mesh");
-    if (n == 2 && !mesh) {
+    bool mesh = !strcmp(word[0], "mesh"), calibrate = !strcmp(word[0], "calibrate");
+    if (n == 2 && !mesh && !calibrate) {
         fprintf(stderr, "palpate bench: \"%.60s\" is one word too many (see palpate bench --help)\n", word[1]);
         return 2;
     }
     /* a quiet bench is one that only has to run */
     if (common.quiet && !common.json && !freopen("/dev/null", "w", stdout)) return 3;
     if (mesh) return bench_mesh(word[1], common.json);
+    if (calibrate) return bench_calibrate(word[1], common.json);
     if (!strcmp(word[0], "springs")) return bench_springs(common.json);
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);

@@ -27,4 +27,5 @@ int bench_springs(bool json);
 int bench_protocol(bool json);
 int bench_latency(bool json);
 int bench_fem(bool json);
+int bench_calibrate(const char *folder_or_null, bool json);
 #endif
