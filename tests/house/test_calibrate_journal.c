@@ -1,0 +1,190 @@
+/* The journal of a calibration: what is put in is found again, to the bit and by the next process; torn ends are cut,
+ * damage is named. */
+#include "server/commands/calibrate_journal.h"
+
+#include "server/num/random.h"
+#include "tests/check.h"
+
+#include <float.h>
+
+enum { N = 3, POINTS = 700 };
+static pal_note note;
+static char path[] = "/tmp/palpate_journal_XXXXXX";
+
+static void point(uint64_t key, double theta[N])
+{
+    for (int i = 0; i < N; i++) theta[i] = 60 * pal_random_unit(key, (uint64_t)i) - 30;
+}
+
+static double cost_of(int i)
+{
+    return i % 7 == 3 ? DBL_MAX : 100 * pal_random_unit(77, (uint64_t)i);
+}
+
+static pal_journal *open_one(uint64_t problem)
+{
+    pal_journal *j = NULL;
+    note.text[0] = 0;
+    if (pal_journal_open(path, &j, &note)) return NULL;
+    if (!pal_journal_begin(j, problem, N, &note)) return j;
+    pal_journal_close(j);
+    return NULL;
+}
+
+static char *contents(size_t *n)
+{
+    FILE *file = fopen(path, "r");
+    char *text = calloc(1, 1 << 20);
+    *n = file && text ? fread(text, 1, (1 << 20) - 1, file) : 0;
+    if (file) fclose(file);
+    return text;
+}
+
+static void put_contents(const char *text, size_t n)
+{
+    FILE *file = fopen(path, "w");
+    if (file && fwrite(text, 1, n, file) != n) CHECK_FAIL("cannot write");
+    if (file) fclose(file);
+}
+
+static void what_was_put_is_found_again(void)
+{
+    double theta[N], cost;
+    pal_journal *j = open_one(5);
+    REQUIRE(j);
+    point(0, theta);
+    CHECK(!pal_journal_find(j, theta, &cost));
+    for (int i = 0; i < POINTS; i++) {
+        point((uint64_t)i, theta);
+        CHECK_INT(pal_journal_put(j, theta, cost_of(i), &note), 0);
+        CHECK_INT(pal_journal_put(j, theta, 1, &note), 0); /* there already */
+    }
+    CHECK_INT(pal_journal_count(j), POINTS);
+    /* another problem in the same file, of the same points */
+    CHECK_INT(pal_journal_begin(j, 6, N, &note), 0);
+    CHECK_INT(pal_journal_count(j), 0);
+    CHECK(!pal_journal_find(j, theta, &cost));
+    CHECK_INT(pal_journal_put(j, theta, 4, &note), 0);
+    pal_journal_close(j);
+    j = open_one(5);
+    REQUIRE(j);
+    CHECK_INT(pal_journal_count(j), POINTS);
+    for (int i = 0; i < POINTS; i++) {
+        point((uint64_t)i, theta);
+        if (!pal_journal_find(j, theta, &cost)) CHECK_FAIL("point %d is lost", i);
+        CHECK_NEAR(cost, cost_of(i), 0);
+        theta[1] = nextafter(theta[1], 100);
+        if (pal_journal_find(j, theta, &cost)) CHECK_FAIL("a neighbour of point %d is found", i);
+    }
+    pal_journal_close(j);
+}
+
+static void only_one_process_writes(void)
+{
+    pal_journal *j = open_one(5), *other = NULL;
+    REQUIRE(j);
+    CHECK_INT(pal_journal_open(path, &other, &note), PAL_ERR_STATE);
+    CHECK(strstr(note.text, "another calibration is writing there"));
+    CHECK(other == NULL);
+    pal_journal_close(j);
+    j = open_one(5);
+    CHECK(j);
+    pal_journal_close(j);
+}
+
+/* the file cut at any byte of its end: all whole lines are there, and it goes on from there */
+static void a_torn_end_is_cut_off(void)
+{
+    size_t n, last = 0;
+    char *text = contents(&n);
+    double theta[N], cost;
+    REQUIRE(text && n > 1000);
+    /* the head and three lines */
+    for (int line = 0; line < 4; line++) last = (size_t)(strchr(text + last, '\n') - text) + 1;
+    for (size_t cut = 0; cut <= last; cut++) {
+        int whole = 0;
+        for (size_t i = 0; i < cut; i++) whole += text[i] == '\n';
+        put_contents(text, cut);
+        pal_journal *j = open_one(5);
+        if (!j) CHECK_FAIL("cut at byte %zu: %s", cut, note.text);
+        REQUIRE(j);
+        CHECK_INT(pal_journal_count(j), whole > 0 ? whole - 1 : 0);
+        point(POINTS + 1, theta);
+        CHECK_INT(pal_journal_put(j, theta, 0.25, &note), 0);
+        pal_journal_close(j);
+        j = open_one(5);
+        REQUIRE(j);
+        CHECK(pal_journal_find(j, theta, &cost) && cost == 0.25);
+        pal_journal_close(j);
+    }
+    put_contents(text, n);
+    free(text);
+}
+
+/* a bit flipped in any byte of the first lines: said, with its line, and nothing of the file changed */
+static void damage_is_named_with_its_line(void)
+{
+    size_t n, after;
+    char *text = contents(&n), *still;
+    REQUIRE(text && n > 1000);
+    for (size_t at = 0; at < 300; at += at < 40 ? 1 : 3)
+        for (int bit = 0; bit < 8; bit += 3) {
+            int line = 1;
+            char want[64];
+            for (size_t i = 0; i < at; i++) line += text[i] == '\n';
+            snprintf(want, sizeof want, line > 1 ? "line %d " : "is not a journal", line);
+            text[at] ^= (char)(1 << bit);
+            put_contents(text, n);
+            pal_journal *j = open_one(5);
+            CHECK(!j);
+            if (!strstr(note.text, want)) CHECK_FAIL("byte %zu: \"%s\" does not say \"%s\"", at, note.text, want);
+            still = contents(&after);
+            CHECK(after == n && !memcmp(text, still, n));
+            free(still);
+            text[at] ^= (char)(1 << bit);
+        }
+    free(text);
+}
+
+static void lines_that_hold_other_things_are_refused(void)
+{
+    static const struct {
+        const char *line, *sentence;
+    } want[] = {
+        {"", "is cut or no line of it"},
+        {"0000000000000005 0x1p+0 0x1p+0 = 0x1p+0 ", "has not as many constants"},
+        {"0000000000000005 0x1p+0 0x1p+0 0x1p+0 0x1p+0 = 0x1p+0 ", "has more constants"},
+        {"0000000000000005 0x1p+0 inf 0x1p+0 = 0x1p+0 ", "has not as many constants"},
+        {"0000000000000005 0x1p+0 0x1p+9999 0x1p+0 = 0x1p+0 ", "has not as many constants"},
+        {"0000000000000005 0x1p+0 nan 0x1p+0 = 0x1p+0 ", "has not as many constants"},
+        {"0000000000000005 0x1p+0 0x1p+0 0x1p+0 = -0x1p+0 ", "has no error"},
+        {"0000000000000005 0x1p+0 0x1p+0 0x1p+0 = many ", "has no error"},
+        {"000000000000005  0x1p+0 0x1p+0 0x1p+0 = 0x1p+0 ", "does not begin with a problem"},
+    };
+    for (size_t k = 0; k < sizeof want / sizeof want[0]; k++) {
+        char text[512];
+        unsigned long long check = pal_journal_hash(0, want[k].line, strlen(want[k].line));
+        snprintf(text, sizeof text, "palpate journal 1\n%s%016llx\n", want[k].line, check);
+        put_contents(text, strlen(text));
+        CHECK(!open_one(5));
+        if (!strstr(note.text, want[k].sentence)) CHECK_FAIL("\"%s\" for \"%s\"", note.text, want[k].line);
+    }
+    put_contents("palpate journal 1\n\n", 19);
+    CHECK(!open_one(5));
+    pal_journal *j = NULL;
+    CHECK_INT(pal_journal_open("/nowhere/at/all.txt", &j, &note), PAL_ERR_IO);
+    CHECK(strstr(note.text, "/nowhere/at/all.txt: cannot be opened"));
+}
+
+int main(void)
+{
+    int file = mkstemp(path);
+    if (file >= 0) close(file);
+    RUN(what_was_put_is_found_again);
+    RUN(only_one_process_writes);
+    RUN(a_torn_end_is_cut_off);
+    RUN(damage_is_named_with_its_line);
+    RUN(lines_that_hold_other_things_are_refused);
+    unlink(path);
+    return check_report();
+}
