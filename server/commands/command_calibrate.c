@@ -333,6 +333,7 @@ int command_calibrate(int argc, char **argv)
 {
     static pal_calibrate_run run;
     words w = {0};
+    run = (pal_calibrate_run){0};
     pal_calibrate_options *o = &run.options;
     pal_calibrate_default(o);
     o->voxel.resolution = 0;
