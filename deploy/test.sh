@@ -17,6 +17,7 @@ esac
 
 install_missing run test || exit 1
 install_missing scan || say "tests of the scan say that it is not there and are left out"
+install_missing mpi || say "calibration over MPI is not built and its test says so"
 fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
 
 passed=0 failed=0
