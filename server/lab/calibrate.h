@@ -79,7 +79,7 @@ void pal_calibration_seat_destroy(pal_calibration_seat *seat);                  
 
 typedef struct pal_calibration_value {
     double error_percent;                     /* E over the fitted cases; DBL_MAX: a case has no stable rest   */
-    double case_percent[PAL_CALIBRATE_CASES]; /* e_L; DBL_MAX: none; NaN: not asked for                        */
+    double case_percent[PAL_CALIBRATE_CASES]; /* e_L; DBL_MAX: none, or another fitted case has none; NaN: not asked */
     double smooth, pull;                      /* the two regularisers, before their weights                    */
     double objective; /* ln (mean e_L^2) + smooth and pull with their weights: what adjoint minimises; the logarithm
                          makes a weight mean the same for 10 % and for 0.1 % of error; DBL_MAX: no value          */
@@ -117,7 +117,7 @@ typedef struct pal_fit_step {
 } pal_fit_step;
 
 typedef struct pal_fit_options {
-    double budget_s;         /* 0: none; ends within an evaluation of it                                 */
+    double budget_s;         /* 0: none; ends within an evaluation of it (annealing: within a batch)      */
     int64_t most_evaluation; /* 0: adjoint 1000, annealing 4000                                          */
     uint64_t seed;           /* annealing                                                                */
     int n_worker;            /* annealing: threads; 0: one per core                                      */

@@ -20,8 +20,10 @@
 #include <string.h>
 
 enum { MOST_EVALUATION = 4000, MOST_STALL = 1500 };
-/* steps below this share of the range change an error by less than anybody asks for: 7e-3 in ln k over 2 x 3 decades */
+/* steps below this share of the range change an error by less than anybody asks for: 5e-3 in ln k over 2 x 2 decades */
 static const double COLDEST = 5e-4;
+/* of the way that theta may go: most of the rest has no stable rest, or an error nobody would take */
+static const double BOX = 2.0 / 3;
 /* shares of a lattice's shear modulus, by kind (spring_law.h) */
 static const double shear[PAL_SPRING_KINDS] = {2.0 / 3, 4.0 / 9, 0};
 
@@ -75,7 +77,7 @@ static void to_theta(const fit *f, const double *p, double *theta)
     for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
 }
 
-/* the box: as far from the calibration's start as theta may go, the walk's own start included */
+/* the box, around the calibration's start, the walk's own start included */
 static void make_box(fit *f, const double *theta)
 {
     const pal_calibration *c = f->c;
@@ -83,8 +85,8 @@ static void make_box(fit *f, const double *theta)
     to_walk(c, theta, f->first);
     to_walk(c, c->theta, f->shown);
     for (int i = 0; i < c->n_parameter; i++) {
-        f->low[i] = fmin(f->first[i], f->shown[i] + c->low[i] - c->theta[i]);
-        f->high[i] = fmax(f->first[i], f->shown[i] + c->high[i] - c->theta[i]);
+        f->low[i] = fmin(f->first[i], f->shown[i] + BOX * (c->low[i] - c->theta[i]));
+        f->high[i] = fmax(f->first[i], f->shown[i] + BOX * (c->high[i] - c->theta[i]));
     }
 }
 

@@ -239,7 +239,10 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
     for (int i = 0; i < c->n_case; i++) {
         bool fit = c->cases[i].fit;
         if (!(ask & (fit ? PAL_CALIBRATION_FIT : PAL_CALIBRATION_VERIFY))) continue;
-        if (fit && lost) continue; /* one case without rest: no value */
+        if (fit && lost) { /* one case without rest: no value */
+            out->case_percent[i] = DBL_MAX;
+            continue;
+        }
         pal_err err = evaluate_case(seat, theta, i, ask, out, slope && !lost);
         if (err == PAL_ERR_MEMORY) return pal_note_set(note, err, "no memory to evaluate load case %d", i);
         lost |= fit && err;
