@@ -97,7 +97,7 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
             if (err) return pal_note_set(note, err, "no memory for the loads of a live run");
         }
     while (!out->steady && time<options->most_s && * work> 0) {
-        if (!say(options, "live", time / options->most_s))
+        if (!say(options, "live body comes to rest", time / options->most_s))
             return pal_note_set(note, PAL_ERR_STATE, "stopped while the live body was coming to rest");
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;
