@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TITLE = 120, MOST_DRAWN = 4000 };
+enum { TITLE = 120, TITLE_SHOWN = 48, MOST_DRAWN = 4000 };
 
 /* ---- trajectory ---- */
 
@@ -36,18 +36,24 @@ static int thin_out(const pal_calibrate_run *run, double *x, double *error, doub
 
 pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_note *note)
 {
-    char title[TITLE], rejected[48] = "";
+    char title[TITLE], label[80] = "evaluations";
     double *x = malloc(3 * ((size_t)MOST_DRAWN + 1) * sizeof *x), *error = x + MOST_DRAWN + 1,
            *best = error + MOST_DRAWN + 1;
     if (!x) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
     int n = thin_out(run, x, error, best);
+    const char *name = run->set.problem->name;
+    int room = TITLE_SHOWN;
+    /* not within a letter of several bytes */
+    while (strlen(name) > TITLE_SHOWN && room > 0 && ((unsigned char)name[room] & 0xc0) == 0x80) room--;
+    snprintf(title, sizeof title, "%.*s%s: %s", room, name, strlen(name) > TITLE_SHOWN ? "..." : "",
+             pal_calibrate_method(run));
     if (run->result.n_rejected > 0)
-        snprintf(rejected, sizeof rejected, ", %lld without a rest left out", (long long)run->result.n_rejected);
-    snprintf(title, sizeof title, "%.60s: %s%s", run->set.problem->name, pal_calibrate_method(run), rejected);
+        snprintf(label, sizeof label, "evaluations (%lld without a rest are left out)",
+                 (long long)run->result.n_rejected);
     const double hand = pal_calibrate_mean(run, &run->hand, true), edge[2] = {n > 0 ? x[0] : 0, n > 0 ? x[n - 1] : 1},
                  level[2] = {hand, hand};
     pal_plot plot = {.title = title,
-                     .x_label = "evaluations",
+                     .x_label = label,
                      .y_label = "RMS error, % of the largest displacement",
                      .log_y = true,
                      .n_curve = hand < DBL_MAX ? 3 : 2,
