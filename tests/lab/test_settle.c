@@ -165,7 +165,8 @@ static void ladder_takes_the_rate_that_is_still_soonest(void)
         on_it |= report.ladder_s[k] == report.seconds && pal_settle_ladder_1_s[k] == report.damping_1_s;
     }
     CHECK(on_it);
-    /* none of the rates is sooner when each of them is run to its own end */
+    /* none of the rates is sooner */
+    options.most_s = report.seconds;
     pal_material material = b.scene.body[0].material;
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) {
         pal_settle_run run;
@@ -173,7 +174,7 @@ static void ladder_takes_the_rate_that_is_still_soonest(void)
         material.damping_1_s = pal_settle_ladder_1_s[k];
         REQUIRE(!pal_world_material(b.world, 0, &material, NULL));
         CHECK_INT(pal_settle(b.world, b.scene.step_s, &load, &options, &work, &run, NULL), PAL_ERR_OK);
-        CHECK(run.seconds >= report.seconds - 1e-9);
+        CHECK(!run.steady || run.seconds >= report.seconds - 1e-9);
     }
     close_beam(&b);
 }
