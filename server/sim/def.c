@@ -109,8 +109,9 @@ pal_err pal_spring_grid_check(const pal_body_def *def, pal_note *note)
     for (int k = 0; k < 3; k++)
         for (int i = 0; g->k_J[k] && i < (int)count; i++)
             if (!(g->k_J[k][i] >= 1e-60 && g->k_J[k][i] <= 1e60))
-                return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.%s[%d]: %g is outside [1e-60, 1e+60]",
-                                    name, list[k], i, g->k_J[k][i]);
+                return pal_note_set(note, PAL_ERR_REFUSED,
+                                    "body \"%s\" model.grid.%s[%d]: %g is outside [1e-60, 1e+60]", name, list[k], i,
+                                    g->k_J[k][i]);
     return PAL_ERR_OK;
 }
 
