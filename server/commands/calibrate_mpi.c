@@ -8,6 +8,7 @@
 #include "server/commands/calibrate_cases.h"
 #include "server/commands/calibrate_journal.h"
 #include "server/commands/report.h"
+#include "server/num/anneal.h"
 #include "server/scene/scene_file.h"
 
 #include <errno.h>
@@ -42,8 +43,8 @@ typedef struct job {
     int seed[MOST_SEED], n_seed;
     int n_worker, evaluations;
     double budget_s, enough_percent;
-    int rank, n_rank;
-    pal_journal *journal; /* rank 0 */
+    int rank, n_rank, n_batch; /* n_batch: points of a batch, of the largest team on every rank */
+    pal_journal *journal;      /* rank 0 */
     pal_team *team;
     /* the problem at hand */
     pal_calibrate_set *set;
@@ -223,7 +224,7 @@ static pal_err make(job *j, const char *problem)
     if (err) return pal_note_set(&j->note, err, "%s: %s", problem, why.text);
     pal_calibration_info_of(j->c, &j->info);
     PAL_TRY(pal_calibrate_cases_check(j->set, j->info.mesh, &j->note));
-    size_t batch = (size_t)(j->n_rank * pal_team_size(j->team));
+    size_t batch = (size_t)j->n_batch;
     j->theta = malloc(batch * (size_t)j->info.n_parameter * sizeof *j->theta);
     j->cost = malloc(batch * sizeof *j->cost);
     j->missing = malloc(batch * sizeof *j->missing);
@@ -364,7 +365,7 @@ static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
                          .seed = (uint64_t)seed,
                          .enough_percent = j->enough_percent,
                          .evaluate = evaluate,
-                         .n_batch = j->n_rank * pal_team_size(j->team),
+                         .n_batch = j->n_batch,
                          .step = show,
                          .user = j};
     double *theta = malloc(sizeof *theta * (size_t)j->info.n_parameter);
@@ -440,10 +441,13 @@ static int run(job *j)
 {
     double begin = pal_clock_s();
     int code = 0;
-    cJSON *object = cJSON_CreateObject(), *ok = cJSON_AddBoolToObject(object, "ok", true),
-          *results = cJSON_AddArrayToObject(object, "results");
-    (void)ok;
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddBoolToObject(object, "ok", true);
+    cJSON *results = cJSON_AddArrayToObject(object, "results");
     pal_err err = agree(j, prepare(j));
+    int mine = err ? 1 : pal_team_size(j->team), most;
+    MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    j->n_batch = j->n_rank * most < PAL_ANNEAL_MOST_BATCH ? j->n_rank * most : PAL_ANNEAL_MOST_BATCH;
     for (int p = 0; p < j->n_problem && !err; p++) {
         pal_err one = run_one(j, j->problem[p], results);
         if (!one || j->rank > 0) continue;
