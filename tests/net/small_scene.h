@@ -13,11 +13,11 @@ typedef struct small_scene {
 static inline bool small_scene_make(small_scene *s, const char *name)
 {
     pal_surface surface;
-    pal_voxel_options options = {.resolution = 6, .border = true};
+    pal_voxel_options options = {.resolution = CHECK_REPEATS(6, 4), .border = true};
     pal_prepare_report report;
     pal_note note = {""};
     memset(s, 0, sizeof *s);
-    if (pal_organ_make(1500, &surface)) return false;
+    if (pal_organ_make(CHECK_REPEATS(1500, 600), &surface)) return false;
     pal_err err = pal_prepared_make(&surface, &options, &s->mesh, &report, &note);
     pal_surface_free(&surface);
     if (err) printf("  no scene: %s\n", note.text);

@@ -240,7 +240,7 @@ static void records_survive_the_round_trip_bit_by_bit(void)
 int main(void)
 {
     int file = mkstemp(path);
-    if (file < 0 || !small_scene(&scene, &mesh, 6)) return 1;
+    if (file < 0 || !small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     close(file);
     RUN(a_recorded_session_gives_the_same_hashes_again);
     RUN(changed_poses_and_materials_are_found_at_the_next_hash);

@@ -351,7 +351,7 @@ static void a_slow_step_slows_simulated_time_and_says_by_how_much(void)
     double step_s = scene.step_s;
     pal_prepared big;
     pal_scene slow;
-    REQUIRE(small_scene(&slow, &big, 26));
+    REQUIRE(small_scene(&slow, &big, CHECK_REPEATS(26, 18)));
     slow.step_s = 1e-4;
     pal_scene kept = scene;
     scene = slow;
@@ -383,7 +383,7 @@ static void no_heap_call_after_open(void)
     REQUIRE(s != NULL);
     REQUIRE(frame_where(s, w, tick_at_least, 2) != NULL);
     long before = atomic_load(&n_heap);
-    for (uint32_t k = 1; k <= 200; k++) {
+    for (uint32_t k = 1; k <= CHECK_REPEATS(200, 70); k++) {
         pal_pose pose = pose_at(0.05 - 0.0001 * k, 0, k);
         pal_session_put_pose(s, 0, &pose);
         if (k % 20 == 0) order(s, PAL_COMMAND_RESET);
@@ -441,7 +441,7 @@ static void survives_poses_commands_and_frames_from_many_threads_and_a_close_in_
         pthread_t thread[4];
         for (int k = 0; k < 4; k++) pthread_create(&thread[k], NULL, k < 2 ? put_poses : give_orders, &member[k]);
         double sum = 0;
-        for (int k = 0; k < 60; k++) {
+        for (int k = 0; k < CHECK_REPEATS(60, 20); k++) {
             const pal_frame *f = next_frame(s, w);
             REQUIRE(f != NULL);
             for (int v = 0; v < 3 * f->part[0].n_vertex; v++) sum += f->part[0].position_m[v];
@@ -584,7 +584,8 @@ static void fields_come_and_go_under_a_reader(void)
 
 int main(void)
 {
-    if (!small_scene(&scene, &mesh, 6)) return 1;
+    /* sanitizers look at where threads meet; the size of the ball is not their matter */
+    if (!small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
