@@ -17,7 +17,7 @@
  *
  * The edges' adjacency is winged (butterfly.h) within each level; pal_levels_spoke and pal_wing_turn walk the edges and
  * faces of any level around a vertex. A pal_levels owns its arrays (heap); it is constant once made and may be shared.
- * Memory: about 310 bytes per finest vertex of a mesh with few irregular vertices; n_byte says it.
+ * Memory: about 330 bytes per finest vertex of a mesh with few irregular vertices; n_byte says it.
  * Thread: [load] to make, [any] to read. */
 #ifndef PAL_MESH_LEVELS_H
 #define PAL_MESH_LEVELS_H

@@ -197,10 +197,11 @@ static void turn_edge(shell *sh, int32_t a, int32_t b)
 static void to_surface(const shell *sh, double x[3])
 {
     for (int k = 0; k < 3; k++) {
-        double g[3];
+        double g[3], depth = sh->inside(x);
+        if (fabs(depth) < 1e-6 * sh->reach) return;
         gradient(sh->inside, x, g);
         double gg = fmax(pal_dot3(g, g), 1e-6), most = sh->reach / sqrt(gg);
-        pal_axpy3(x, fmax(fmin(-sh->inside(x) / gg, most), -most), g);
+        pal_axpy3(x, fmax(fmin(-depth / gg, most), -most), g);
     }
 }
 
