@@ -49,6 +49,8 @@ pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note)
 {
     size_t n = strlen(path);
     if (n >= sizeof out->path) return pal_note_set(note, PAL_ERR_IO, "%.100s...: the path is too long", path);
+    struct stat info; /* the new file takes the name: a device or a pipe of that name would be gone */
+    if (!stat(path, &info) && !S_ISREG(info.st_mode)) return pal_note_set(note, PAL_ERR_IO, "%s: not a file", path);
     memcpy(out->path, path, n + 1);
     snprintf(out->temporary, sizeof out->temporary, "%s.XXXXXX", out->path);
     int fd = mkstemp(out->temporary);
