@@ -90,6 +90,31 @@ static pal_err make_world(const job *j)
     return err ? err : pal_lattice_take(c->world, 0, &c->lattice, j->note);
 }
 
+/* held nodes on one line let the body turn about it: neither truth nor springs have a rest then */
+static pal_err check_hold(const job *j)
+{
+    const pal_lattice *l = &j->c->lattice;
+    double first[3] = {0}, along[3] = {0}, d[3], out[3], longest = 0, widest = 0;
+    int n_held = 0;
+    for (int i = 0; i < l->n_node; i++) {
+        if (!l->held[i]) continue;
+        if (n_held++ == 0) pal_copy3(first, l->x_rest + 3 * i);
+        pal_sub3(d, l->x_rest + 3 * i, first);
+        if (pal_norm3(d) <= longest) continue;
+        longest = pal_norm3(d);
+        pal_copy3(along, d);
+    }
+    for (int i = 0; i < l->n_node && longest > 0; i++) {
+        if (!l->held[i]) continue;
+        pal_sub3(d, l->x_rest + 3 * i, first);
+        pal_cross3(out, along, d);
+        widest = fmax(widest, pal_norm3(out) / longest);
+    }
+    if (widest > 1e-6 * l->h_m) return PAL_ERR_OK;
+    return pal_note_set(j->note, PAL_ERR_REFUSED,
+                        "supports: held nodes: %d, all on one line, so the body turns and comes to no rest", n_held);
+}
+
 static pal_err make_body(const job *j)
 {
     pal_calibration *c = j->c;
@@ -99,7 +124,8 @@ static pal_err make_body(const job *j)
     PAL_TRY(pal_case_voxels(c->problem, j->surface, &c->options.voxel, &c->mesh, j->note));
     PAL_TRY(pal_case_supports(c->problem, &c->mesh.tets, c->support, j->note));
     take_material(c);
-    return make_world(j);
+    PAL_TRY(make_world(j));
+    return check_hold(j);
 }
 
 /* ---- loads ---- */
@@ -143,10 +169,17 @@ static pal_err make_loads(const job *j, int index)
         for (size_t i = 0; i < n; i++) fit->force_N[i] += one[i];
     }
     free(one);
-    if (!err && !(sum > 0))
-        err = pal_note_set(j->note, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
-                           load_case->id);
-    return err;
+    if (err) return err;
+    double left, held;
+    sum_up(c, fit->force_N, &left, &held);
+    if (!(sum > 0))
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
+                            load_case->id);
+    if (left <= 1e-9 * sum)
+        return pal_note_set(j->note, PAL_ERR_REFUSED,
+                            "load case \"%s\": its loads cancel each other at every node, so there is nothing to fit",
+                            load_case->id);
+    return PAL_ERR_OK;
 }
 
 /* ---- truths ---- */

@@ -150,8 +150,8 @@ static pal_err close_up(fit *f, const double *start, double *theta)
     pal_fit_result *out = f->out;
     if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
     PAL_TRY(pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note));
-    if (out->value.error_percent < DBL_MAX) return PAL_ERR_OK;
-    /* only reached from its neighbours: a live body at rest may not find it either */
+    if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
+    /* none, or another, worse one: the rest is only reached from its neighbours, a live body may not find it either */
     memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
     return pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note);
 }
