@@ -26,7 +26,8 @@ static const char about[] =
     "Example: palpate calibrate deploy/problems/gear.json --case twist --verify push -o gear/scene.json\n"
     "Example: palpate calibrate deploy/problems/cube.json --case push --grid 5x5x5 --picture cube.svg -o cube.json\n";
 
-enum { MOST_GRID = 16000 }; /* three numbers of 20 characters each within a scene file's 1 MiB */
+static const double LIVE_WORK_1_S = 7.5e7; /* sub-steps times tetrahedra that a core does in a second */
+enum { MOST_GRID = 16000 };                /* three numbers of 20 characters each within a scene file's 1 MiB */
 
 /* words as they were given */
 typedef struct words {
@@ -168,10 +169,28 @@ static const char *take_words(pal_calibrate_run *run, const words *w)
 
 /* ---- files that will be written ---- */
 
-/* can a file of this name be written, and is it not one of those that are read? Said before the work, not after it */
-static pal_err check_target(const pal_calibrate_run *run, const char *flag, const char *path, pal_note *note)
+static const char *const target_flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
+
+/* the same file by another spelling, whether it exists or not */
+static bool is_same_file(const char *a, const char *b)
 {
-    char folder[PAL_CALIBRATE_PATH], own[PATH_MAX], other[PATH_MAX];
+    char real[2][PATH_MAX], folder[PATH_MAX];
+    const char *path[2] = {a, b}, *name[2];
+    for (int k = 0; k < 2; k++) {
+        const char *slash = strrchr(path[k], '/');
+        int n = slash ? (int)(slash - path[k]) + 1 : 0;
+        name[k] = path[k] + n;
+        if (n >= PATH_MAX) return false;
+        snprintf(folder, sizeof folder, "%.*s", n > 0 ? n : 1, n > 0 ? path[k] : ".");
+        if (!realpath(folder, real[k])) return false;
+    }
+    return !strcmp(real[0], real[1]) && !strcmp(name[0], name[1]);
+}
+
+/* can a file of this name be written? Said before the work, not after it */
+static pal_err check_target(const char *flag, const char *path, pal_note *note)
+{
+    char folder[PAL_CALIBRATE_PATH];
     struct stat facts;
     if (!path) return PAL_ERR_OK;
     const char *slash = strrchr(path, '/');
@@ -190,8 +209,17 @@ static pal_err check_target(const pal_calibrate_run *run, const char *flag, cons
     unlink(folder);
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
-    if (realpath(path, own) && realpath(run->wish.problem, other) && !strcmp(own, other))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is the problem itself", flag, path);
+    if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is there and not a file", flag, path);
+    return PAL_ERR_OK;
+}
+
+/* is it none of those that are read? */
+static pal_err check_source(const char *flag, const char *path, const char *source, const char *what, pal_note *note)
+{
+    char own[PATH_MAX], other[PATH_MAX];
+    if (path && source && realpath(path, own) && realpath(source, other) && !strcmp(own, other))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is the %s itself", flag, path, what);
     return PAL_ERR_OK;
 }
 
@@ -203,13 +231,27 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_note *note)
                             "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0], grid[1],
                             grid[2], MOST_GRID);
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
-    static const char *const flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_target(run, flag[a], path[a], note));
+        PAL_TRY(check_target(target_flag[a], path[a], note));
+        PAL_TRY(check_source(target_flag[a], path[a], run->wish.problem, "problem", note));
+        PAL_TRY(check_source(target_flag[a], path[a], run->wish.truth, "truth", note));
         for (int b = 0; b < a && path[a]; b++)
-            if (path[b] && !strcmp(path[a], path[b]))
-                return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", flag[a], path[a],
-                                    flag[b]);
+            if (path[b] && is_same_file(path[a], path[b]))
+                return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", target_flag[a], path[a],
+                                    target_flag[b]);
+    }
+    return PAL_ERR_OK;
+}
+
+/* files that the problem names */
+static pal_err check_sources(const pal_calibrate_run *run, pal_note *note)
+{
+    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
+    const pal_problem *p = run->set.problem;
+    for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
+        PAL_TRY(check_source(target_flag[a], path[a], p->surface, "problem's surface", note));
+        for (int k = 0; k < p->n_reference; k++)
+            PAL_TRY(check_source(target_flag[a], path[a], p->reference[k].file, "problem's reference", note));
     }
     return PAL_ERR_OK;
 }
@@ -263,6 +305,8 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note 
     pal_settle_default(&options);
     options.progress = show_making;
     options.user = &run->common;
+    /* a short search is not followed by a long run; a number of sub-steps, so that scenes do not depend on the clock */
+    if (run->fit.budget_s > 0) options.most_work = fmin(options.most_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
     if (!u) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
         bool rests = pal_calibration_moved(run->calibration, run->seat, k, u + n * (size_t)k);
@@ -296,6 +340,7 @@ static pal_err work(pal_calibrate_run *run, pal_note *note)
     pal_loaded_scene *scene = NULL;
     PAL_TRY(check_targets(run, note));
     PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, note));
+    PAL_TRY(check_sources(run, note));
     PAL_TRY(make(run, note));
     PAL_TRY(search(run, note));
     PAL_TRY(pal_calibrate_scene(run, &scene, note));
@@ -344,7 +389,8 @@ int command_calibrate(int argc, char **argv)
          "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
         {"--method", "WORD", PAL_FLAG_TEXT, &w.method, 0, 0,
          "adjoint (L-BFGS with exact slopes) or annealing (adaptive simulated annealing) (adjoint)"},
-        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &w.budget_s, 0.01, 1e7, "ends the search after so long (no limit)"},
+        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &w.budget_s, 0.01, 1e7,
+         "ends the search after so long, and the live run behind it after about as long (no limit; 20 s)"},
         {"--evaluations", "N", PAL_FLAG_COUNT, &w.evaluations, 1, 1e9,
          "ends the search after so many (1000; annealing 4000)"},
         {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.enough_percent, 1e-9, 1e9,

@@ -189,6 +189,22 @@ check "the problem changed" same no.json "$bar"
 rm -f no.json
 end
 
+begin "does not write over a surface or a pipe"
+cp "$bar" read.json
+run calibrate read.json --case bend -o bar.obj
+check "exit code $code" code_is 1
+check "says something else" has err "is the problem's surface itself"
+check "the surface changed" same bar.obj "$problems/bar.obj"
+mkfifo pipe
+run calibrate read.json --case bend -o x.json --vtk pipe
+check "exit code $code" code_is 1
+check "says something else" has err "pipe is there and not a file"
+check "the pipe is gone" [ -p pipe ]
+run calibrate read.json --case bend -o x.json --vtk ./x.json
+check "exit code $code" code_is 1
+check "says something else" has err "is that of -o as well"
+end
+
 problem() { # problem SUPPORTS LOADS: problem.json, a beam
     cat >problem.json <<END
 {"format": "palpate-reference-1", "name": "made up", "surface": "beam.obj",
@@ -204,6 +220,10 @@ problem "{\"type\": \"fixed\", \"region\": $end_box}" '{"type": "point", "point"
 refuse 1 "nothing to fit" problem.json --case c --resolution 16 -o no.json
 problem "{\"type\": \"fixed\", \"region\": $end_box}" '{"type": "point", "point": [0, 0, 0], "force": [0, 0, -1]}'
 refuse 1 "on nodes that a support holds" problem.json --case c --resolution 16 -o no.json
+problem "{\"type\": \"fixed\", \"region\": $end_box}" "$tip, $(echo "$tip" | sed 's/-0.01/0.01/')"
+refuse 1 "loads cancel each other" problem.json --case c --resolution 16 -o no.json
+problem '{"type": "fixed", "region": {"type": "box", "min": [-1, -1, 0.019999], "max": [0.000001, 1, 1]}}' "$tip"
+refuse 1 "all on one line" problem.json --case c --resolution 16 -o no.json
 problem "{\"type\": \"moved\", \"region\": $end_box, \"move\": [0, 0, 0.01]}" "$tip"
 refuse 1 "supports\[0\]: moves" problem.json --case c --resolution 16 -o no.json
 
