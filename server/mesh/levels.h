@@ -142,7 +142,8 @@ static inline bool pal_levels_on_rim(const pal_levels *l, int32_t v)
 }
 
 /* Applies the stencil of vertex v >= n_vertex[0] to positions or any other triple per vertex x [][3]: where v stands
- * when all vertices of its stencil (all of coarser levels) do as in x. out must not be one of the row's own. */
+ * when all vertices of its stencil do as in x. They are of coarser levels, so that vertices nobody moves can be placed
+ * in ascending order. out may be the row's own place in x, as no row names its own vertex. */
 static inline void pal_levels_midpoint(const pal_levels *l, int32_t v, const double *x, double out[3])
 {
     const int32_t row = v - l->n_vertex[0];

@@ -235,6 +235,8 @@ static void irregular_boundary_vertices_take_the_crease_weights(void)
             for (int j = 0; j <= k; j++) want[pal_wing_far(l.edge, around[j], 0)] = pal_butterfly_rim(k, i, j);
             REQUIRE(l.n_vertex[1] <= 512);
             CHECK_LE(stencil_error(&l, around[i], want, l.n_vertex[1]), 1e-15);
+            /* two faces: plainly the middle */
+            if (k == 2) CHECK_INT(entries_of(&l, pal_levels_edge_midpoint(&l, around[i])), 2);
         }
         CHECK_LE(worst_sum(&l), 1e-14);
         pal_levels_free(&l);
@@ -295,6 +297,34 @@ static void sheets_stay_sheets_at_sides_and_corners(void)
         CHECK_INT(n_corner, 4);
         pal_levels_free(&l);
     }
+}
+
+/* an L: five corners like a sheet's and one that is hollow, whose inner edges stay straight */
+static void hollow_corners_keep_their_place(void)
+{
+    pal_surface s = sheet(7, 7, 6, 6);
+    int n = 0;
+    for (int t = 0; t < s.n_tri; t++) {
+        double x = 0, y = 0;
+        for (int k = 0; k < 3; k++) x += s.x[3 * s.tri[3 * t + k]] / 3, y += s.x[3 * s.tri[3 * t + k] + 1] / 3;
+        if (x > 0 && y > 0) continue;
+        memmove(s.tri + 3 * n++, s.tri + 3 * t, 3 * sizeof *s.tri);
+    }
+    s.n_tri = n;
+    pal_surface_report report = {0};
+    CHECK(!pal_surface_clean(&s, 0, &report, NULL));
+    pal_levels l = levels_of(s, 4);
+    double worst = 0;
+    int n_corner = 0;
+    for (int v = 0; v < l.n_vertex[0]; v++) n_corner += l.corner[v];
+    CHECK_INT(n_corner, 6);
+    for (int32_t v = l.n_vertex[0]; v < l.n_vertex[3]; v++) {
+        const int32_t *end = l.edge[pal_levels_vertex_parent(&l, v)].vertex;
+        for (int k = 0; k < 3; k++)
+            worst = fmax(worst, fabs(l.x[3 * v + k] - 0.5 * (l.x[3 * end[0] + k] + l.x[3 * end[1] + k])));
+    }
+    CHECK_LE(worst, 1e-14);
+    pal_levels_free(&l);
 }
 
 static void boundaries_depend_on_boundaries_only(void)
@@ -395,6 +425,7 @@ int main(void)
     RUN(irregular_boundary_vertices_take_the_crease_weights);
     RUN(cubics_are_reproduced_on_a_regular_grid);
     RUN(sheets_stay_sheets_at_sides_and_corners);
+    RUN(hollow_corners_keep_their_place);
     RUN(boundaries_depend_on_boundaries_only);
     RUN(a_mirrored_surface_has_mirrored_midpoints);
     RUN(normals_converge_at_every_kind_of_vertex);
