@@ -32,7 +32,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
 {
     const pal_problem *p = run->set.problem;
     const pal_tets *t = &run->info.mesh->tets;
-    double poisson = 0, density = 0;
+    double poisson = p->material[0].poisson, density = p->material[0].density_kg_m3;
     out->young_Pa = p->n_material > 1 ? run->info.mean_young_Pa : p->material[0].young_Pa;
     out->poisson = fmin(p->material[0].poisson, 0.4999);
     out->density_kg_m3 = p->material[0].density_kg_m3;
@@ -43,8 +43,9 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
         for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * e + k]);
         for (int k = 0; k < p->n_material; k++)
             if (pal_box_holds(&p->material[k].region, x, 0)) m = &p->material[k];
-        poisson += m->poisson / t->n_tet;
-        density += m->density_kg_m3 / t->n_tet;
+        /* what is the same in all materials stays what it is, to the bit */
+        poisson += (m->poisson - p->material[0].poisson) / t->n_tet;
+        density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;
     }
     if (p->n_material == 1) return;
     out->poisson = fmin(poisson, 0.4999);
