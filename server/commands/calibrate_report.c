@@ -47,6 +47,16 @@ static double ratio_of(const pal_calibrate_run *run, int k)
     return exp(run->theta[k * run->info.n_used] - run->info.start[k * run->info.n_used]);
 }
 
+/* constants of kind k that stand at a bound: displacements alone do not tell how large they are */
+static int count_bound(const pal_calibrate_run *run, int k)
+{
+    const pal_calibration_info *i = &run->info;
+    int n = 0;
+    for (int p = k * i->n_used; p < (k + 1) * i->n_used; p++)
+        n += run->theta[p] <= i->low[p] + 1e-6 || run->theta[p] >= i->high[p] - 1e-6;
+    return n;
+}
+
 /* ---- text ---- */
 
 /* "12.34 %", or "no rest" */
@@ -92,12 +102,14 @@ static void print_constants(const pal_calibrate_run *run)
 {
     for (int k = 0; k < run->info.n_kind; k++) {
         if (!run->info.grid) {
-            printf("%s %.6g J, %.3g times the start\n", pal_calibrate_key(run, k, true), exp(run->theta[k]),
-                   ratio_of(run, k));
+            printf("%s %.6g J, %.3g times the start%s\n", pal_calibrate_key(run, k, true), exp(run->theta[k]),
+                   ratio_of(run, k), count_bound(run, k) ? ", as far as --decades lets it go" : "");
             continue;
         }
         spread s = spread_of(run, k);
-        printf("%s %.3g to %.3g J, median %.3g\n", pal_calibrate_key(run, k, true), s.least, s.most, s.middle);
+        printf("%s %.3g to %.3g J, median %.3g", pal_calibrate_key(run, k, true), s.least, s.most, s.middle);
+        if (count_bound(run, k)) printf(", %d as far as --decades lets them go", count_bound(run, k));
+        printf("\n");
     }
 }
 
@@ -245,6 +257,9 @@ cJSON *pal_calibrate_json(const pal_calibrate_run *run)
     add_number(o, "spent", (double)(r->n_spent > 0 ? r->n_spent : r->n_evaluation));
     cJSON_AddStringToObject(o, "ended", r->ended);
     add_constants(run, o);
+    int n_bound = 0;
+    for (int k = 0; k < i->n_kind; k++) n_bound += count_bound(run, k);
+    add_number(o, "at_bound", n_bound);
     add_number(o, "nodes", i->n_node);
     add_number(o, "free_nodes", i->n_free);
     add_number(o, "tets", i->n_tet);

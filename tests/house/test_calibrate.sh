@@ -109,6 +109,9 @@ check "exit code $code" code_is 0
 check "no table" has out calibrated
 check "no constants" has out 'k_d .* J, .* times the start'
 check "no file" has out 'wrote text.json'
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --decades 0.05 --evaluations 20 -o text.json
+check "does not say that a constant stands at its bound" has out 'k_d .*, as far as --decades lets it go'
 end
 
 # ---- the same again ----
