@@ -38,12 +38,12 @@ static bool open_problem(experiment *e, const char *path)
     return !err;
 }
 
-/* calibrates from the default start by the adjoint; grid NULL: homogeneous */
-static bool calibrate(experiment *e, int n_case, int resolution, const int *grid)
+/* calibrates from the default start by the adjoint; grid NULL: homogeneous; most_evaluation 0: until it converges */
+static bool calibrate(experiment *e, int n_case, int resolution, const int *grid, int most_evaluation)
 {
     pal_note note = {""};
     pal_calibrate_options o;
-    pal_fit_options fit = {0};
+    pal_fit_options fit = {.most_evaluation = most_evaluation};
     pal_calibrate_default(&o);
     o.voxel.resolution = resolution;
     for (int a = 0; a < 3 && grid; a++) o.grid[a] = grid[a];
@@ -75,39 +75,29 @@ static void close_problem(experiment *e)
     free(e->problem);
 }
 
-/* paper: 0.9 -> 0.08 on the twist, 1.0 -> 0.1 on another load with the same constants */
+/* paper: 0.9 -> 0.08 on the twist, 1.0 -> 0.1 on another load with the same constants. The springs, fitted to our own
+ * finite elements, also against CalculiX's quadratic ones on the same gear, where ../shared has them */
 static void one_set_of_constants_serves_the_gear_on_a_load_it_never_saw(void)
 {
+    const char *csv = check_shared("reference/gear/u_twist_nh.csv");
     experiment e;
+    pal_note note = {""};
     REQUIRE(open_problem(&e, "deploy/problems/gear.json"));
     add_case(&e, 0, "twist", true);
     add_case(&e, 1, "push", false);
-    REQUIRE(calibrate(&e, 2, 20, NULL));
+    if (csv) {
+        REQUIRE(!pal_samples_read(csv, &e.samples, &note));
+        add_case(&e, 2, "twist", false);
+        e.cases[2].samples = &e.samples;
+    }
+    REQUIRE(calibrate(&e, csv ? 3 : 2, 20, NULL, 0));
     CHECK(e.info.n_node > 700);
     CHECK(e.result.start_percent > 5 && e.result.start_percent < DBL_MAX);
     CHECK(e.result.value.case_percent[0] <= 3);
     CHECK(e.result.value.case_percent[1] <= 4);
     CHECK(e.result.n_evaluation < 200);
-    close_problem(&e);
-}
-
-/* the springs, fitted to our own finite elements, against CalculiX's quadratic ones */
-static void the_gear_meets_a_reference_of_others(void)
-{
-    const char *path = check_shared("reference/gear/problem.json");
-    const char *csv = check_shared("reference/gear/u_twist_nh.csv");
-    check_count++; /* an absent reference is no failure */
-    if (!path || !csv) return;
-    experiment e;
-    pal_note note = {""};
-    REQUIRE(open_problem(&e, path));
-    REQUIRE(!pal_samples_read(csv, &e.samples, &note));
-    add_case(&e, 0, "twist", true);
-    add_case(&e, 1, "twist", false);
-    e.cases[1].samples = &e.samples;
-    REQUIRE(calibrate(&e, 2, 20, NULL));
-    CHECK(e.result.value.case_percent[0] <= 3);
-    CHECK(e.result.value.case_percent[1] <= 5); /* what the voxels of the truth miss is in it: 3 % */
+    if (csv) printf("  against the reference: %.3f %%\n", e.result.value.case_percent[2]);
+    if (csv) CHECK(e.result.value.case_percent[2] <= 5); /* what the voxels of the truth miss is in it: 3 % */
     close_problem(&e);
 }
 
@@ -119,10 +109,10 @@ static void a_grid_fits_both_loads_of_the_gear_better(void)
     REQUIRE(open_problem(&e, "deploy/problems/gear.json"));
     add_case(&e, 0, "twist", true);
     add_case(&e, 1, "push", true);
-    REQUIRE(calibrate(&e, 2, 16, NULL));
+    REQUIRE(calibrate(&e, 2, 12, NULL, 0));
     double alone[2] = {e.result.value.case_percent[0], e.result.value.case_percent[1]},
            both = e.result.value.error_percent;
-    REQUIRE(calibrate(&e, 2, 16, grid));
+    REQUIRE(calibrate(&e, 2, 12, grid, 0));
     CHECK(e.result.value.error_percent <= 0.6 * both);
     for (int k = 0; k < 2; k++) CHECK(e.result.value.case_percent[k] < alone[k]);
     close_problem(&e);
@@ -173,9 +163,9 @@ static void a_grid_finds_the_hard_half_of_the_cube(void)
     double median[2], right;
     REQUIRE(open_problem(&e, "deploy/problems/cube.json"));
     add_case(&e, 0, "push", true);
-    REQUIRE(calibrate(&e, 1, 8, NULL));
+    REQUIRE(calibrate(&e, 1, 8, NULL, 20));
     double homogeneous = e.result.value.error_percent;
-    REQUIRE(calibrate(&e, 1, 8, grid));
+    REQUIRE(calibrate(&e, 1, 8, grid, 60));
     medians(&e, median, &right);
     CHECK(homogeneous >= 5 * e.result.value.error_percent);
     CHECK(median[1] >= 8 * median[0]);
@@ -192,7 +182,7 @@ static void a_grid_recovers_the_regions_of_the_bar(void)
     REQUIRE(open_problem(&e, "deploy/problems/bar.json"));
     add_case(&e, 0, "bend", true);
     add_case(&e, 1, "twist_pull", false);
-    REQUIRE(calibrate(&e, 2, 20, grid));
+    REQUIRE(calibrate(&e, 2, 20, grid, 100));
     medians(&e, median, &right);
     CHECK(e.info.n_node > 700);
     CHECK(e.result.value.case_percent[0] <= 0.5);
@@ -205,7 +195,6 @@ static void a_grid_recovers_the_regions_of_the_bar(void)
 int main(void)
 {
     RUN(one_set_of_constants_serves_the_gear_on_a_load_it_never_saw);
-    RUN(the_gear_meets_a_reference_of_others);
     RUN(a_grid_fits_both_loads_of_the_gear_better);
     RUN(a_grid_finds_the_hard_half_of_the_cube);
     RUN(a_grid_recovers_the_regions_of_the_bar);

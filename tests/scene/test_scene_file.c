@@ -607,7 +607,7 @@ int main(void)
 {
     char command[128];
     pal_note note = {""};
-    if (!mkdtemp(folder) || !small_scene(&plain, &mesh, 8)) return 1;
+    if (!mkdtemp(folder) || !small_scene(&plain, &mesh, CHECK_REPEATS(8, 5))) return 1;
     if (pal_prepared_save(&mesh, in_folder("ball.palmesh"), &note)) return 1;
     RUN(what_is_not_json_is_refused_with_its_line);
     RUN(big_files_are_refused_before_they_are_parsed);

@@ -36,7 +36,7 @@ static void check_comes_back(tool_scene *s)
 /* fewer voxels for elements of ten nodes */
 static int resolution_of(int kind)
 {
-    return kind >= HARD_TET10 ? 4 : 6;
+    return kind >= HARD_TET10 ? 4 : CHECK_REPEATS(6, 4);
 }
 
 static void poses_and_loads_that_are_no_numbers_are_refused(void)

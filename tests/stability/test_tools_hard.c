@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+enum { VOXELS = CHECK_REPEATS(8, 6) }; /* of the ball */
+
 /* counted heap calls (linked with --wrap) */
 static long n_heap;
 void *__real_malloc(size_t n);
@@ -68,9 +70,9 @@ static void check_comes_back(tool_scene *s)
 static void teleport_by_a_body_size_gives_no_more_than_cap_times_clamp(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 8, true, 1, 0.01, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, VOXELS, true, 1, 0.01, 15) && tool_scene_open(&s));
     const double to[3][3] = {{0, 0, 0}, {0, 0, -0.1}, {0.02, 0.01, 0.03}};
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < CHECK_REPEATS(3, 1); k++) {
         pal_world_reset(s.world);
         move_tool(&s, 0, 0, 0, s.body->size_m - 0.05, false);
         REQUIRE(step_world(&s, 12));
@@ -90,7 +92,7 @@ static void teleport_by_a_body_size_gives_no_more_than_cap_times_clamp(void)
 static void tool_that_appears_inside_pushes_out_gently(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 8, true, 1, 0.01, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, VOXELS, true, 1, 0.01, 15) && tool_scene_open(&s));
     move_tool(&s, 0, 0.025, 0, 0.005, false);
     double most_energy = 0;
     for (int i = 0; i < 30; i++) {
@@ -113,7 +115,7 @@ static void tool_that_appears_inside_pushes_out_gently(void)
 static void eight_tools_press_and_grab_one_spot(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 8, true, 8, 0.01, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, VOXELS, true, 8, 0.01, 15) && tool_scene_open(&s));
     for (int i = 0; i < 90; i++) {
         for (int t = 0; t < 8; t++)
             move_tool(&s, t, 0.0005 * t, 0, 0.061 - 0.0003 * i * (t & 1 ? 1 : -0.3), i > 12 && t < 6);
@@ -159,11 +161,11 @@ static void opposed_tools_pinch_a_thin_sheet(void)
 static void wild_hands_never_break_it_and_never_touch_the_heap(void)
 {
     tool_scene s;
-    REQUIRE(ball_scene(&s, 8, true, 3, 0.01, 15) && tool_scene_open(&s));
+    REQUIRE(ball_scene(&s, VOXELS, true, 3, 0.01, 15) && tool_scene_open(&s));
     seed = 12345;
     double x[3][3] = {{0}};
     long before = n_heap;
-    for (int i = 0; i < 300; i++) {
+    for (int i = 0; i < CHECK_REPEATS(300, 100); i++) {
         for (int t = 0; t < 3; t++) {
             double chance = random_in(0, 1);
             for (int c = 0; c < 3; c++)
@@ -188,7 +190,7 @@ static void same_hands_give_the_same_state(void)
     uint64_t hash[2];
     for (int k = 0; k < 2; k++) {
         tool_scene s;
-        REQUIRE(ball_scene(&s, 8, true, 2, 0.01, 15) && tool_scene_open(&s));
+        REQUIRE(ball_scene(&s, VOXELS, true, 2, 0.01, 15) && tool_scene_open(&s));
         if (k) {
             /* a past that reset must wipe out */
             move_tool(&s, 0, 0, 0.01, 0.05, true);
