@@ -325,7 +325,7 @@ static void pictures_side_by_side_share_frame_and_range(void)
 /* a wavy sheet of 180,000 triangles in three pictures: coarser, but all of it, in less than 1.5 MB */
 static void large_surfaces_are_drawn_coarser(void)
 {
-    enum { N = 300 };
+    enum { N = CHECK_REPEATS(300, 150) };
     double *x = malloc(3 * sizeof *x * (N + 1) * (N + 1)), *value = malloc(sizeof *value * (N + 1) * (N + 1));
     int32_t *tri = malloc(6 * sizeof *tri * N * N);
     triangle *t = malloc(20000 * sizeof *t);

@@ -67,7 +67,7 @@ static void shuffled_bodies_come_back_for_every_seed(void)
     for (int k = 0; k < HARD_KINDS; k++)
         for (int q = 0; q < 3; q++) {
             fem_beam b;
-            int back = 0, n_seed = (k >= HARD_TET10 ? 4 : 20) / HARD_SLOW, n = 0;
+            int back = 0, n_seed = CHECK_REPEATS(k >= HARD_TET10 ? 4 : 20, 2), n = 0;
             double most = 0, last = 0, rise = 0;
             REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2, poisson[q]));
             for (int seed = 0; seed < 2 * n_seed; seed++, n++) {
