@@ -42,11 +42,11 @@ get() { # get PATH: status and body
     node -e 'fetch(process.argv[1]).then(async r => console.log(r.status, (await r.text()).slice(0, 200)),
         e => console.log("no answer", String(e)))' "http://127.0.0.1:$port$1"
 }
-waits_for() { # waits_for FILE WORD: until the line is there or the server is gone, at most 30 s
+waits_for() { # waits_for FILE WORD: until the line is there or the server is gone, at most 90 s
     n=0
     while ! grep -q "$2" "$1" 2>/dev/null; do
         n=$((n + 1))
-        [ $n -lt 300 ] && kill -0 "$pid" 2>/dev/null || return 1
+        [ $n -lt 900 ] && kill -0 "$pid" 2>/dev/null || return 1
         sleep 0.1
     done
 }
