@@ -2,19 +2,24 @@
 # Installs what is missing, builds, prepares the default scene, starts the server and prints the address to open.
 # usage: deploy/run.sh [INPUT] [palpate serve options...]
 #   INPUT  a scene (.json), a surface (.obj .stl .ply .off) or a label volume (.nii .nii.gz .inr .inr.gz);
+#          stomach, sphere or sheet: a hollow body that refines where it is touched;
 #          without it: the liver of an abdominal CT, or our own organ when that cannot be had
 # PALPATE_BUILD names another build folder. A rerun starts in seconds.
 set -u
 . "$(dirname "$0")/common.sh"
 case ${1-} in -h | --help)
-    sed -n '2,7s/^# \{0,1\}//p' "$0"
+    sed -n '2,8s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 esac
 start=$(pwd)
-input=
+input='' shape=''
 case ${1-} in
 '' | -*) ;;
+stomach | sphere | sheet)
+    shape=$1
+    shift
+    ;;
 *)
     input=$1
     shift
@@ -47,6 +52,12 @@ find_scan() {
 # a scene is prepared again (a second) when the program that reads it is newer
 stale() { [ ! -e "$1" ] || [ "$palpate" -nt "$1" ]; }
 
+if [ -n "$shape" ]; then
+    input=$build/scene/$shape/scene.json
+    if stale "$input"; then
+        "$palpate" prepare --shape "$shape" -o "$build/scene/$shape" --quiet || fail "the scene could not be prepared"
+    fi
+fi
 if [ -z "$input" ]; then
     input=$build/scene/liver/scene.json
     if stale "$input"; then

@@ -70,6 +70,7 @@ if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
     step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
+    step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
     build_preset asan all && leave="accuracy|bench" tests_of asan

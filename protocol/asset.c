@@ -6,6 +6,7 @@
 #include "protocol/asset.h"
 
 #include "protocol/bytes.h"
+#include "protocol/planes.h"
 #include "protocol/sha256.h"
 
 #include <lz4.h>
@@ -30,27 +31,6 @@ static uint32_t fnv1a(const uint8_t *bytes, size_t n)
     return hash;
 }
 
-/* signed differences as small unsigned numbers: 0 -1 1 -2 ... */
-static uint32_t fold(uint32_t difference)
-{
-    return difference << 1 ^ (0 - (difference >> 31));
-}
-
-static uint32_t unfold(uint32_t folded)
-{
-    return folded >> 1 ^ (0 - (folded & 1));
-}
-
-static void put_plane(uint8_t *plane, size_t n, size_t i, uint32_t v)
-{
-    for (size_t p = 0; p < 4; p++) plane[p * n + i] = (uint8_t)(v >> (8 * p));
-}
-
-static uint32_t get_plane(const uint8_t *plane, size_t n, size_t i)
-{
-    return plane[i] | (uint32_t)plane[n + i] << 8 | (uint32_t)plane[2 * n + i] << 16 | (uint32_t)plane[3 * n + i] << 24;
-}
-
 static void write_planes(uint8_t *at, const float *rest_m, const pal_frame_order *o, const uint32_t *triangle,
                          uint32_t n_triangle)
 {
@@ -60,15 +40,15 @@ static void write_planes(uint8_t *at, const float *rest_m, const pal_frame_order
         for (size_t i = 0; i < n; i++) {
             uint32_t bits;
             memcpy(&bits, &rest_m[3 * i + c], sizeof bits);
-            put_plane(at, n, i, bits);
+            pal_put_plane(at, n, i, bits);
         }
-    for (size_t i = 0; i < n; before = o->vertex_of[i++]) put_plane(at, n, i, fold(o->vertex_of[i] - before));
+    for (size_t i = 0; i < n; before = o->vertex_of[i++]) pal_put_plane(at, n, i, pal_fold(o->vertex_of[i] - before));
     at += 4 * n;
     /* a neighbour as the difference to the one before it, the first as the distance from the own index */
     for (size_t j = 0; j < 4; j++, at += 4 * n)
         for (size_t i = 0; i < n; i++) {
             const uint32_t *neighbour = o->neighbour + 4 * i;
-            put_plane(at, n, i, fold(neighbour[j] - (j ? neighbour[j - 1] : (uint32_t)i)));
+            pal_put_plane(at, n, i, pal_fold(neighbour[j] - (j ? neighbour[j - 1] : (uint32_t)i)));
         }
     for (size_t j = 0; j < 4; j++, at += 2 * n)
         for (size_t i = 0; i < n; i++) {
@@ -78,9 +58,10 @@ static void write_planes(uint8_t *at, const float *rest_m, const pal_frame_order
         }
     /* corners as differences to the same corner of the triangle before */
     size_t n_corner = 3 * (size_t)n_triangle;
-    for (size_t e = 0; e < n_corner; e++) put_plane(at, n_corner, e, fold(triangle[e] - (e < 3 ? 0 : triangle[e - 3])));
+    for (size_t e = 0; e < n_corner; e++)
+        pal_put_plane(at, n_corner, e, pal_fold(triangle[e] - (e < 3 ? 0 : triangle[e - 3])));
     at += 4 * n_corner;
-    for (size_t l = 0; l < o->n_level; l++) put_plane(at, o->n_level, l, o->level_begin[l]);
+    for (size_t l = 0; l < o->n_level; l++) pal_put_plane(at, o->n_level, l, o->level_begin[l]);
 }
 
 int pal_asset_encode(const float *rest_m, const pal_frame_order *order, const uint32_t *triangle, uint32_t n_triangle,
@@ -171,23 +152,23 @@ static void read_planes(const uint8_t *at, pal_asset *a)
     uint32_t before = 0;
     for (size_t c = 0; c < 3; c++, at += 4 * n)
         for (size_t i = 0; i < n; i++) {
-            uint32_t bits = get_plane(at, n, i);
+            uint32_t bits = pal_get_plane(at, n, i);
             memcpy(&a->rest_m[3 * i + c], &bits, sizeof bits);
         }
-    for (size_t i = 0; i < n; i++) o->vertex_of[i] = before += unfold(get_plane(at, n, i));
+    for (size_t i = 0; i < n; i++) o->vertex_of[i] = before += pal_unfold(pal_get_plane(at, n, i));
     at += 4 * n;
     for (size_t j = 0; j < 4; j++, at += 4 * n)
         for (size_t i = 0; i < n; i++) {
             uint32_t *neighbour = o->neighbour + 4 * i;
-            neighbour[j] = unfold(get_plane(at, n, i)) + (j ? neighbour[j - 1] : (uint32_t)i);
+            neighbour[j] = pal_unfold(pal_get_plane(at, n, i)) + (j ? neighbour[j - 1] : (uint32_t)i);
         }
     for (size_t j = 0; j < 4; j++, at += 2 * n)
         for (size_t i = 0; i < n; i++) o->weight[4 * i + j] = (int16_t)(uint16_t)(at[i] | at[n + i] << 8);
     size_t n_corner = 3 * (size_t)a->n_triangle;
     for (size_t e = 0; e < n_corner; e++)
-        a->triangle[e] = unfold(get_plane(at, n_corner, e)) + (e < 3 ? 0 : a->triangle[e - 3]);
+        a->triangle[e] = pal_unfold(pal_get_plane(at, n_corner, e)) + (e < 3 ? 0 : a->triangle[e - 3]);
     at += 4 * n_corner;
-    for (size_t l = 0; l < o->n_level; l++) o->level_begin[l] = get_plane(at, o->n_level, l);
+    for (size_t l = 0; l < o->n_level; l++) o->level_begin[l] = pal_get_plane(at, o->n_level, l);
     o->level_begin[o->n_level] = o->n_vertex;
 }
 

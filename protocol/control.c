@@ -18,7 +18,7 @@ typedef enum field_type {
     U32,
     U64,
     F64,
-    BOOL,
+    BOOL,    /* not required: left out while it is false        */
     TEXT,    /* char[size]                                      */
     SAID,    /* the same, left out while it is empty            */
     ROLE,    /* pal_wire_role as its name                       */
@@ -26,7 +26,7 @@ typedef enum field_type {
     NUMBERS, /* double[max], counted or FIXED                   */
     TEXTS,   /* char[max][size], counted                        */
     OBJECT,  /* sub, whose offsets are those of the outer struct */
-    OBJECTS, /* struct[max] of size bytes, counted              */
+    OBJECTS, /* struct[max] of size bytes, counted; not required: left out while there is none */
     ARGS     /* object of numbers: pal_wire_arg[max], counted   */
 } field_type;
 
@@ -56,6 +56,7 @@ static const field part_fields[] = {
     {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
     {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
      PAL_WIRE_FIELDS_MAX, NULL},
+    {"adapts", BOOL, false, AT(pal_wire_part_info, adapts), 0, 0, 0, NULL},
     END};
 static const field tool_fields[] = {{"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
                                     {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
@@ -89,6 +90,12 @@ static const field topology_fields[] = {{"parts", OBJECTS, true, AT(pal_wire_top
                                          sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part), PAL_WIRE_PART_MAX,
                                          part_fields},
                                         END};
+static const field active_fields[] = {{"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},
+                                      {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
+                                      {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
+                                      {"of_nodes", U32, true, AT(pal_wire_active, n_all_node), 0, 0, 0, NULL},
+                                      {"of_springs", U32, true, AT(pal_wire_active, n_all_spring), 0, 0, 0, NULL},
+                                      END};
 static const field status_fields[] = {
     {"tick", U64, true, AT(pal_wire_status, tick), 0, 0, 0, NULL},
     {"sim_time_s", F64, true, AT(pal_wire_status, sim_time_s), 0, 0, 0, NULL},
@@ -108,6 +115,8 @@ static const field status_fields[] = {
     {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
     {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
     {"note", TEXT, false, AT(pal_wire_status, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
+     PAL_WIRE_PART_MAX, active_fields},
     END};
 static const field member_fields[] = {{"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
                                       {"role", ROLE, true, AT(pal_wire_member, role), 0, 0, 0, NULL},
@@ -124,6 +133,7 @@ static const field error_fields[] = {{"code", TEXT, true, AT(pal_wire_problem, c
 static const field join_fields[] = {{"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
                                     {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
                                     {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
+                                    {"patches", BOOL, false, AT(pal_wire_join, patches), 0, 0, 0, NULL},
                                     END};
 static const field command_fields[] = {
     {"verb", TEXT, true, AT(pal_wire_order, verb), LEN(pal_wire_order, verb), 0, 0, NULL},
@@ -338,10 +348,22 @@ static void add_list(writer *w, const field *f, const uint8_t *base)
     add(w, f->type == ARGS ? "}" : "]", 1);
 }
 
+/* what nobody said is not written */
+static bool left_out(const field *f, const uint8_t *base)
+{
+    uint32_t n = 1;
+    bool value = true;
+    if (f->required) return false;
+    if (f->type == SAID) return !base[f->offset];
+    if (f->type == BOOL) memcpy(&value, base + f->offset, sizeof value);
+    if (f->type == OBJECTS) memcpy(&n, base + f->count, sizeof n);
+    return !value || n == 0;
+}
+
 static void add_fields(writer *w, const field *f, const uint8_t *base, bool first)
 {
     for (; f->key && !w->refusal; f++) {
-        if (f->type == SAID && !base[f->offset]) continue;
+        if (left_out(f, base)) continue;
         add_key(w, f->key, first);
         first = false;
         if (f->type == BOOL) {

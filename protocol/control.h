@@ -66,7 +66,8 @@ typedef struct pal_wire_part_info {
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* what `view` may ask for; 0 also from servers that know no fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
-} pal_wire_part_info;                                      /* its place in the array is its part index   */
+    bool adapts; /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
+} pal_wire_part_info; /* its place in the array is its part index   */
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
@@ -97,6 +98,13 @@ typedef struct pal_wire_hello {
     int you_tool; /* tool given, or PAL_WIRE_TOOL_NONE                                */
 } pal_wire_hello;
 
+/* how much of a part that adapts is in use */
+typedef struct pal_wire_active {
+    uint32_t part;
+    uint32_t n_node, n_spring;         /* now                                      */
+    uint32_t n_all_node, n_all_spring; /* and if all of it were of its finest level */
+} pal_wire_active;
+
 typedef struct pal_wire_status {
     uint64_t tick; /* steps done                                                     */
     double sim_time_s;
@@ -116,6 +124,8 @@ typedef struct pal_wire_status {
     uint64_t n_late;                /* steps that began late                                          */
     uint64_t n_refused;             /* poses and commands refused by the session                      */
     char note[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
+    uint32_t n_active;              /* parts that adapt; 0: not on the wire                     */
+    pal_wire_active active[PAL_WIRE_PART_MAX];
 } pal_wire_status;
 
 typedef struct pal_wire_member {
@@ -138,7 +148,8 @@ typedef struct pal_wire_problem {
 typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
-    int tool; /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */
+    int tool;     /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
+    bool patches; /* takes PATCH; else it sees adapting parts with the triangles of load; false is not on the wire */
 } pal_wire_join;
 
 typedef struct pal_wire_arg {

@@ -189,12 +189,17 @@ static bool invert(const float a[12], double inverse[12])
     return true;
 }
 
-/* displacements in wire order; returns the largest |component| as float bits, >= 0x7f800000 when one is not finite */
-static uint32_t displace(pal_frame_encoder *e, const float *position_m, const double *inverse)
+/* displacements in wire order, 0 where hidden; returns the largest |component| as float bits, >= 0x7f800000 when one is
+ * not finite */
+static uint32_t displace(pal_frame_encoder *e, const float *position_m, const double *inverse, const uint8_t *hidden)
 {
     const tables *t = &e->t;
     uint4 largest = {0};
     for (uint32_t i = 0; i < t->n; i++) {
+        if (hidden && hidden[t->vertex_of[i]]) {
+            e->u[i] = (float4){0};
+            continue;
+        }
         const float *p = position_m + 3 * (size_t)t->vertex_of[i];
         float4 x = {p[0], p[1], p[2], 0};
         if (inverse)
@@ -223,8 +228,15 @@ static float choose_q(double error_m, double largest_u, double reach_m)
     return (double)down < least ? nextafterf(down, INFINITY) : down;
 }
 
-/* closed loop: residuals of all vertices, X updated; true when X changed */
-static bool quantise(pal_frame_encoder *e, double q)
+/* X of a hidden vertex is its prediction; a chain of predictors that extrapolate is kept in range */
+static inline int4 within_range(int4 x)
+{
+    for (int c = 0; c < 3; c++) x[c] = x[c] > X_ROOM ? X_ROOM : x[c] < -X_ROOM ? -X_ROOM : x[c];
+    return x;
+}
+
+/* closed loop: residuals of all vertices, X updated; true when X of one that is not hidden changed */
+static inline __attribute__((always_inline)) bool quantise_all(pal_frame_encoder *e, double q, const uint8_t *hidden)
 {
     const tables *t = &e->t;
     float scale = (float)(16 / q);
@@ -234,16 +246,23 @@ static bool quantise(pal_frame_encoder *e, double q)
     for (uint32_t i = 0; i < t->n; i++) {
         int4 wanted = (int4)(e->u[i] * scale + magic) - (int4)magic;
         int4 guess = predicted(t->x, &t->predict[i]);
+        bool unseen = hidden && hidden[t->vertex_of[i]];
+        if (unseen) wanted = within_range(guess);
         int4 r = (wanted - guess + 8) >> 4;
         int4 x = guess + r * 16;
         uint4 folded = (uint4)r << 1 ^ (uint4)(r >> 31);
-        changed |= (uint4)(x ^ t->x[i]);
+        if (!unseen) changed |= (uint4)(x ^ t->x[i]);
         t->x[i] = x;
         /* the fourth number is overwritten by the next vertex */
         memcpy(e->residual + 3 * (size_t)i, &folded, sizeof folded);
     }
     memset(e->residual + 3 * (size_t)t->n, 0, 4 * sizeof *e->residual);
     return (changed[0] | changed[1] | changed[2]) != 0;
+}
+
+static bool quantise(pal_frame_encoder *e, double q, const uint8_t *hidden)
+{
+    return hidden ? quantise_all(e, q, hidden) : quantise_all(e, q, NULL);
 }
 
 /* bits of n_code codes with parameter k, whose values that are not zero are among v[0..3 GROUP) */
@@ -400,7 +419,7 @@ int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *d
     }
 
     /* displacements, and a step that fits them; nothing is changed before all checks are done */
-    uint32_t bits = displace(e, given->position_m, given->affine ? inverse : NULL);
+    uint32_t bits = displace(e, given->position_m, given->affine ? inverse : NULL, given->hidden);
     if (bits >= 0x7f800000u) return PAL_REFUSAL_NAN;
     float largest;
     memcpy(&largest, &bits, sizeof largest);
@@ -413,7 +432,7 @@ int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *d
     if (head.q_m > Q_MAX_M) return PAL_REFUSAL_RANGE;
 
     bool same = e->any_before && head.q_m == e->q_before && !memcmp(head.affine, e->affine_before, sizeof head.affine);
-    result->changed = quantise(e, (double)head.q_m) || !same;
+    result->changed = quantise(e, (double)head.q_m, given->hidden) || !same;
     e->any_before = true;
     e->q_before = head.q_m;
     memcpy(e->affine_before, head.affine, sizeof head.affine);

@@ -4,7 +4,8 @@
  * with step q (closed loop, so that errors do not add up), written as Rice codes in groups of 16 vertices and packed in
  * one LZ4 block. Every frame stands alone: it may be dropped, and any frame serves a client that joins.
  * Stated bound: |decoded - given| <= error_m per axis, for every vertex of every frame whose sent q was not raised
- * (pal_frame_result.error_m says the bound that holds). */
+ * (pal_frame_result.error_m says the bound that holds). Hidden vertices have no residual: they cost next to nothing and
+ * stand where their neighbours predict them. */
 #ifndef PAL_PROTOCOL_FRAME_CODEC_H
 #define PAL_PROTOCOL_FRAME_CODEC_H
 #include "protocol/asset.h"
@@ -46,21 +47,23 @@ typedef struct pal_frame_given {
     double error_m;          /* wanted largest error per axis, > 0                                         */
     const float *position_m; /* shown vertices in the asset's vertex order, borrowed  [n_vertex][3]        */
     const float *affine;     /* NULL, or an invertible 3x4 that takes most of a large motion, borrowed [12] */
+    const uint8_t *hidden;   /* NULL, or not 0: in no triangle now, its position is never read, borrowed [n_vertex] */
 } pal_frame_given;
 typedef struct pal_frame_result {
     size_t n_byte;  /* of the message in dst                                                               */
     double error_m; /* bound that holds; larger than asked when the range forced a larger q                */
     bool changed;   /* the client would see a difference to the last frame this encoder put (true at first):
-                       a part at rest need not be sent, and then its seq should not grow                   */
+                       a part at rest need not be sent, and then its seq should not grow. Where other vertices are
+                       hidden than in the last frame sent, the caller sends it in any case                 */
 } pal_frame_result;
 
 typedef struct pal_frame_encoder pal_frame_encoder;
 /* [load] copies rest pose and order; one encoder per part and accuracy, used by one thread at a time */
 int pal_frame_encoder_create(const float *rest_m, const pal_frame_order *order, pal_frame_encoder **out);
 void pal_frame_encoder_destroy(pal_frame_encoder *e); /* NULL allowed */
-/* [any] one whole FRAME message into dst; allocates nothing. NAN: a position is not finite; SPACE: cap is less than
- * pal_frame_bound(n_vertex); RANGE: error_m, affine or a displacement beyond any use. On failure the
- * encoder is as before the call. */
+/* [any] one whole FRAME message into dst; allocates nothing. NAN: a position of a vertex that is not hidden is not
+ * finite; SPACE: cap is less than pal_frame_bound(n_vertex); RANGE: error_m, affine or a displacement beyond any use.
+ * On failure the encoder is as before the call. */
 int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *dst, size_t cap,
                   pal_frame_result *result);
 

@@ -415,6 +415,75 @@ int pal_frame_order_create(const float *rest_m, uint32_t n_vertex, const uint32_
     return refusal;
 }
 
+/* a midpoint's wire index is its number; a parent's too, unless it is coarse. A level ends where a parent lies in it.
+ * begin NULL: only counts */
+static uint32_t midpoint_levels(const pal_frame_order *coarse, const uint32_t *parent, const uint32_t *rank, uint32_t n,
+                                uint32_t *begin)
+{
+    uint32_t n_level = coarse->n_level, n_coarse = coarse->n_vertex, first = 0;
+    for (uint32_t i = n_coarse; i < n; i++) {
+        const uint32_t *p = parent + 2 * (size_t)(i - n_coarse);
+        bool inside = i == n_coarse;
+        for (int k = 0; k < 2; k++) inside |= (p[k] < n_coarse ? rank[p[k]] : p[k]) >= first;
+        if (!inside) continue;
+        first = i;
+        if (begin) begin[n_level] = i;
+        n_level++;
+    }
+    return n_level;
+}
+
+static int extend(const pal_frame_order *coarse, const uint32_t *parent, uint32_t n, pal_frame_order *o)
+{
+    const int16_t half[4] = {PAL_ORDER_ONE / 2, PAL_ORDER_ONE / 2, 0, 0};
+    uint32_t n_coarse = coarse->n_vertex, *rank = malloc(n_coarse * sizeof *rank);
+    if (!rank) return PAL_REFUSAL_MEMORY;
+    for (uint32_t i = 0; i < n_coarse; i++) rank[coarse->vertex_of[i]] = i;
+    o->n_vertex = n;
+    o->n_level = midpoint_levels(coarse, parent, rank, n, NULL);
+    o->level_begin = malloc(((size_t)o->n_level + 1) * sizeof *o->level_begin);
+    o->vertex_of = malloc(n * sizeof *o->vertex_of);
+    o->neighbour = calloc(4 * (size_t)n, sizeof *o->neighbour);
+    o->weight = calloc(4 * (size_t)n, sizeof *o->weight);
+    if (!o->level_begin || !o->vertex_of || !o->neighbour || !o->weight) return free(rank), PAL_REFUSAL_MEMORY;
+    memcpy(o->level_begin, coarse->level_begin, coarse->n_level * sizeof *o->level_begin);
+    memcpy(o->vertex_of, coarse->vertex_of, n_coarse * sizeof *o->vertex_of);
+    memcpy(o->neighbour, coarse->neighbour, 4 * (size_t)n_coarse * sizeof *o->neighbour);
+    memcpy(o->weight, coarse->weight, 4 * (size_t)n_coarse * sizeof *o->weight);
+    midpoint_levels(coarse, parent, rank, n, o->level_begin);
+    o->level_begin[o->n_level] = n;
+    for (uint32_t i = n_coarse; i < n; i++) {
+        const uint32_t *p = parent + 2 * (size_t)(i - n_coarse);
+        uint32_t *neighbour = o->neighbour + 4 * (size_t)i;
+        o->vertex_of[i] = i;
+        for (int k = 0; k < 2; k++) neighbour[k] = p[k] < n_coarse ? rank[p[k]] : p[k];
+        memcpy(o->weight + 4 * (size_t)i, half, sizeof half);
+    }
+    free(rank);
+    return 0;
+}
+
+int pal_frame_order_families(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
+                             const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out)
+{
+    pal_frame_order *coarse = NULL, *o = NULL;
+    if (n_coarse == 0 || n_coarse > n_vertex || n_vertex > PAL_ORDER_VERTEX_MAX) return PAL_REFUSAL_COUNT;
+    for (uint32_t i = n_coarse; i < n_vertex; i++)
+        for (int k = 0; k < 2; k++)
+            if (parent[2 * (size_t)(i - n_coarse) + (size_t)k] >= i) return PAL_REFUSAL_RANGE;
+    for (size_t i = 3 * (size_t)n_coarse; i < 3 * (size_t)n_vertex; i++)
+        if (!isfinite(rest_m[i])) return PAL_REFUSAL_NAN;
+    int refusal = pal_frame_order_create(rest_m, n_coarse, coarse_triangle, n_coarse_triangle, &coarse);
+    if (!refusal && !(o = calloc(1, sizeof *o))) refusal = PAL_REFUSAL_MEMORY;
+    if (!refusal) refusal = extend(coarse, parent, n_vertex, o);
+    pal_frame_order_destroy(coarse);
+    if (refusal)
+        pal_frame_order_destroy(o);
+    else
+        *out = o;
+    return refusal;
+}
+
 void pal_frame_order_destroy(pal_frame_order *order)
 {
     if (!order) return;

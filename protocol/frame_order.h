@@ -29,6 +29,14 @@ typedef struct pal_frame_order {
  * O(n log n), about 0.3 s for 30k vertices. The caller frees *out with pal_frame_order_destroy. */
 int pal_frame_order_create(const float *rest_m, uint32_t n_vertex, const uint32_t *triangle, uint32_t n_triangle,
                            pal_frame_order **out);
+/* [load] Order of a surface made by halving edges: vertices below n_coarse are those of the coarsest level, with its
+ * triangles; vertex i >= n_coarse is the midpoint of the smaller vertices parent[2 (i - n_coarse)], parent[.. + 1].
+ * The coarse ones come first, in the order of pal_frame_order_create, then the midpoints in vertex order, predicted as
+ * the mean of their parents: exact for any motion that is linear on coarse triangles, and what is right for vertices
+ * that are not in use. All borrowed. COUNT: n_coarse is 0 or above n_vertex; RANGE: a parent that is not smaller; as
+ * pal_frame_order_create */
+int pal_frame_order_families(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
+                             const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out);
 void pal_frame_order_destroy(pal_frame_order *order); /* NULL allowed */
 
 /* Checks all that a frame decoder trusts: vertex_of is a permutation, every neighbour is smaller than its own index,

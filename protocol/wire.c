@@ -91,7 +91,7 @@ static bool take_doubles(const uint8_t **at, double *v, int n)
 static bool known_kind(uint8_t kind)
 {
     return kind == PAL_WIRE_FRAME || kind == PAL_WIRE_TOOLS || kind == PAL_WIRE_HAPTIC || kind == PAL_WIRE_FIELD ||
-           kind == PAL_WIRE_POSE || kind == PAL_WIRE_ACK;
+           kind == PAL_WIRE_PATCH || kind == PAL_WIRE_POSE || kind == PAL_WIRE_ACK;
 }
 
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out)

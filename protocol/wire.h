@@ -33,6 +33,7 @@ typedef enum pal_wire_kind {
     PAL_WIRE_TOOLS = 2,  /* server to client: all tools; closes a cycle                 */
     PAL_WIRE_HAPTIC = 3, /* server to client: contact model for one tool's holder       */
     PAL_WIRE_FIELD = 4,  /* server to client that asked: numbers for colours, field_codec.h */
+    PAL_WIRE_PATCH = 5,  /* server to client that takes them: changed triangles, patch_codec.h */
     PAL_WIRE_POSE = 16,  /* client to server: pose of the tool it holds                 */
     PAL_WIRE_ACK = 17    /* client to server: cycle taken in, gives credit              */
 } pal_wire_kind;
@@ -55,7 +56,7 @@ typedef enum pal_wire_close {
 typedef struct pal_wire_head {
     uint8_t kind;   /* pal_wire_kind              */
     uint8_t flags;  /* FRAME only, else 0         */
-    uint16_t index; /* FRAME, FIELD: part; POSE, HAPTIC: tool; TOOLS: n_tool; ACK: 0 */
+    uint16_t index; /* FRAME, FIELD, PATCH: part; POSE, HAPTIC: tool; TOOLS: n_tool; ACK: 0 */
 } pal_wire_head;
 /* head of any message, e.g. to dispatch on kind: SHORT, MAGIC or KIND refused */
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out);

@@ -9,7 +9,7 @@
 
 enum {
     LINK_QUEUE = 16,
-    LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part fits */
+    LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part fits, and a patch of all places */
     LINK_SMALL_SOCKET = 16384,   /* receive buffer of a client that reads slowly on purpose */
     LINK_PAUSE_FIRST_MS = 250,
     LINK_PAUSE_MOST_MS = 5000
@@ -23,6 +23,7 @@ struct pal_link {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
     int tool;
+    bool patches;
     bool once, closing, up, held, pause_reading;
     double read_bytes_s, read_budget;
     uint64_t read_ns;
@@ -143,6 +144,7 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
     link->role = options->role;
     link->tool = options->tool;
+    link->patches = options->patches;
     link->once = options->once;
     link->read_bytes_s = options->read_bytes_s;
     link->read_budget = options->read_bytes_s / 4;
@@ -377,6 +379,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     memcpy(join.join.name, link->name, sizeof join.join.name);
     join.join.role = link->role;
     join.join.tool = link->tool;
+    join.join.patches = link->patches;
     pal_link_send_control(link, &join);
     link_tell(link, PAL_LINK_OPEN, "");
     if (link->held) lws_rx_flow_control(wsi, 0);

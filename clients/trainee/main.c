@@ -45,7 +45,9 @@ static void main_watch(void *user)
 
 typedef struct totals {
     pal_samples latency, decode, gap;
-    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fields, field_bytes, fault[PAL_FAULT_COUNT];
+    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fields, field_bytes, patches, patch_bytes,
+        fault[PAL_FAULT_COUNT];
+    uint32_t triangles, places; /* of the last client */
     int joined, with_tool, reconnects, old_after_stall, stalls_done, silent, unanswered;
     int without_field, ungiven;
     double seconds, moved_m, force_N, field_low, field_high, field_s;
@@ -63,6 +65,8 @@ static void main_add(totals *sum, const pal_trainee_result *r)
     if (r->n_field) sum->field_low = sum->fields ? fmin(sum->field_low, r->field_low) : r->field_low;
     sum->field_high = fmax(sum->field_high, r->field_high);
     sum->fields += r->n_field, sum->field_bytes += r->field_bytes, sum->field_s += r->field_s;
+    sum->patches += r->n_patch, sum->patch_bytes += r->patch_bytes;
+    if (r->n_place) sum->triangles = r->n_triangle, sum->places = r->n_place;
     sum->without_field += r->joined && r->n_field == 0;
     sum->ungiven += r->joined && !r->field_given;
     for (int i = 0; i < PAL_FAULT_COUNT; i++) sum->fault[i] += r->fault[i];
@@ -123,6 +127,14 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
         cJSON_AddNumberToObject(field, "high", sum->field_high);
         cJSON_AddNumberToObject(field, "bytes_mean", (double)sum->field_bytes / (double)sum->fields);
     }
+    if (sum->places) {
+        cJSON *patches = cJSON_AddObjectToObject(o, "patches");
+        cJSON_AddNumberToObject(patches, "n", (double)sum->patches);
+        cJSON_AddNumberToObject(patches, "bytes_mean",
+                                sum->patches ? (double)sum->patch_bytes / (double)sum->patches : 0);
+        cJSON_AddNumberToObject(patches, "triangles", sum->triangles);
+        cJSON_AddNumberToObject(patches, "places", sum->places);
+    }
     main_put_samples(o, "latency_ms", &sum->latency);
     main_put_samples(o, "decode_ms", &sum->decode);
     main_put_samples(o, "gap_ms", &sum->gap);
@@ -154,6 +166,10 @@ static void main_table(totals *sum, int n_client)
         printf("field:            %.1f/s each, values from %.4g to %.4g, %.0f bytes each\n",
                main_field_rate(sum, n_client), sum->field_low, sum->field_high,
                (double)sum->field_bytes / (double)sum->fields);
+    if (sum->places)
+        printf("patches:          %llu, %.0f bytes each, %u triangles drawn now of %u places\n",
+               (unsigned long long)sum->patches, sum->patches ? (double)sum->patch_bytes / (double)sum->patches : 0,
+               sum->triangles, sum->places);
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         if (sum->fault[i]) printf("%s: %llu\n", pal_fault_name((pal_fault)i), (unsigned long long)sum->fault[i]);
 }

@@ -16,7 +16,9 @@ typedef struct trainee_part {
     uint32_t epoch, seq, n_vertex;
     bool seen, looks;       /* looks: a field was asked for  */
     float *now_m, *first_m; /* [n_vertex][3]; first: of the first frame   */
-    uint8_t *kept;          /* newest frame that came before its asset   */
+    bool adapts;
+    pal_patch_table table; /* its triangles                         */
+    uint8_t *kept;         /* newest frame that came before its asset   */
     size_t n_kept;
 } trainee_part;
 
@@ -32,6 +34,7 @@ struct pal_trainee {
     double box_low[3], box_high[3], error_m[PAL_WIRE_PART_MAX];
     uint32_t n_part, cycle, frame_cycle, echo_seq, pose_seq;
     bool cycle_seen;
+    int patched; /* part whose PATCH came last and whose frame has not; -1: none */
     uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns, first_field_ns;
     double decode_s;
     trainee_part part[PAL_WIRE_PART_MAX];
@@ -141,6 +144,9 @@ static void trainee_frame(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
         return;
     }
     trainee_part *part = &t->part[head.part];
+    if (t->patched >= 0 && t->patched != (int)head.part)
+        trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before a frame of part %u", t->patched, head.part);
+    t->patched = -1;
     if (head.cycle > t->frame_cycle) t->frame_cycle = head.cycle;
     if (part->n_kept || part->seen) {
         if (head.epoch < part->epoch)
@@ -194,6 +200,8 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     /* a frame may have waited for credit, so its cycle may lie before the one that it came in, never behind */
     if (t->frame_cycle > tools.cycle)
         trainee_fault(t, PAL_FAULT_CYCLE, "frame of cycle %u before cycle %u", t->frame_cycle, tools.cycle);
+    if (t->patched >= 0) trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before the end of its cycle", t->patched);
+    t->patched = -1;
     t->frame_cycle = 0;
     t->cycle = tools.cycle;
     if (t->cycle_seen)
@@ -211,6 +219,23 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     const pal_wire_ack ack = {tools.cycle, (uint32_t)(t->decode_s * 1e6)};
     t->decode_s = 0;
     pal_link_send_ack(t->link, &ack);
+}
+
+static void trainee_patch(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
+{
+    pal_patch_head head;
+    int refusal = pal_patch_get_head(bytes, n_byte, &head);
+    if (!refusal && (head.part >= t->n_part || !t->part[head.part].adapts)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
+    if (!refusal) refusal = pal_patch_table_take(&t->part[head.part].table, bytes, n_byte, &head);
+    if (refusal) {
+        trainee_fault(t, PAL_FAULT_PATCH, "%s", pal_refusal_text(refusal));
+        return;
+    }
+    if (t->patched >= 0) trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before another", t->patched);
+    t->patched = (int)head.part;
+    t->result.n_patch++;
+    t->result.patch_bytes += n_byte;
 }
 
 static void trainee_field(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
@@ -264,8 +289,20 @@ static void trainee_on_message(void *user, pal_link *link, const pal_wire_head *
     if (head->kind == PAL_WIRE_FRAME) trainee_frame(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) trainee_tools(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_FIELD) trainee_field(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_PATCH) trainee_patch(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_HAPTIC && pal_wire_get_haptic(bytes, n_byte, &haptic))
         trainee_fault(t, PAL_FAULT_MALFORMED, "HAPTIC");
+}
+
+/* the table of a part that adapts begins at its asset again, with every connection */
+static void trainee_table(pal_trainee *t, const pal_wire_part_info *info, uint32_t i)
+{
+    trainee_part *part = &t->part[i];
+    pal_patch_table_free(&part->table);
+    part->adapts = info->adapts;
+    if (!info->adapts) return;
+    const pal_err err = pal_patch_table_begin(&part->table, info->n_triangle, info->n_vertex);
+    if (err) trainee_fault(t, PAL_FAULT_PATCH, "part %u of %u places: %s", i, info->n_triangle, pal_err_text(err));
 }
 
 /* parts as hello or topology name them; buffers follow */
@@ -276,6 +313,7 @@ static void trainee_parts(pal_trainee *t, const pal_wire_part_info *info, uint32
         trainee_part *part = &t->part[i];
         t->error_m[i] = info[i].error_m;
         part->asset = pal_asset_store_want(t->store, info[i].asset);
+        trainee_table(t, &info[i], i);
         if (part->now_m && part->epoch == info[i].epoch && part->n_vertex == info[i].n_vertex) continue;
         free(part->now_m);
         free(part->first_m);
@@ -300,6 +338,7 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
     pal_copy3(t->box_low, hello->box_min_m);
     pal_copy3(t->box_high, hello->box_max_m);
     t->cycle_seen = false;
+    t->patched = -1;
     t->echo_seq = 0;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
         t->part[i].seq = 0;
@@ -358,6 +397,8 @@ void pal_trainee_asset(pal_trainee *t, const pal_stored_asset *asset)
             trainee_fault(t, PAL_FAULT_ASSET, "%s: %s", asset->path, asset->failed ? asset->why : "vertex count");
             continue;
         }
+        if (part->adapts && pal_patch_table_base(&part->table, asset->asset))
+            trainee_fault(t, PAL_FAULT_ASSET, "%s: another table of triangles", asset->path);
         t->result.asset_bytes += asset->n_byte;
         if (i == 0 && !t->has_place) trainee_place(t);
         if (part->n_kept) {
@@ -427,6 +468,7 @@ pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_
                                    .name = options->name,
                                    .role = PAL_WIRE_ROLE_TRAINEE,
                                    .tool = t->script.idle ? PAL_WIRE_TOOL_NONE : options->tool,
+                                   .patches = true,
                                    .read_bytes_s = options->read_bytes_s,
                                    .events = &events,
                                    .user = t};
@@ -449,6 +491,7 @@ void pal_trainee_destroy(pal_trainee *t)
         free(t->part[i].now_m);
         free(t->part[i].first_m);
         free(t->part[i].kept);
+        pal_patch_table_free(&t->part[i].table);
     }
     pal_samples_free(&t->result.latency_ms);
     pal_samples_free(&t->result.decode_ms);
@@ -462,6 +505,11 @@ const pal_trainee_result *pal_trainee_look(pal_trainee *t)
         const pal_link_counts counts = pal_link_count(t->link);
         t->result.bytes_in = counts.bytes_in;
         t->result.joins = counts.joins;
+    }
+    t->result.n_triangle = t->result.n_place = 0;
+    for (uint32_t i = 0; i < t->n_part; i++) {
+        t->result.n_triangle += pal_patch_table_drawn(&t->part[i].table);
+        t->result.n_place += t->part[i].table.n_place;
     }
     t->result.seconds = t->hello_ns ? (double)(pal_clock_ns() - t->hello_ns) * 1e-9 : 0;
     return &t->result;

@@ -4,11 +4,14 @@
  * the scene's box grown by its own size, its quantisation keeps the stated error (coarser steps for a client that does
  * not keep up are counted); cycles never go back, no frame comes before its cycle; assets have the hash of their name;
  * nothing malformed. A field that was asked for is of a known part, of its number of vertices, of the kind asked for,
- * in a range of no negative numbers, and no other field comes. A wish broken is counted under its name. Measured: pose
+ * in a range of no negative numbers, and no other field comes. A PATCH is of a known part that adapts, its revision
+ * grows, it fits the table of triangles that the asset and the patches before it gave, and a frame of the part follows
+ * in the same cycle, before any other part's. A wish broken is counted under its name. Measured: pose
  * to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
 #ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
 #define PAL_CLIENTS_TRAINEE_TRAINEE_H
 #include "clients/link/asset_store.h"
+#include "clients/link/patch_table.h"
 #include "clients/trainee/samples.h"
 #include "clients/trainee/script.h"
 
@@ -23,6 +26,7 @@
     X(BOUND, "a frame's step is too coarse for the stated error")                                                      \
     X(PLACE, "a vertex lies far outside the scene or is not finite")                                                   \
     X(FIELD, "a field is not what was asked for")                                                                      \
+    X(PATCH, "a patch of triangles does not fit or comes without its frame")                                           \
     X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \
     X(CLOSED, "the server closed the connection for a fault of ours")
 typedef enum pal_fault {
@@ -59,8 +63,10 @@ typedef struct pal_trainee_result {
     double force_N; /* largest force on the own tool              */
     uint64_t asset_bytes;
     uint64_t n_field, field_bytes;
-    double field_low, field_high;              /* of all values that came, SI                */
-    double field_s;                            /* from the first field to the last           */
+    double field_low, field_high; /* of all values that came, SI                */
+    double field_s;               /* from the first field to the last           */
+    uint64_t n_patch, patch_bytes;
+    uint32_t n_triangle, n_place;              /* drawn now, and places, of all parts that adapt */
     bool field_given;                          /* a part of the session gives what was asked for */
     pal_samples latency_ms, decode_ms, gap_ms; /* owned by the trainee */
 } pal_trainee_result;

@@ -8,11 +8,13 @@
 int command_bench(int argc, char **argv)
 {
     const pal_flag_table table = {
-        .usage = "bench mesh [SURFACE.ply] | springs | fem | calibrate [FOLDER] | protocol | latency [flags]",
+        .usage =
+            "bench mesh [SURFACE.ply] | springs | adaptive | fem | calibrate [FOLDER] | protocol | latency [flags]",
         .about = "Measures this machine, medians of several runs:\n"
                  "  mesh      preparation of tetrahedra at several resolutions (of a "
                  "procedural organ without SURFACE)\n"
                  "  springs   forces, integration and skinning against the machine's limits\n"
+                 "  adaptive  surfaces that refine where they are touched: coarse, refined, adaptive\n"
                  "  fem       live steps and static solves of finite elements\n"
                  "  calibrate springs fitted to finite elements, by gradient and by "
                  "annealing (FOLDER: deploy/problems)\n"
@@ -34,6 +36,7 @@ int command_bench(int argc, char **argv)
     if (mesh) return bench_mesh(word[1], common.json);
     if (calibrate) return bench_calibrate(word[1], common.json);
     if (!strcmp(word[0], "springs")) return bench_springs(common.json);
+    if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json);
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);

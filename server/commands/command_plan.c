@@ -1,11 +1,12 @@
 /* `palpate plan`: the rows of a scene, their memory, and what they cost on this machine: the median over up to 60 steps
- * at rest, or as many as fit into two seconds. */
+ * at rest, or as many as fit into two seconds. Of a body that adapts all its levels, and what of them is active now. */
 #include "server/base/clock.h"
 #include "server/commands/commands.h"
 #include "server/commands/median.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
 #include "server/sim/effect.h"
+#include "server/sim/shell.h"
 #include "server/sim/world.h"
 
 #include <math.h>
@@ -37,7 +38,22 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
     return PAL_ERR_OK;
 }
 
-static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
+/* nodes and springs of every level, and of the present mixture */
+static void add_levels(cJSON *body, const pal_shell *shell)
+{
+    const pal_levels *levels = &shell->levels;
+    cJSON_AddNumberToObject(body, "nodes", shell->n_node);
+    cJSON_AddNumberToObject(body, "springs", shell->n_spring);
+    cJSON *list = cJSON_AddArrayToObject(body, "levels");
+    for (int l = 0; l < levels->n_level; l++) {
+        cJSON *level = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, level);
+        cJSON_AddNumberToObject(level, "nodes", levels->n_vertex[l]);
+        cJSON_AddNumberToObject(level, "springs", pal_levels_n_edge(levels, l));
+    }
+}
+
+static cJSON *as_json(const pal_scene *scene, pal_world *world, cost *c)
 {
     cJSON *o = cJSON_CreateObject();
     double step_ms = pal_median(c->step_ms, c->n_step);
@@ -55,8 +71,13 @@ static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
         cJSON *body = cJSON_CreateObject();
         cJSON_AddItemToArray(bodies, body);
         cJSON_AddStringToObject(body, "name", scene->body[b].name);
-        cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
-        cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
+        const pal_shell *shell = pal_world_body(world, b)->shell;
+        if (shell) {
+            add_levels(body, shell);
+        } else {
+            cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
+            cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
+        }
         cJSON_AddNumberToObject(body, "triangles", scene->body[b].mesh->surface.n_tri);
     }
     cJSON *rows = cJSON_AddArrayToObject(o, "rows");
@@ -74,11 +95,25 @@ static cJSON *as_json(const pal_scene *scene, const pal_world *world, cost *c)
     return o;
 }
 
-static void print(const pal_scene *scene, const pal_world *world, cost *c)
+static void print_shell(const char *name, const pal_shell *shell)
 {
-    for (int b = 0; b < scene->n_body; b++)
+    const pal_levels *levels = &shell->levels;
+    printf("%s: a surface that adapts, %d nodes and %d springs of\n", name, shell->n_node, shell->n_spring);
+    for (int l = 0; l < levels->n_level; l++)
+        printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
+}
+
+static void print(const pal_scene *scene, pal_world *world, cost *c)
+{
+    for (int b = 0; b < scene->n_body; b++) {
+        const pal_shell *shell = pal_world_body(world, b)->shell;
+        if (shell) {
+            print_shell(scene->body[b].name, shell);
+            continue;
+        }
         printf("%s: %d tetrahedra, %d nodes, %d shown triangles\n", scene->body[b].name,
                scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
+    }
     printf("\n%-9s %-16s %-16s %10s %10s\n", "stage", "row", "body", "kB", "ms a step");
     for (int r = 0; r < pal_world_rows(world); r++) {
         pal_row_info row;

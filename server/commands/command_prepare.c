@@ -1,6 +1,6 @@
-/* `palpate prepare`: surface file or label volume -> DIR/scene.json, the prepared mesh and TetGen files. All files are
- * written into a hidden folder inside DIR first and then moved, scene.json last, so that DIR never holds half a scene.
- */
+/* `palpate prepare`: surface file, label volume or procedural shape -> DIR/scene.json, the prepared mesh and TetGen
+ * files. All files are written into a hidden folder inside DIR first and then moved, scene.json last, so that DIR never
+ * holds half a scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/commands/commands.h"
@@ -8,9 +8,11 @@
 #include "server/mesh/label_volume.h"
 #include "server/mesh/mesh_file.h"
 #include "server/scene/scene_file.h"
+#include "server/sim/world.h"
 
 #include <dirent.h>
 #include <errno.h>
+#include <math.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -24,6 +26,7 @@ static const char about[] =
     "Turns a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr .inr.gz) into a "
     "scene\n"
     "that `palpate serve DIR/scene.json` runs: tetrahedra (paper B 2.2), skin, tissue, supports, tools.\n"
+    "With --model adaptive a hollow organ: springs on the surface as it is, refined where it is touched (paper C).\n"
     "Files written: DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at "
     "most\n"
     "1,000,000 tetrahedra (--tetgen writes them for any mesh, --no-tetgen for none). Either all of them or none.\n";
@@ -31,12 +34,18 @@ static const char about[] =
 typedef struct wishes {
     pal_surface_scene scene;
     const char *folder, *units, *up, *name, *title, *source, *model;
+    double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
 } wishes;
 
 typedef struct outcome {
     pal_surface_scene_report report;
     double write_s, total_s;
+    size_t world_byte; /* of model adaptive_springs, whose world is made once to see that it can be */
+    double limit_s;
+    int n_substep, fine_substep; /* a step at rest; with a leaf of the finest level, as each level halves the bound */
+    int most_node;               /* put into the row refine; 0: no limit is needed */
+    double busy;                 /* of real time, by node_s, with as many nodes as there may be */
     char file[FILES][80];
     int n_file;
 } outcome;
@@ -124,7 +133,8 @@ static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome 
 {
     char stage[PATH];
     bool was_there = access(wish->folder, F_OK) == 0;
-    bool tetgen = wish->tetgen || (!wish->no_tetgen && loaded->mesh[0].tets.n_tet <= TETGEN_MOST);
+    int n_tet = loaded->mesh[0].tets.n_tet;
+    bool tetgen = wish->tetgen || (!wish->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MOST);
     int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", wish->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage)
         return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
@@ -145,6 +155,49 @@ static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome 
 }
 
 /* ---- saying ---- */
+
+/* what voxels and tetrahedra have to say */
+static void add_solid(cJSON *o, const pal_prepared *mesh, const pal_surface_scene_report *r)
+{
+    cJSON_AddNumberToObject(o, "resolution", r->resolution);
+    cJSON_AddNumberToObject(o, "voxels", (double)r->prepare.n_voxel);
+    cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
+    cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
+    cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
+    cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
+    cJSON_AddBoolToObject(o, "open", r->prepare.voxel.open);
+    cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
+    cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
+    cJSON_AddNumberToObject(o, "surface_volume_m3", r->prepare.voxel.surface_volume_m3);
+    cJSON_AddNumberToObject(o, "inside_volume_m3", r->prepare.voxel.inside_volume_m3);
+    cJSON_AddNumberToObject(o, "volume_error", r->prepare.volume_error);
+}
+
+/* what the levels of a surface have to say */
+static void add_levels(cJSON *o, const outcome *out)
+{
+    const pal_surface_scene_report *r = &out->report;
+    cJSON *levels = cJSON_AddArrayToObject(o, "levels");
+    for (int l = 0; l < r->n_level; l++) {
+        cJSON *level = cJSON_CreateObject();
+        cJSON_AddItemToArray(levels, level);
+        cJSON_AddNumberToObject(level, "nodes", r->n_node[l]);
+        cJSON_AddNumberToObject(level, "springs", r->n_spring[l]);
+    }
+    cJSON_AddNumberToObject(o, "components", r->n_piece);
+    cJSON_AddBoolToObject(o, "closed", r->n_open_edge == 0);
+    cJSON_AddNumberToObject(o, "open_edges", r->n_open_edge);
+    cJSON_AddNumberToObject(o, "area_m2", r->area_m2);
+    if (r->n_open_edge == 0) cJSON_AddNumberToObject(o, "surface_volume_m3", r->volume_m3);
+    cJSON_AddNumberToObject(o, "mass_kg", r->mass_kg);
+    cJSON_AddNumberToObject(o, "level_bytes", (double)r->level_byte);
+    cJSON_AddNumberToObject(o, "world_bytes", (double)out->world_byte);
+    cJSON_AddNumberToObject(o, "substeps", out->n_substep);
+    cJSON_AddNumberToObject(o, "limit_s", out->limit_s);
+    cJSON_AddNumberToObject(o, "finest_substeps", out->fine_substep);
+    if (out->most_node > 0) cJSON_AddNumberToObject(o, "most_node", out->most_node);
+    cJSON_AddNumberToObject(o, "share_of_real_time", out->busy);
+}
 
 static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
 {
@@ -167,18 +220,10 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     if (r->label >= 0) cJSON_AddNumberToObject(o, "label", r->label);
     cJSON_AddNumberToObject(o, "triangles", mesh->surface.n_tri);
     cJSON_AddNumberToObject(o, "vertices", mesh->surface.n_vertex);
-    cJSON_AddNumberToObject(o, "resolution", r->resolution);
-    cJSON_AddNumberToObject(o, "voxels", (double)r->prepare.n_voxel);
-    cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
-    cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
-    cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
-    cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
-    cJSON_AddBoolToObject(o, "open", r->prepare.voxel.open);
-    cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
-    cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
-    cJSON_AddNumberToObject(o, "surface_volume_m3", r->prepare.voxel.surface_volume_m3);
-    cJSON_AddNumberToObject(o, "inside_volume_m3", r->prepare.voxel.inside_volume_m3);
-    cJSON_AddNumberToObject(o, "volume_error", r->prepare.volume_error);
+    if (r->n_level > 0)
+        add_levels(o, out);
+    else
+        add_solid(o, mesh, r);
     cJSON *dropped = cJSON_AddObjectToObject(o, "dropped");
     cJSON_AddNumberToObject(dropped, "degenerate", (double)r->surface.n_degenerate);
     cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
@@ -215,12 +260,49 @@ static volume_text say_volume(double volume_m3)
     return out;
 }
 
+static void print_solid(const pal_prepared *mesh, const pal_surface_scene_report *r)
+{
+    int n_component = r->prepare.voxel.n_component;
+    printf("%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
+           mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution, n_component,
+           n_component == 1 ? "" : "s", r->prepare.voxel.method);
+    volume_text known = say_volume(r->prepare.voxel.surface_volume_m3), whole = say_volume(r->prepare.volume_m3);
+    printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n", known.text,
+           r->prepare.voxel.open ? " (open: its holes count as closed)" : "", 100 * r->prepare.volume_error,
+           whole.text);
+}
+
+static void print_levels(const pal_prepared *mesh, const wishes *wish, const outcome *out)
+{
+    const pal_surface_scene_report *r = &out->report;
+    for (int l = 0; l < r->n_level; l++) printf("level %d: %d nodes, %d springs\n", l, r->n_node[l], r->n_spring[l]);
+    printf("%d component%s, ", r->n_piece, r->n_piece == 1 ? "" : "s");
+    if (r->n_open_edge > 0)
+        printf("open along %d edges", r->n_open_edge);
+    else
+        printf("closed around %s", say_volume(r->volume_m3).text);
+    printf(", wall of %.1f cm2 and %.1f g\n", 1e4 * r->area_m2, 1e3 * r->mass_kg);
+    printf("memory %.1f MB, of it %.1f for the levels; %d sub-step%s a step at rest\n", 1e-6 * (double)out->world_byte,
+           1e-6 * (double)r->level_byte, out->n_substep, out->n_substep == 1 ? "" : "s");
+    if (!wish->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
+        printf("made coarser from %lld triangles, so that it keeps real time (--triangles says otherwise)\n",
+               (long long)r->surface.n_tri_read);
+    if (out->most_node > 0)
+        printf(
+            "refined to at most %d nodes at a time (most_node of refine); the finest level needs %d sub-steps a step\n",
+            out->most_node, out->fine_substep);
+    if (out->busy > 1)
+        printf("too much for real time, about %.1f times: --triangles makes the surface coarser; fewer --levels or a "
+               "smaller --young-Pa need fewer sub-steps\n",
+               out->busy);
+}
+
 static void print(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_surface_report *d = &r->surface;
     const pal_prepared *mesh = &loaded->mesh[0];
-    int n_component = r->prepare.voxel.n_component;
+    int n_component = r->n_level > 0 ? r->n_piece : r->prepare.voxel.n_component;
     double low[3], high[3];
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
@@ -231,13 +313,11 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
         printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
     if (r->n_label > 1 && wish->scene.label < 0)
         printf(", the most frequent of %d labels (--list-labels shows them)", r->n_label);
-    printf("\n%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
-           mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution, n_component,
-           n_component == 1 ? "" : "s", r->prepare.voxel.method);
-    volume_text known = say_volume(r->prepare.voxel.surface_volume_m3), whole = say_volume(r->prepare.volume_m3);
-    printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n", known.text,
-           r->prepare.voxel.open ? " (open: its holes count as closed)" : "", 100 * r->prepare.volume_error,
-           whole.text);
+    printf("\n");
+    if (r->n_level > 0)
+        print_levels(mesh, wish, out);
+    else
+        print_solid(mesh, r);
     if (n_component > 1)
         printf("the components do not hang together; those without support drift (--largest keeps one)\n");
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
@@ -257,6 +337,44 @@ static int usage(const pal_flag_common *common, const char *sentence)
     return 2;
 }
 
+/* a body that adapts is made once: what its model and rows refuse is said now and not when it is served */
+static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outcome *out, pal_note *note)
+{
+    pal_world *world;
+    pal_note why = {""};
+    pal_err err = pal_world_create(&loaded->scene, &why, &world);
+    if (err) return pal_note_set(note, err, "%s: %s", name, why.text);
+    out->world_byte = pal_world_bytes(world);
+    out->n_substep = pal_world_substeps(world);
+    out->limit_s = pal_world_limit_s(world);
+    pal_world_destroy(world);
+    return PAL_ERR_OK;
+}
+
+/* what a node costs in a sub-step of rk4 with its springs and anchor, on a core of today with some time to spare; half
+ * of a step is for that. A live session whose finest level is too dear for all of its places refines fewer of them,
+ * though always an eighth more nodes than the coarsest level has and some hundreds */
+static const double node_s = 120e-9, most_busy = 0.5;
+enum { LEAST_MORE = 400 };
+
+static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_note *note)
+{
+    pal_scene *scene = &loaded->scene;
+    const pal_surface_scene_report *r = &out->report;
+    int finest = r->n_level - 1, n = r->n_node[finest];
+    double most = n, pace = scene->step_s / node_s;
+    out->fine_substep = (int)fmax(1, ceil(ldexp(scene->step_s / out->limit_s, finest)));
+    if (finest > 0) most = fmax(most_busy * pace / out->fine_substep, 1.125 * r->n_node[0] + LEAST_MORE);
+    out->busy = fmin(most, n) * out->fine_substep / pace;
+    if (most >= n) return PAL_ERR_OK;
+    out->most_node = (int)most;
+    pal_body_def *body = &scene->body[0];
+    pal_item *refine = &body->effect[body->n_effect];
+    pal_item_init(refine, "", "refine");
+    snprintf(refine->path, sizeof refine->path, "bodies[0].effects[%d]", body->n_effect++);
+    return pal_item_put_number(refine, "most_node", out->most_node, note);
+}
+
 static int run(pal_flag_common *common, const char *in, wishes *wish)
 {
     pal_loaded_scene *loaded = NULL;
@@ -265,10 +383,12 @@ static int run(pal_flag_common *common, const char *in, wishes *wish)
     double start = pal_clock_s();
     wish->scene.progress = pal_report_progress;
     wish->scene.user = common;
-    pal_err err = wish->procedural ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
-                                   : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
+    pal_err err = !in ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
+                      : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
     if (err) return pal_report_refusal(common, err, &note);
     err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
+    if (!err && wish->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &note);
+    if (!err && wish->scene.adaptive) err = keep_up(loaded, &out, &note);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
     if (!err) err = save(loaded, wish, &out, &note);
@@ -291,12 +411,32 @@ static bool is_one(const char *word, const char *const *list)
     return !word;
 }
 
-/* model, element, law and solver; NULL: all fine, else the sentence */
+/* what only goes with other models; NULL: all fine, else the sentence */
+static const char *check_adaptive(const wishes *wish)
+{
+    const pal_surface_scene *s = &wish->scene;
+    if (!s->adaptive) {
+        if (s->n_level) return "--levels: only goes with --model adaptive";
+        if (wish->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
+        if (s->inflate_Pa != 0) return "--inflate: only goes with --model adaptive";
+        return NULL;
+    }
+    if (s->resolution) return "--resolution: model adaptive has no voxels";
+    if (s->area_springs) return "--area-springs: model adaptive has springs along edges only";
+    if (wish->tetgen) return "--tetgen: model adaptive has no tetrahedra";
+    return NULL;
+}
+
+/* shape, model, element, law and solver; NULL: all fine, else the sentence */
 static const char *check_model(wishes *wish)
 {
     pal_surface_scene *s = &wish->scene;
-    if (!is_one(wish->model, (const char *const[]){"springs", "fem", NULL})) return "--model: is not springs or fem";
+    if (!is_one(s->shape, (const char *const[]){"organ", "stomach", "sphere", "sheet", NULL}))
+        return "--shape: is not organ, stomach, sphere or sheet";
+    if (!is_one(wish->model, (const char *const[]){"springs", "fem", "adaptive", NULL}))
+        return "--model: is not springs or fem or adaptive";
     s->fem = wish->model && !strcmp(wish->model, "fem");
+    s->adaptive = wish->model ? !strcmp(wish->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
     if (s->fem && s->area_springs) return "--area-springs: model fem has no springs";
     if (!s->fem && s->element) return "--element: only goes with --model fem";
     if (!s->fem && s->law) return "--law: only goes with --model fem";
@@ -307,7 +447,7 @@ static const char *check_model(wishes *wish)
         return "--law: is not corotational, neo_hookean or linear";
     if (!is_one(s->solver, (const char *const[]){"implicit_euler", "sdirk2", "static_newton", NULL}))
         return "--solver: is not implicit_euler, sdirk2 or static_newton";
-    return NULL;
+    return check_adaptive(wish);
 }
 
 /* "-y" -> (0, -1, 0) */
@@ -321,50 +461,64 @@ static bool read_axis(const char *word, double axis[3])
     return true;
 }
 
+/* tissue of an organ, and the wall of a hollow one, which is muscle */
+#define SOLID_YOUNG_PA 5000
+#define WALL_YOUNG_PA  50000
+
+static wishes wish = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
+static const pal_flag flag[] = {
+    {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
+    {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
+     "voxels on the longest axis (as many as give about 13,000 tetrahedra, or 2,500 nodes for fem)"},
+    {"--model", "WORD", PAL_FLAG_TEXT, &wish.model, 0, 0,
+     "springs (paper B); fem: finite elements that are accurate and implicit;\nor adaptive: a hollow organ, springs on "
+     "its surface that refine where it is touched (springs)"},
+    {"--element", "WORD", PAL_FLAG_TEXT, &wish.scene.element, 0, 0,
+     "of fem: hex8_bbar, hex8, tet4 or tet10 (hex8_bbar)"},
+    {"--law", "WORD", PAL_FLAG_TEXT, &wish.scene.law, 0, 0,
+     "of fem: corotational, neo_hookean or linear (corotational)"},
+    {"--solver", "WORD", PAL_FLAG_TEXT, &wish.scene.solver, 0, 0,
+     "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
+    {"--levels", "N", PAL_FLAG_COUNT, &wish.scene.n_level, 1, PAL_LEVELS_MOST,
+     "of adaptive: levels of detail; the surface itself is the coarsest, each has four times the springs of the one "
+     "before (2)"},
+    {"--thickness-mm", "T", PAL_FLAG_NUMBER, &wish.thickness_mm, 1e-3, 1000, "of adaptive: thickness of the wall (3)"},
+    {"--inflate", "PA", PAL_FLAG_NUMBER, &wish.scene.inflate_Pa, -1e6, 1e6,
+     "of adaptive: pressure inside beyond that outside; closed surfaces only (0)"},
+    {"--label", "N", PAL_FLAG_COUNT, &wish.scene.label, 1, INT32_MAX,
+     "label of a segmented scan (the most frequent one)"},
+    {"--list-labels", NULL, PAL_FLAG_SWITCH, &wish.list_labels, 0, 0, "only list the labels of a segmented scan"},
+    {"--units", "WORD", PAL_FLAG_TEXT, &wish.units, 0, 0,
+     "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
+    {"--triangles", "N", PAL_FLAG_COUNT, &wish.scene.target_tri, 100, 10000000,
+     "shown triangles of a scan's surface or of the procedural organ (50,000); of adaptive the coarsest level\nof a "
+     "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
+    {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
+     "keep only the largest of several pieces that do not hang together"},
+    {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, 1e-6, 1e12,
+     "stiffness of the tissue (5000; adaptive: 50,000)"},
+    {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},
+    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &wish.scene.material.density_kg_m3, 1e-3, 1e6, "its density (1000)"},
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &wish.scene.material.damping_1_s, 0, 1e6, "its damping rate (4)"},
+    {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
+    {"--hold", "PERCENT", PAL_FLAG_NUMBER, &wish.hold_percent, 0.1, 100,
+     "lowest part of the height that is held in place (5; an open surface of adaptive: its open edges)"},
+    {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
+     "let it hang (a scanned shape carries its weight already)"},
+    {"--area-springs", NULL, PAL_FLAG_SWITCH, &wish.scene.area_springs, 0, 0,
+     "springs that keep face areas too (edges and volumes alone have the same moduli and cost half)"},
+    {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
+    {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
+    {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},
+    {"--procedural", NULL, PAL_FLAG_SWITCH, &wish.procedural, 0, 0, "no IN: an organ that is computed"},
+    {"--shape", "WORD", PAL_FLAG_TEXT, &wish.scene.shape, 0, 0,
+     "no IN: a computed organ, stomach, sphere or sheet; all but the first are adaptive"},
+    {"--tetgen", NULL, PAL_FLAG_SWITCH, &wish.tetgen, 0, 0, "write TetGen files for any size"},
+    {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &wish.no_tetgen, 0, 0, "write no TetGen files"},
+};
+
 int command_prepare(int argc, char **argv)
 {
-    wishes wish = {.scene = {.label = -1, .material = {5000, 0.45, 1000, 4}}};
-    pal_material *m = &wish.scene.material;
-    double hold = 5;
-    pal_surface_scene *scene = &wish.scene;
-    const pal_flag flag[] = {
-        {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
-        {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
-         "voxels on the longest axis (as many as give about 13,000 tetrahedra, or 2,500 nodes for fem)"},
-        {"--model", "WORD", PAL_FLAG_TEXT, &wish.model, 0, 0,
-         "springs (paper B), or fem: finite elements that are accurate and implicit (springs)"},
-        {"--element", "WORD", PAL_FLAG_TEXT, &scene->element, 0, 0,
-         "of fem: hex8_bbar, hex8, tet4 or tet10 (hex8_bbar)"},
-        {"--law", "WORD", PAL_FLAG_TEXT, &scene->law, 0, 0,
-         "of fem: corotational, neo_hookean or linear (corotational)"},
-        {"--solver", "WORD", PAL_FLAG_TEXT, &scene->solver, 0, 0,
-         "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
-        {"--label", "N", PAL_FLAG_COUNT, &wish.scene.label, 1, INT32_MAX,
-         "label of a segmented scan (the most frequent one)"},
-        {"--list-labels", NULL, PAL_FLAG_SWITCH, &wish.list_labels, 0, 0, "only list the labels of a segmented scan"},
-        {"--units", "WORD", PAL_FLAG_TEXT, &wish.units, 0, 0,
-         "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
-        {"--triangles", "N", PAL_FLAG_COUNT, &wish.scene.target_tri, 100, 10000000,
-         "shown triangles of a scan's surface or of the procedural organ (50,000)"},
-        {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
-         "keep only the largest of several pieces that do not hang together"},
-        {"--young-Pa", "E", PAL_FLAG_NUMBER, &m->young_Pa, 1e-6, 1e12, "stiffness of the tissue (5000)"},
-        {"--poisson", "NU", PAL_FLAG_NUMBER, &m->poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},
-        {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &m->density_kg_m3, 1e-3, 1e6, "its density (1000)"},
-        {"--damping-1-s", "C", PAL_FLAG_NUMBER, &m->damping_1_s, 0, 1e6, "its damping rate (4)"},
-        {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
-        {"--hold", "PERCENT", PAL_FLAG_NUMBER, &hold, 0.1, 100, "lowest part of the height that is held in place (5)"},
-        {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
-         "let it hang (a scanned shape carries its weight already)"},
-        {"--area-springs", NULL, PAL_FLAG_SWITCH, &wish.scene.area_springs, 0, 0,
-         "springs that keep face areas too (edges and volumes alone have the same moduli and cost half)"},
-        {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
-        {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
-        {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},
-        {"--procedural", NULL, PAL_FLAG_SWITCH, &wish.procedural, 0, 0, "no IN: an organ that is computed"},
-        {"--tetgen", NULL, PAL_FLAG_SWITCH, &wish.tetgen, 0, 0, "write TetGen files for any size"},
-        {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &wish.no_tetgen, 0, 0, "write no TetGen files"},
-    };
     const pal_flag_table table = {.usage = "prepare IN -o DIR [flags]",
                                   .about = about,
                                   .flag = flag,
@@ -374,14 +528,19 @@ int command_prepare(int argc, char **argv)
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
     if (code >= 0) return code;
-    if (wish.procedural == (n_in > 0)) return usage(&common, "needs either a file or --procedural");
+    if (wish.procedural && wish.scene.shape) return usage(&common, "--procedural and --shape exclude each other");
+    if ((wish.procedural || wish.scene.shape) == (n_in > 0))
+        return usage(&common, "needs either a file or --procedural or --shape");
     if (wish.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
     if (!wish.folder || !*wish.folder) return usage(&common, "needs -o DIR");
     const char *sentence = check_model(&wish);
     if (sentence) return usage(&common, sentence);
     if (wish.tetgen && wish.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
     if (wish.up && !read_axis(wish.up, wish.scene.up)) return usage(&common, "--up: is not x, y, z, -x, -y or -z");
-    wish.scene.hold = hold / 100;
+    pal_material *m = &wish.scene.material;
+    if (m->young_Pa == 0) m->young_Pa = wish.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
+    wish.scene.hold = wish.hold_percent / 100;
+    wish.scene.thickness_m = wish.thickness_mm / 1000;
     if (wish.units && !(wish.scene.unit_m = pal_mesh_unit_named(wish.units)))
         return usage(&common, "--units: is not m, cm, mm, um or in");
     return run(&common, in[0], &wish);

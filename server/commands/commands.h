@@ -27,5 +27,6 @@ int bench_springs(bool json);
 int bench_protocol(bool json);
 int bench_latency(bool json);
 int bench_fem(bool json);
+int bench_adaptive(bool json);
 int bench_calibrate(const char *folder_or_null, bool json);
 #endif

@@ -8,7 +8,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/lab/load_case.h"
-#include "server/lab/refine.h"
+#include "server/lab/smaller_voxels.h"
 #include "server/mesh/locate.h"
 #include "server/mesh/vtk_file.h"
 #include "server/num/shape.h"

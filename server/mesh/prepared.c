@@ -4,10 +4,12 @@
  * then eight u64 counts and four doubles (origin, h); then per section u32 number, u32 item bytes, u64 items, u64
  * offset (a multiple of 64); then the sections. The counts alone fix every section's size, so a file is either whole or
  * refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only a measured fill is kept:
- * their corners follow from the tetrahedra. Version 2 has no fill, hence one count and one section less. */
+ * their corners follow from the tetrahedra. A mesh without skin frames binds no vertex to any, so that a surface alone
+ * has counts of 0 but its own. Version 2 has no fill, hence one count and one section less. */
 #include "server/mesh/prepared.h"
 
 #include "server/base/clock.h"
+#include "server/base/vec3.h"
 #include "server/mesh/mesh_file.h"
 
 #include <math.h>
@@ -44,7 +46,7 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6], n_fill = count[7];
+             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_near = n_frame ? PAL_SKIN_NEAR * n_vertex : 0;
     const section all[N_SECTION] = {
         {&p->surface.x, 8, 3 * n_vertex},
         {&p->surface.tri, 4, 3 * n_tri},
@@ -58,8 +60,8 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
         {&p->skin.frame_rest, 4, 3 * n_frame},
         {&p->skin.fan_start, 4, n_frame + 1},
         {&p->skin.fan, 4, 2 * n_fan},
-        {&p->skin.near, 4, PAL_SKIN_NEAR * n_vertex},
-        {&p->skin.coef, 4, 4 * PAL_SKIN_NEAR * n_vertex},
+        {&p->skin.near, 4, n_near},
+        {&p->skin.coef, 4, 4 * n_near},
         {&p->hexes.fill, 4, n_fill},
     };
     memcpy(out, all, sizeof all);
@@ -81,7 +83,8 @@ static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
 
 static void put_counts(pal_prepared *p, const uint64_t count[N_COUNT])
 {
-    p->surface.n_vertex = p->skin.n_vertex = (int)count[0];
+    p->surface.n_vertex = (int)count[0];
+    p->skin.n_vertex = count[5] ? (int)count[0] : 0;
     p->surface.n_tri = (int)count[1];
     p->tets.n_node = p->skin.n_node = (int)count[2];
     p->tets.n_tet = (int)count[3];
@@ -137,6 +140,21 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
         told.volume_error = told.voxel.inside_volume_m3 / told.voxel.surface_volume_m3 - 1;
     *out = p;
     if (report) *report = told;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out)
+{
+    pal_prepared p = {0};
+    double sum = 0;
+    PAL_TRY(pal_surface_copy(surface, &p.surface));
+    for (int t = 0; t < surface->n_tri; t++)
+        for (int k = 0; k < 3; k++)
+            sum += pal_dist3(surface->x + 3 * (size_t)surface->tri[3 * t + k],
+                             surface->x + 3 * (size_t)surface->tri[3 * t + (k + 1) % 3]);
+    p.tets.h_m = sum > 0 ? sum / (3.0 * surface->n_tri) : 1;
+    pal_copy3(p.tets.origin_m, surface->origin_m);
+    *out = p;
     return PAL_ERR_OK;
 }
 
@@ -218,7 +236,8 @@ pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, si
         put_u64(entry + 16, at);
         void *array;
         memcpy(&array, s[k].pointer, sizeof array);
-        if (s[k].n) memcpy(bytes + at, array, s[k].n * s[k].n_byte);
+        /* fans of no frame are one 0, which a mesh without skin need not hold */
+        if (s[k].n && array) memcpy(bytes + at, array, s[k].n * s[k].n_byte);
         at += round_up(s[k].n * s[k].n_byte);
     }
     put_u64(bytes + 24, pal_prepared_checksum(bytes, n_byte));
@@ -300,9 +319,10 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         if (skin->frame_edge[2 * f] < 0) return "a skin frame has no edge";
     if (!fans_are_rows(skin, count[6])) return "the skin's fans are not ascending rows";
     if (!all_within(skin->fan, 2 * count[6], 0, n_node)) return "a skin fan's corner is out of range";
-    if (!all_within(skin->near, PAL_SKIN_NEAR * count[0], 0, n_frame)) return "a vertex's skin frame is out of range";
-    if (!all_finite_float(skin->coef, 4 * PAL_SKIN_NEAR * count[0]) ||
-        !all_finite_float(skin->frame_turn, 2 * n_frame) || !all_finite_float(skin->frame_rest, 3 * n_frame))
+    uint64_t n_near = n_frame ? PAL_SKIN_NEAR * count[0] : 0;
+    if (!all_within(skin->near, n_near, 0, n_frame)) return "a vertex's skin frame is out of range";
+    if (!all_finite_float(skin->coef, 4 * n_near) || !all_finite_float(skin->frame_turn, 2 * n_frame) ||
+        !all_finite_float(skin->frame_rest, 3 * n_frame))
         return "a skin weight is not finite";
     for (uint64_t i = 0; i < n_node; i++)
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";

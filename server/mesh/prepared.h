@@ -1,4 +1,5 @@
-/* The prepared mesh: everything about a body that is computed once from its surface and read at every start.
+/* The prepared mesh: everything about a body that is computed once from its surface and read at every start. Of a body
+ * that is simulated on the surface itself (model adaptive_springs) it is the surface alone.
  * One file, little-endian, sections with counts and a checksum; loading never trusts a count or an index.
  * Thread: [load]. */
 #ifndef PAL_MESH_PREPARED_H
@@ -11,8 +12,8 @@
 
 typedef struct pal_prepared {
     pal_surface surface; /* what is shown                                    */
-    pal_tets tets;       /* what is simulated, same origin_m as the surface  */
-    pal_skin skin;       /* surface on tets                                  */
+    pal_tets tets;       /* what is simulated, same origin_m as the surface; none: n_node 0, h_m its mean edge */
+    pal_skin skin;       /* surface on tets; none: n_vertex 0                */
     pal_hexes hexes;     /* the same body as cubes; n_hex 0: it is no voxels */
 } pal_prepared;
 
@@ -28,6 +29,8 @@ typedef struct pal_prepare_report {
  * measured when options->fill or options->least_fill asks for it, else it is 1 */
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
                           pal_prepare_report *report, pal_note *note);
+/* the surface alone, copied, without tetrahedra, hexahedra and skin; MEMORY */
+pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out);
 void pal_prepared_free(pal_prepared *prepared);
 pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_note *note);
 pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_note *note);

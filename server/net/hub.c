@@ -197,10 +197,29 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         /* rows of fields have come: the plan is no longer that of hello */
         for (int r = 0; r < f->n_row && f->n_row != pal_session_rows(s->session); r++)
             pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->row_name[r]);
+        for (int p = 0; p < s->n_part; p++)
+            if (s->part[p].places)
+                w->active[w->n_active++] =
+                    (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
+                                      (uint32_t)f->part[p].n_all, (uint32_t)f->part[p].n_all_spring};
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }
     return encode(hub, hub->control);
+}
+
+/* the triangles that go with the newest frame of a part; false: they cannot be had now, so the frame waits too */
+static bool add_patch(pal_hub *hub, pal_client *c, int p)
+{
+    const pal_stream_part *part = &c->room->stream->part[p];
+    if (!c->patches || !part->places || c->sent_change[p] == part->places->change) return true;
+    pal_packet *packet =
+        part->frame_change[c->tier] == part->places->change ? pal_places_patch(part->places, c->sent_change[p]) : NULL;
+    if (!packet) return false;
+    c->out[c->n_out++] = packet;
+    c->sent_change[p] = part->places->change;
+    hub->count.n_patch++;
+    return true;
 }
 
 /* the newest of what this client has not got, as one cycle */
@@ -211,6 +230,7 @@ static void begin_cycle(pal_hub *hub, pal_client *c)
     for (int p = 0; p < s->n_part; p++) {
         const pal_stream_part *part = &s->part[p];
         if (!part->frame[c->tier] || part->frame_cycle[c->tier] == c->sent_frame[p]) continue;
+        if (!add_patch(hub, c, p)) continue;
         c->out[c->n_out++] = pal_packet_hold(part->frame[c->tier]);
         c->sent_frame[p] = part->frame_cycle[c->tier];
         hub->count.n_frame++;

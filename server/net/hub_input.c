@@ -80,6 +80,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
         return;
     }
     hub->count.n_joined++;
+    c->patches = wanted->patches;
     room->tier_users[c->tier]++;
     /* hello says which tool was given; a refusal follows it */
     pal_err err = PAL_ERR_OK;

@@ -22,13 +22,15 @@ typedef struct pal_client {
     int queue_begin, n_queue;
     bool members_due, status_due;
     pal_packet *haptic; /* newest, unsent */
-    /* the cycle that is being sent: frames of parts, then tools */
-    pal_packet *out[PAL_BODY_MAX + 1];
+    /* the cycle that is being sent: of each part a patch if its triangles changed, and a frame; then tools */
+    pal_packet *out[2 * PAL_BODY_MAX + 1];
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
-    uint32_t sent_frame[PAL_BODY_MAX]; /* cycle of the frame of each part sent last */
-    uint8_t view[PAL_BODY_MAX];        /* pal_field looked at, of each part         */
-    uint64_t sent_field[PAL_BODY_MAX]; /* number of the values sent last            */
+    uint32_t sent_frame[PAL_BODY_MAX];  /* cycle of the frame of each part sent last */
+    bool patches;                       /* takes PATCH                                     */
+    uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_places.change */
+    uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */
+    uint64_t sent_field[PAL_BODY_MAX];  /* number of the values sent last            */
     /* figures */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status                   */
@@ -49,7 +51,7 @@ typedef struct pal_hub_room {
 } pal_hub_room;
 
 typedef struct pal_hub_count {
-    uint64_t n_frame, n_field, n_skipped, n_byte, n_joined, n_refused_join;
+    uint64_t n_frame, n_field, n_patch, n_skipped, n_byte, n_joined, n_refused_join;
     uint64_t n_pose, n_ack, n_control;
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;

@@ -45,7 +45,12 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
     pal_err err = PAL_ERR_OK;
     const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are not negative */
 
-    int refusal = pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
+    int refusal =
+        shown->parent
+            ? pal_frame_order_families(shown->rest_m, (uint32_t)shown->n_vertex, (uint32_t)shown->n_coarse,
+                                       (const uint32_t *)shown->parent, (const uint32_t *)shown->coarse_tri,
+                                       (uint32_t)shown->n_coarse_tri, &order)
+            : pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
     if (refusal) return refuse(note, refusal, shown->name, "no vertex order");
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(note, refusal, shown->name, "no asset");
@@ -61,6 +66,8 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
+        part->info.adapts = shown->adapts;
+        if (shown->adapts) err = pal_places_make(index, part->info.epoch, shown, note, &part->places);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_gives(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
@@ -129,6 +136,7 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; stream->part && p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
+        pal_places_free(stream->part[p].places);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
         for (int t = 0; t < PAL_STREAM_TIER; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
@@ -163,7 +171,8 @@ static uint64_t time_us(const pal_frame *frame)
     return frame->time_s > 0 ? (uint64_t)(frame->time_s * 1e6) : 0;
 }
 
-/* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest */
+/* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest, unless other
+ * vertices are shown now */
 static void encode_part(pal_stream *s, int p, int tier)
 {
     pal_stream_part *part = &s->part[p];
@@ -174,7 +183,9 @@ static void encode_part(pal_stream *s, int p, int tier)
                              .cycle = s->cycle,
                              .sim_time_us = time_us(s->frame),
                              .error_m = pal_stream_tier_error_m(s, tier),
-                             .position_m = from->position_m};
+                             .position_m = from->position_m,
+                             .hidden = part->places ? part->places->hidden : NULL};
+    uint32_t change = part->places ? part->places->change : 0;
     pal_frame_result result;
     uint64_t begin = pal_clock_ns();
     if (from->n_vertex != (int)part->info.n_vertex) return;
@@ -186,11 +197,12 @@ static void encode_part(pal_stream *s, int p, int tier)
             pal_log(PAL_LOG_ERROR, "frame", "part %s is not streamed: %s", part->info.name, pal_refusal_text(refusal));
         return;
     }
-    if (!result.changed && part->frame[tier]) return;
+    if (!result.changed && part->frame[tier] && part->frame_change[tier] == change) return;
     pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
     if (!packet) return;
     pal_packet_replace(&part->frame[tier], packet);
     part->frame_cycle[tier] = s->cycle;
+    part->frame_change[tier] = change;
     s->coder->seq[p]++;
     s->count.n_frame_byte += result.n_byte;
 }
@@ -312,9 +324,13 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
     stream->frame = frame;
     stream->cycle++;
     stream->cycle_ns = now_ns;
-    for (int p = 0; p < stream->n_part; p++)
+    for (int p = 0; p < stream->n_part; p++) {
+        const pal_frame_part *part = &frame->part[p];
+        if (stream->part[p].places && part->n_slot == (int)stream->part[p].places->n_place)
+            pal_places_take(stream->part[p].places, part->slot, part->revision);
         for (int t = 0; t < PAL_STREAM_TIER; t++)
             if (used[t]) encode_part(stream, p, t);
+    }
     put_tools(stream, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
     /* rows have come or gone, so the places mean others */

@@ -2,13 +2,14 @@
  *
  * A cycle is one simulation output (protocol/README.md, "Cycles and credit"): FRAME messages of the parts that look
  * different, one TOOLS message. Frames stand alone, so the newest messages serve everybody: the client that keeps up,
- * the one that skipped cycles, and the one that has just come. Tiers are accuracies of the same part; a tier that
- * nobody uses is not encoded.
- * Thread: [net], except open and close [load]. */
+ * the one that skipped cycles, and the one that has just come. Triangles of parts that adapt do not stand alone: they
+ * go as differences to what the client has (places.h), with the frame of their vertices. Tiers are accuracies of the
+ * same part; a tier that nobody uses is not encoded. Thread: [net], except open and close [load]. */
 #ifndef PAL_NET_STREAM_H
 #define PAL_NET_STREAM_H
 #include "protocol/control.h"
 #include "server/net/packet.h"
+#include "server/net/places.h"
 #include "server/session/members.h"
 #include "server/session/session.h"
 
@@ -21,6 +22,8 @@ typedef struct pal_stream_part {
     pal_packet *asset;
     pal_packet *frame[PAL_STREAM_TIER];       /* newest, NULL before the first          */
     uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that made it                     */
+    uint32_t frame_change[PAL_STREAM_TIER];   /* table of triangles that it belongs to, of pal_places.change */
+    pal_places *places;                       /* of a part that adapts, else NULL       */
     pal_packet *field[PAL_FIELD_COUNT];       /* newest values, NULL: nobody looks or none yet */
     uint64_t field_made[PAL_FIELD_COUNT];     /* another number for every message       */
     uint64_t field_revision[PAL_FIELD_COUNT]; /* of what was encoded last            */

@@ -85,13 +85,19 @@ static pal_err read_material(const pal_json *json, const cJSON *body, const char
 
 static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support *out)
 {
-    static const char *const known[] = {"lowest", "box", NULL}, *const corners[] = {"low_m", "high_m", NULL};
+    static const char *const known[] = {"lowest", "box", "rim", NULL}, *const corners[] = {"low_m", "high_m", NULL};
     char at[PAL_JSON_PATH];
     *out = (pal_support){.fraction = 0.05};
     PAL_TRY(pal_json_object(json, object, path, known));
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
     out->lowest = cJSON_GetObjectItemCaseSensitive(object, "lowest") != NULL;
-    if (out->lowest == (box != NULL)) return pal_json_bad(json, path, "needs either lowest or box");
+    out->rim = cJSON_GetObjectItemCaseSensitive(object, "rim") != NULL;
+    if (out->lowest + out->rim + (box != NULL) != 1)
+        return pal_json_bad(json, path, "needs either lowest or box, or rim");
+    if (out->rim) {
+        PAL_TRY(pal_json_bool(json, object, path, "rim", &out->rim));
+        return out->rim ? PAL_ERR_OK : pal_json_bad(json, pal_json_key(at, path, "rim"), "can only be true");
+    }
     if (out->lowest) return pal_json_number(json, object, path, "lowest", 0, 1, &out->fraction);
     pal_json_key(at, path, "box");
     PAL_TRY(pal_json_object(json, box, at, corners));
@@ -113,8 +119,8 @@ static pal_err place_of(const pal_json *json, const char *path, const char *fold
     return n < 0 || (size_t)n >= n_byte ? pal_json_bad(json, path, "the path is too long") : PAL_ERR_OK;
 }
 
-static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder, bool fem,
-                         pal_prepared *out)
+static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder,
+                         const pal_item *model, pal_prepared *out)
 {
     char name[FOLDER / 2] = "", units[16] = "", at[PAL_JSON_PATH], file[FOLDER + FOLDER / 2];
     bool has_mesh = cJSON_GetObjectItemCaseSensitive(body, "mesh") != NULL;
@@ -133,7 +139,11 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
                 return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
         err = pal_prepared_load(file, out, &why);
     } else {
-        pal_surface_scene options = {.label = -1, .fem = fem};
+        pal_surface_scene options = {
+            .label = -1, .fem = !strcmp(model->name, "fem"), .adaptive = !strcmp(model->name, "adaptive_springs")};
+        if (options.adaptive && cJSON_GetObjectItemCaseSensitive(body, "resolution"))
+            return pal_json_bad(json, pal_json_key(at, path, "resolution"),
+                                "model adaptive_springs has no voxels: it works on the surface");
         PAL_TRY(pal_json_count(json, body, path, "resolution", 0, 1024, &options.resolution));
         PAL_TRY(pal_json_count(json, body, path, "label", -1, 1 << 30, &options.label));
         PAL_TRY(pal_json_count(json, body, path, "triangles", 0, 10000000, &options.target_tri));
@@ -185,7 +195,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
-    PAL_TRY(read_mesh(json, object, path, folder, !strcmp(body->model.name, "fem"), &scene->mesh[index]));
+    PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
     return pal_region_read(json, object, path, folder, scene, index);
 }

@@ -24,10 +24,11 @@
  *                   "k_distance_J": [75 numbers, x fastest], "k_area_J": [..], "k_volume_J": [..]}}
  *                                                          constants of springs that vary over the body
  *               or {"name": "fem", "element": "hex8_bbar", "law": "corotational", "fill": true} (sim/models/fem.c)
- *     "solver": {"name": "verlet"},
- *               or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
- *     "output": {"name": "skin_out"},
- *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}}],
+ *               or {"name": "adaptive_springs", "levels": 2, ...} (sim/models/adaptive_springs.c): a hollow organ,
+ * springs on the surface itself; a "surface" is taken as it is, without voxels "solver": {"name": "verlet"}, or
+ * {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each) "output": {"name": "skin_out"},
+ *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}},
+ *                  {"rim": true}],                         the open edges of the surface (model adaptive_springs)
  *     "effects": [{"name": "gravity"}, {"name": "tool_push", ...}, {"name": "tool_grab"}, {"name": "finite_guard"}]
  *   }],
  *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]
@@ -37,6 +38,7 @@
  * surface's box. Absent keys take the defaults of pal_scene_default and pal_body_default. */
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
+#include "server/mesh/levels.h"
 #include "server/sim/def.h"
 
 /* what a region borrows */
@@ -65,7 +67,8 @@ typedef struct pal_surface_scene {
     double unit_m;         /* 0: guess                                            */
     int resolution;        /* 0: about 13,000 tetrahedra; fem: about 2,500 nodes  */
     int label;             /* of a label volume; < 0: the most frequent           */
-    int target_tri;        /* shown triangles of a label volume's surface; 50,000 */
+    int target_tri;        /* shown triangles of a label volume's surface; 50,000, adaptive 1,500; a surface file that
+                            * adapts is made as coarse as that when it is given, or has more than 3,000 */
     pal_material material; /* young_Pa 0: the default material                 */
     bool largest_only;     /* keep only the largest of several pieces             */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
@@ -74,7 +77,13 @@ typedef struct pal_surface_scene {
     bool area_springs; /* add the row face_area; without it edges and volumes bear its share */
     /* model fem in place of springs */
     bool fem;
-    const char *element, *law, *solver;                              /* NULL: hex8_bbar, corotational, implicit_euler */
+    const char *element, *law, *solver; /* NULL: hex8_bbar, corotational, implicit_euler */
+    /* model adaptive_springs in place of springs: the surface as it is, without voxels */
+    bool adaptive;
+    int n_level;        /* 0: 2                                                           */
+    double thickness_m; /* 0: 0.003                                                       */
+    double inflate_Pa;  /* not 0: the row inflate with this pressure; closed surfaces only */
+    const char *shape;  /* of pal_scene_procedural: "organ" (NULL), "stomach", "sphere", "sheet" */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
 } pal_surface_scene;
@@ -89,12 +98,22 @@ typedef struct pal_surface_scene_report {
     int resolution;
     int label;   /* of a label volume, -1: a surface                */
     int n_label; /* labels it holds beside 0, at most 64 are counted */
+    /* of model adaptive_springs, all its levels; n_level 0: another model */
+    int n_level, n_node[PAL_LEVELS_MOST], n_spring[PAL_LEVELS_MOST];
+    int n_piece, n_open_edge;           /* pieces without a common edge; 0 open edges: closed      */
+    double area_m2, volume_m3, mass_kg; /* volume_m3 0: not closed                                 */
+    size_t level_byte;                  /* memory of the levels                                    */
 } pal_surface_scene_report;
 
-/* any surface file or label volume -> default scene: material, lowest 5 % held, three tools. report may be NULL */
+/* any surface file or label volume -> default scene: material, lowest 5 % held, three tools; with model
+ * adaptive_springs the open edges are held in place of the lowest part when there are some and nobody asked for `hold`.
+ * REFUSED also for a surface that this model cannot take, naming the first offender, BUDGET with both numbers when its
+ * levels do not fit into 512 MiB. report may be NULL */
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                                pal_surface_scene_report *report, pal_note *note);
-/* our own procedural organ as a scene, for when nothing else can be had */
+/* our own procedural organ as a scene, for when nothing else can be had; or the shapes of mesh/stomach.h: a stomach
+ * held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m on anchors fixed in space, a sheet of 17 x 17
+ * vertices and 0.2 m held at its border. REFUSED: there is no such shape */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note);
 /* writes DIR/scene.json, DIR/NAME.palmesh for every body and NAME_regionK.nii for every label region, scene.json last;

@@ -24,7 +24,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { WANTED_VOXELS = 2600, WANTED_NODES = 2500, WANTED_TRI = 50000, LABELS = 64 };
+enum { WANTED_VOXELS = 2600, WANTED_NODES = 2500, WANTED_TRI = 50000, COARSE_TRI = 1500, LABELS = 64 };
 static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
 static const double fem_least_fill = 0.1;
 
@@ -169,8 +169,9 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
                                         report->surface.place)
                          : PAL_ERR_OK;
     if (!err) {
+        int wanted = options->adaptive ? COARSE_TRI : WANTED_TRI;
         pal_label_surface_options surface = {
-            .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : WANTED_TRI};
+            .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : wanted};
         pal_note why = {""};
         report->n_label = n;
         report->label = options->label >= 0 ? options->label : count[0].label;
@@ -221,11 +222,16 @@ static pal_err make(const char *name, const pal_surface *surface, const pal_surf
 {
     pal_note why = {""};
     pal_voxel_options voxel = voxel_options(options);
-    say(options, "fill", 0);
-    pal_err err = options->resolution ? PAL_ERR_OK : choose_resolution(surface, options, &voxel.resolution, &why);
-    say(options, "split and skin", 0);
-    if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
-    report->resolution = voxel.resolution;
+    pal_err err = PAL_ERR_OK;
+    if (options->adaptive) {
+        err = pal_scene_shell_prepare(surface, options, out, &why);
+    } else {
+        say(options, "fill", 0);
+        if (!options->resolution) err = choose_resolution(surface, options, &voxel.resolution, &why);
+        say(options, "split and skin", 0);
+        if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
+        report->resolution = voxel.resolution;
+    }
     const char *place = report->surface.place;
     return err ? pal_note_set(note, err, "%s: %s%s%s", name, place, *place ? ": " : "", why.text) : PAL_ERR_OK;
 }
@@ -259,8 +265,10 @@ static void leave_gravity_out(pal_body_def *body)
 }
 
 /* model and solver as asked for */
-static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options, pal_note *note)
+static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options,
+                            const pal_surface_scene_report *report, pal_note *note)
 {
+    if (options->adaptive) return pal_scene_shell_dress(body, options, report, note);
     /* edges and volumes alone have the same moduli and cost half (README, tables) */
     if (!options->fem)
         return options->area_springs ? PAL_ERR_OK : pal_item_put_number(&body->model, "k_area_J", 0, note);
@@ -273,7 +281,8 @@ static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options
 }
 
 /* one body with defaults around the prepared mesh in mesh[0] */
-static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
+static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
+                     const pal_surface_scene_report *report, pal_note *note)
 {
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
@@ -284,7 +293,7 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(&scene->body[0]);
-    PAL_TRY(choose_model(&scene->body[0], options, note));
+    PAL_TRY(choose_model(&scene->body[0], options, report, note));
     for (int k = 0; k < scene->body[0].n_effect; k++)
         snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;
@@ -348,8 +357,10 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, note);
     pal_note why = {""};
-    if (!err && (err = dress(loaded, stem, options, &why)))
-        pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
+    say(options, "levels", 0);
+    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &why);
+    if (!err) err = dress(loaded, stem, options, report, &why);
+    if (err && why.text[0]) pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
     if (err) {
         pal_scene_free(loaded);
         return err;
@@ -365,6 +376,29 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     return PAL_ERR_OK;
 }
 
+/* the shape's own supports and anchors in place of the defaults; what is asked for still wins */
+static pal_err dress_shape(pal_scene *scene, const pal_scene_shape *shape, const pal_surface_scene *options,
+                           pal_note *note)
+{
+    pal_body_def *body = &scene->body[0];
+    snprintf(scene->title, sizeof scene->title, "%s", shape->title);
+    if (pal_norm3(options->up) == 0 && pal_norm3(shape->up) > 0) pal_copy3(scene->up, shape->up);
+    if (!options->adaptive || options->hold > 0) return PAL_ERR_OK;
+    body->n_support = shape->n_support;
+    for (int k = 0; k < shape->n_support; k++) body->support[k] = shape->support[k];
+    return shape->in_space ? pal_item_put_text(&body->model, "frame", "world", note) : PAL_ERR_OK;
+}
+
+/* the surface of a procedural scene: our organ, or a shape */
+static pal_err make_procedural(const pal_surface_scene *options, pal_scene_shape *out, pal_note *note)
+{
+    if (options->shape && strcmp(options->shape, "organ") != 0) return pal_scene_shape_make(options->shape, out, note);
+    *out = (pal_scene_shape){.name = "organ", .title = "Procedural organ"};
+    pal_err err = pal_organ_make(options->target_tri ? options->target_tri : WANTED_TRI, &out->surface);
+    if (err) pal_note_set(note, err, "the procedural organ: %s", pal_err_text(err));
+    return err;
+}
+
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note)
 {
@@ -372,27 +406,31 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     if (!report) report = &own;
     pal_loaded_scene *loaded = begin(report, "procedural organ", note);
     if (!loaded) return PAL_ERR_MEMORY;
-    pal_surface surface = {0};
+    pal_scene_shape shape = {0};
     double start = pal_clock_s();
     say(options, "organ", 0);
-    pal_err err = pal_organ_make(options->target_tri ? options->target_tri : WANTED_TRI, &surface);
-    if (err) pal_note_set(note, err, "the procedural organ: %s", pal_err_text(err));
+    pal_err err = make_procedural(options, &shape, note);
     report->read_s = pal_clock_s() - start;
     report->unit_m = 1;
     report->unit_name = "m";
     snprintf(report->surface.format, sizeof report->surface.format, "procedural");
-    report->surface.n_vertex_read = surface.n_vertex;
-    report->surface.n_tri_read = surface.n_tri;
-    if (!err) err = make("procedural organ", &surface, options, &loaded->mesh[0], report, note);
-    pal_surface_free(&surface);
-    if (!err) err = dress(loaded, "organ", options, note);
+    report->surface.n_vertex_read = shape.surface.n_vertex;
+    report->surface.n_tri_read = shape.surface.n_tri;
+    char name[PAL_NAME];
+    snprintf(name, sizeof name, "procedural %.30s", shape.name);
+    if (!err) err = make(name, &shape.surface, options, &loaded->mesh[0], report, note);
+    pal_note why = {""};
+    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &why);
+    if (err && why.text[0]) pal_note_set(note, err, "%s: %s", name, why.text);
+    pal_surface_free(&shape.surface);
+    if (!err) err = dress(loaded, shape.name, options, report, note);
+    if (!err) err = dress_shape(&loaded->scene, &shape, options, note);
     if (err) {
         pal_scene_free(loaded);
         return err;
     }
-    snprintf(loaded->scene.title, sizeof loaded->scene.title, "Procedural organ");
-    snprintf(loaded->scene.source, sizeof loaded->scene.source,
-             "computed by Palpate, not from a patient: no scan was given");
+    snprintf(loaded->scene.source, sizeof loaded->scene.source, "computed by Palpate, not from a patient%s",
+             options->shape ? "" : ": no scan was given");
     *out = loaded;
     return PAL_ERR_OK;
 }

@@ -1,4 +1,4 @@
-/* Surface or label volume -> prepared mesh (private to this room). Thread: [load]. */
+/* Surface or label volume -> prepared mesh and its scene (private to this room). Thread: [load]. */
 #ifndef PAL_SCENE_SCENE_MAKE_H
 #define PAL_SCENE_SCENE_MAKE_H
 #include "server/scene/scene_file.h"
@@ -6,6 +6,27 @@
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_note *note);
+/* Model adaptive_springs (scene_shell.c). The surface alone, or its largest piece, as a prepared mesh; errors have no
+ * file's name */
+pal_err pal_scene_shell_prepare(const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,
+                                pal_note *note);
+/* makes its levels once, to refuse what the model would and to tell what they have; mass by the density in options */
+pal_err pal_scene_shell_inspect(const pal_surface *surface, const pal_surface_scene *options,
+                                pal_surface_scene_report *report, pal_note *note);
+/* model, output and supports of a body with defaults */
+pal_err pal_scene_shell_dress(pal_body_def *body, const pal_surface_scene *options,
+                              const pal_surface_scene_report *report, pal_note *note);
+/* a shape of mesh/stomach.h by name, its box's middle at zero, and how it is held; up where it has one */
+typedef struct pal_scene_shape {
+    const char *name, *title;
+    pal_surface surface;
+    bool in_space; /* anchors fixed in space, nothing held */
+    int n_support;
+    pal_support support[2];
+    double up[3];
+} pal_scene_shape;
+pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_note *note);
+
 /* text -> [a-z0-9_-], at most PAL_NAME - 1 characters, never empty */
 void pal_scene_plain_name(const char *text, char out[PAL_NAME]);
 /* file name without folder and endings: "/a/liver.inr.gz" -> "liver" */

@@ -76,6 +76,10 @@ static void add_supports(cJSON *object, const pal_body_def *body)
         const pal_support *s = &body->support[k];
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddItemToArray(list, entry);
+        if (s->rim) {
+            cJSON_AddBoolToObject(entry, "rim", true);
+            continue;
+        }
         if (s->lowest) {
             add_number(entry, "lowest", s->fraction);
             continue;

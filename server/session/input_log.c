@@ -112,6 +112,8 @@ static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
     h = mix_bytes(h, mesh->tets.x, (size_t)mesh->tets.n_node * 3 * sizeof(double));
     h = mix_bytes(h, mesh->tets.tet, (size_t)mesh->tets.n_tet * 4 * sizeof(int32_t));
     h = mix_bytes(h, mesh->surface.x, (size_t)mesh->surface.n_vertex * 3 * sizeof(double));
+    /* elsewhere what moves is the tetrahedra */
+    if (mesh->tets.n_tet == 0) h = mix_bytes(h, mesh->surface.tri, (size_t)mesh->surface.n_tri * 3 * sizeof(int32_t));
     return mix_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
 }
 
@@ -129,8 +131,8 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
         h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
         for (int k = 0; k < def->n_support; k++) {
             const pal_support *s = &def->support[k];
-            double number[8] = {s->lowest, s->lowest ? s->fraction : 0};
-            if (!s->lowest)
+            double number[8] = {s->rim ? 2 : s->lowest, s->lowest ? s->fraction : 0};
+            if (!s->lowest && !s->rim)
                 memcpy(number + 2, s->low_m, sizeof s->low_m), memcpy(number + 5, s->high_m, sizeof s->high_m);
             h = mix_bytes(h, number, sizeof number);
         }

@@ -33,7 +33,7 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     double *mass = PAL_NEW(arena, double, n_node);
     uint8_t *held = PAL_NEW(arena, uint8_t, n_node);
     if (!x || !v || !f || !load || !rest || !mass || !held) return PAL_ERR_MEMORY;
-    body->n_dof = body->n_node = n_node;
+    body->n_dof = body->n_node = body->n_active = n_node;
     body->x = body->d = x;
     body->v = body->dv = v;
     body->f = body->g = f;
@@ -47,7 +47,8 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
 double pal_body_kinetic_J(const pal_body *body)
 {
     double sum = 0;
-    for (int i = 0; i < body->n_dof; i++) {
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
         const double *v = body->v + 3 * i;
         sum += 0.5 * body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
@@ -57,8 +58,10 @@ double pal_body_kinetic_J(const pal_body *body)
 void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3])
 {
     double sum[3] = {0, 0, 0};
-    for (int i = 0; i < body->n_dof; i++)
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
         for (int c = 0; c < 3; c++) sum[c] += body->mass_kg[i] * body->v[3 * i + c];
+    }
     for (int c = 0; c < 3; c++) momentum_kg_m_s[c] = sum[c];
 }
 
@@ -66,6 +69,10 @@ bool pal_body_finite(const pal_body *body)
 {
     /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells */
     double sum = 0;
-    for (int i = 0; i < 3 * body->n_dof; i++) sum += 0 * body->x[i] + 0 * body->v[i];
+    for (int k = 0; k < body->n_active && body->active; k++) {
+        size_t i = 3 * (size_t)body->active[k];
+        for (size_t c = 0; c < 3; c++) sum += 0 * body->x[i + c] + 0 * body->v[i + c];
+    }
+    for (int i = 0; i < 3 * body->n_dof && !body->active; i++) sum += 0 * body->x[i] + 0 * body->v[i];
     return sum == 0;
 }

@@ -41,25 +41,31 @@ typedef struct pal_shown_field {
 
 typedef struct pal_body {
     const char *name;
-    int n_dof;          /* points the solver moves: control points (A) or mass nodes             */
-    int n_node;         /* points forces act on; equals n_dof when embed is NULL                 */
-    double *x, *v;      /* dof position m (relative to origin_m), velocity m/s     [n_dof][3]    */
-    double *d, *dv;     /* node position, velocity; alias x, v without embed       [n_node][3]   */
-    double *load;       /* loads of CONTACT rows and of `outer`, N, constant in a sub-step [n_node][3] */
-    double *outer;      /* lasting loads set by pal_world_load, N; NULL: none      [n_node][3]   */
-    double *f;          /* node force N                                            [n_node][3]   */
-    double *g;          /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
-    double *mass_kg;    /* lumped                                                  [n_dof]       */
-    uint8_t *held;      /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
-    double *x_rest;     /* rest position m                                         [n_dof][3]    */
-    bool frozen;        /* set by finite_guard or the solver: the body no longer moves           */
-    double size_m;      /* box diagonal at rest, S of numerics.md part 3                         */
-    double h_m;         /* typical element edge                                                  */
-    double offset_m[3]; /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
-    double dt_limit_s;  /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
-    double load_cap_N;  /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
-    uint64_t n_capped;  /* node loads shortened since reset                                        */
-    uint64_t n_clamped; /* node moves shortened by the solver since reset                          */
+    int n_dof;       /* points the solver moves: control points (A) or mass nodes             */
+    int n_node;      /* points forces act on; equals n_dof when embed is NULL                 */
+    double *x, *v;   /* dof position m (relative to origin_m), velocity m/s     [n_dof][3]    */
+    double *d, *dv;  /* node position, velocity; alias x, v without embed       [n_node][3]   */
+    double *load;    /* loads of CONTACT rows and of `outer`, N, constant in a sub-step [n_node][3] */
+    double *outer;   /* lasting loads set by pal_world_load, N; NULL: none      [n_node][3]   */
+    double *f;       /* node force N                                            [n_node][3]   */
+    double *g;       /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
+    double *mass_kg; /* lumped                                                  [n_dof]       */
+    uint8_t *held;   /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
+    double *x_rest;  /* rest position m                                         [n_dof][3]    */
+    /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (shell.h) has arrays for its
+     * finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over all is right and
+     * one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
+    const int32_t *active; /* [n_active] */
+    int n_active;
+    struct pal_shell *shell; /* NULL: the body does not adapt */
+    bool frozen;             /* set by finite_guard or the solver: the body no longer moves           */
+    double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */
+    double h_m;              /* typical element edge                                                  */
+    double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
+    double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
+    double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
+    uint64_t n_capped;       /* node loads shortened since reset                                        */
+    uint64_t n_clamped;      /* node moves shortened by the solver since reset                          */
     uint64_t n_heavy;   /* sub-steps since reset in which deformation asked for more than the budget of sub-steps */
     uint64_t n_tangled; /* times since reset that voxel elements were found turned over and ran on their split  */
     uint64_t n_split;   /* changes between voxel elements and their split                                        */
@@ -89,7 +95,12 @@ typedef struct pal_body {
     uint64_t field_revision;                       /* sets of values taken so far, of all fields       */
 } pal_body;
 
-/* arrays for n points without embed, zeroed, f = g, d = x, dv = v; MEMORY. [load] */
+static inline int pal_body_point(const pal_body *body, int k)
+{
+    return body->active ? body->active[k] : k;
+}
+
+/* arrays for n points without embed, all active, zeroed, f = g, d = x, dv = v; MEMORY. [load] */
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node);
 /* sums over the body [sim] */
 double pal_body_kinetic_J(const pal_body *body);

@@ -69,10 +69,16 @@ pal_err pal_material_check(pal_material *material, pal_note *note)
 static pal_err check_support(const pal_body_def *body, int index, pal_note *note)
 {
     const pal_support *s = &body->support[index];
+    if (s->lowest && s->rim)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: both lowest and rim", body->name, index);
+    if (s->rim && strcmp(body->model.name, "adaptive_springs") != 0)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" supports[%d].rim: only goes with model \"adaptive_springs\", not \"%s\"",
+                            body->name, index, body->model.name);
     if (s->lowest && !(s->fraction >= 0 && s->fraction <= 1))
         return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]",
                             body->name, index, s->fraction);
-    for (int c = 0; c < 3 && !s->lowest; c++)
+    for (int c = 0; c < 3 && !s->lowest && !s->rim; c++)
         if (!(s->low_m[c] <= s->high_m[c]))
             return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: box from %g to %g", body->name, index,
                                 s->low_m[c], s->high_m[c]);
@@ -122,8 +128,18 @@ static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
     for (int i = 0; i < index; i++)
         if (!strcmp(scene->body[i].name, body->name))
             return pal_note_set(note, PAL_ERR_REFUSED, "bodies[%d]: the name \"%s\" is there twice", index, body->name);
-    if (!body->mesh || body->mesh->tets.n_node < 1)
+    bool shell = !strcmp(body->model.name, "adaptive_springs");
+    if (!body->mesh || (body->mesh->tets.n_node < 1 && body->mesh->surface.n_tri < 1))
         return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": no mesh", body->name);
+    if (shell && body->mesh->surface.n_tri < 1)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model: \"adaptive_springs\" works on the surface, and the mesh has none",
+                            body->name);
+    if (!shell && body->mesh->tets.n_node < 1)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model: \"%s\" works on tetrahedra, and the mesh is a surface alone (made for "
+                            "\"adaptive_springs\")",
+                            body->name, body->model.name);
     if (body->n_support < 0 || body->n_support > PAL_SUPPORT_MAX || body->n_effect < 0 ||
         body->n_effect > PAL_ROW_ITEMS)
         return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": %d supports, %d effects, at most %d and %d",

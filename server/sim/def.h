@@ -40,10 +40,11 @@ typedef struct pal_spring_grid {
     const double *k_J[3];       /* of edges, faces, tetrahedra; NULL: not given, faces: no such row */
 } pal_spring_grid;
 
-/* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), or the lowest
- * fraction of the body's height along `up` */
+/* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), the lowest
+ * fraction of the body's height along `up`, or those on open edges of the surface (model adaptive_springs) */
 typedef struct pal_support {
-    bool lowest;     /* true: `fraction`, false: the box */
+    bool lowest;     /* true: `fraction`                 */
+    bool rim;        /* true: the open edges; both false: the box */
     double fraction; /* 0.05                              */
     double low_m[3], high_m[3];
 } pal_support;
@@ -57,7 +58,7 @@ typedef struct pal_body_def {
     pal_spring_grid spring_grid; /* k_distance_J, k_area_J, k_volume_J of the model in place of its keys  */
     pal_item model;              /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
     pal_item solver;             /* name: "verlet"; empty name: the model's own choice               */
-    pal_item output;             /* "skin_out" (default) or "surface_out"                            */
+    pal_item output; /* "skin_out" (default) or "surface_out"; a body that adapts has the latter either way */
     int n_support;
     pal_support support[PAL_SUPPORT_MAX];
     int n_effect; /* gravity, tool_push, tool_grab, finite_guard, viscous ...         */

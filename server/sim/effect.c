@@ -8,7 +8,11 @@
 pal_err pal_gather(pal_step *step)
 {
     pal_body *body = step->body;
-    memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
+    for (int k = 0; k < body->n_active && body->active; k++) {
+        size_t i = 3 * (size_t)body->active[k];
+        for (size_t c = 0; c < 3; c++) body->f[i + c] = body->load[i + c];
+    }
+    if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
         pal_row *row = &step->force[i];

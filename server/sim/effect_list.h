@@ -15,18 +15,23 @@
     X(tet_elastic)                                                                                                     \
     X(hex_elastic)                                                                                                     \
     X(moving_support)                                                                                                  \
+    X(edge_spring)                                                                                                     \
+    X(shape_spring)                                                                                                    \
+    X(inflate)                                                                                                         \
     X(verlet)                                                                                                          \
+    X(rk4)                                                                                                             \
     X(implicit_euler)                                                                                                  \
     X(sdirk2)                                                                                                          \
     X(static_newton)                                                                                                   \
     X(tool_push)                                                                                                       \
     X(tool_grab)                                                                                                       \
+    X(refine)                                                                                                          \
     X(finite_guard)                                                                                                    \
     X(surface_out)                                                                                                     \
     X(skin_out)                                                                                                        \
     X(field_out)
 
-#define PAL_MODEL_LIST(X) X(tet_springs) X(fem)
+#define PAL_MODEL_LIST(X) X(tet_springs) X(fem) X(adaptive_springs)
 
 #define X(name) extern const pal_effect pal_effect_##name;
 PAL_EFFECT_LIST(X)

@@ -1,9 +1,22 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/frame.h"
 
+#include "server/sim/shell.h"
 #include "server/sim/world.h"
 
 #include <stdlib.h>
+
+/* room for the triangles of a part that adapts; no table taken yet */
+static bool make_slots(pal_frame_part *part, const pal_shell *shell)
+{
+    const pal_levels *levels = &shell->levels;
+    part->n_slot = shell->n_slot;
+    part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
+    part->slot_log = UINT64_MAX;
+    part->n_all = levels->n_vertex[levels->n_level - 1];
+    part->n_all_spring = pal_levels_n_edge(levels, levels->n_level - 1);
+    return part->slot != NULL;
+}
 
 pal_frame *pal_frame_create(const pal_world *world)
 {
@@ -16,7 +29,9 @@ pal_frame *pal_frame_create(const pal_world *world)
         pal_frame_part *part = &frame->part[frame->n_part++];
         part->n_vertex = shown.n_vertex;
         part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
-        if (!part->position_m) {
+        const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
+        bool made = part->position_m && (!shown.adapts || make_slots(part, body->shell));
+        if (!made) {
             pal_frame_destroy(frame);
             return NULL;
         }
@@ -29,6 +44,7 @@ void pal_frame_destroy(pal_frame *frame)
     if (!frame) return;
     for (int i = 0; i < frame->n_part; i++) {
         free(frame->part[i].position_m);
+        free(frame->part[i].slot);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) free(frame->part[i].field[k].value);
     }
     free(frame);

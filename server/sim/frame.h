@@ -22,6 +22,13 @@ typedef struct pal_frame_part {
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
+    /* bodies that adapt (sim/shell.h): the table of drawn triangles at this revision, 0 0 0 in empty places. Vertices
+     * of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
+    int n_slot;
+    int32_t *slot;           /* [n_slot][3]                                      */
+    uint64_t slot_log;       /* changes taken in so far, of pal_shell.n_log      */
+    int n_active, n_spring;  /* nodes and springs now                            */
+    int n_all, n_all_spring; /* and if all of the body were of its finest level  */
 } pal_frame_part;
 
 typedef struct pal_frame_tool {

@@ -3,6 +3,7 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/shell.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -64,7 +65,22 @@ static pal_err add_named(build_state *s, pal_item *own, const pal_item *item, pa
     return PAL_ERR_OK;
 }
 
-static void hold(pal_body *body, const pal_body_def *def, const double up[3])
+/* holds the vertices on open edges, on every level: the halves of an open edge are open edges too */
+static pal_err hold_rim(pal_body *body, int index, pal_note *note)
+{
+    if (!body->shell)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the model has no surface of its own",
+                            body->name, index);
+    const pal_levels *levels = &body->shell->levels;
+    if (levels->closed)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the surface has no open edge",
+                            body->name, index);
+    for (int i = 0; i < body->n_dof; i++)
+        if (pal_levels_on_rim(levels, i)) body->held[i] = 1;
+    return PAL_ERR_OK;
+}
+
+static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3], pal_note *note)
 {
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < body->n_dof; i++) {
@@ -73,6 +89,10 @@ static void hold(pal_body *body, const pal_body_def *def, const double up[3])
     }
     for (int s = 0; s < def->n_support; s++) {
         const pal_support *support = &def->support[s];
+        if (support->rim) {
+            PAL_TRY(hold_rim(body, s, note));
+            continue;
+        }
         /* a hair above, so that rounding does not part nodes of one height */
         double top = low + (support->fraction + 1e-9) * (high - low);
         for (int i = 0; i < body->n_dof; i++) {
@@ -83,6 +103,7 @@ static void hold(pal_body *body, const pal_body_def *def, const double up[3])
             if (in) body->held[i] = 1;
         }
     }
+    return PAL_ERR_OK;
 }
 
 static double box_diagonal(const pal_body *body)
@@ -95,6 +116,17 @@ static double box_diagonal(const pal_body *body)
             high[c] = fmax(high[c], body->x_rest[3 * i + c]);
         }
     return pal_dist3(low, high);
+}
+
+static const double *mesh_origin(const pal_prepared *mesh)
+{
+    return mesh->tets.n_node > 0 ? mesh->tets.origin_m : mesh->surface.origin_m;
+}
+
+/* a body that adapts is its own surface: what skin_out, the default, would put between them is not there */
+static void choose_output(const pal_body *body, pal_item *output)
+{
+    if (body->shell && !strcmp(output->name, "skin_out")) snprintf(output->name, sizeof output->name, "surface_out");
 }
 
 /* arrays, supports and the ordered wishes of one body */
@@ -113,15 +145,18 @@ static pal_err build_body(build_state *s, const pal_scene *scene)
     pal_item *own = s->own;
     *own = def->model;
     PAL_TRY(model->build(own, &s->build, &s->recipe));
-    hold(body, def, scene->up);
+    PAL_TRY(hold(body, def, scene->up, s->build.note));
     body->size_m = box_diagonal(body);
     body->load_cap_N = 10 * def->material.young_Pa * body->h_m * body->h_m;
-    for (int c = 0; c < 3; c++) body->offset_m[c] = def->mesh->tets.origin_m[c] - scene->body[0].mesh->tets.origin_m[c];
+    const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
+    for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
 
     s->n_wish = 0;
     for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
     /* what is shown comes before the entries, so that a row field_out finds it */
-    PAL_TRY(add_named(s, ++own, &def->output, PAL_STAGE_OUTPUT));
+    pal_item output = def->output;
+    choose_output(body, &output);
+    PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));
     for (int i = 0; i < def->n_effect; i++) {
         *++own = def->effect[i];
         PAL_TRY(add_wish(s, own, true));

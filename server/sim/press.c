@@ -12,8 +12,6 @@ enum { ROUNDS = 2 };
 #define FELT_FORCE_CHANGE 0.02
 /* share of the pushing forces that ties may pull, or points may come through, without another round */
 #define WRONG 0.05
-/* contacts within 75 degrees of a patch's direction belong to it (as in tool_push) */
-#define BLOB_COSINE 0.25
 
 pal_err pal_press_make(pal_arena *arena, pal_press *out)
 {
@@ -273,6 +271,32 @@ static int find_entry(const pal_felt *felt, const pal_blob *blob)
     return best;
 }
 
+bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blob *blob)
+{
+    double axis[3], sum[3];
+    int seed = -1;
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double f2 = pal_dot3(contact[i].force, contact[i].force);
+        if (!grouped[i] && f2 > most) most = f2, seed = i;
+    }
+    if (seed < 0) return false;
+    pal_copy3(axis, contact[seed].away);
+    for (int pass = 0; pass < 2; pass++) {
+        pal_set3(sum, 0, 0, 0);
+        for (int i = 0; i < n; i++)
+            if (!grouped[i] && pal_dot3(contact[i].away, axis) >= PAL_BLOB_COSINE) pal_add3(sum, sum, contact[i].force);
+        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
+    }
+    for (int i = 0; i < n; i++)
+        if (pal_dot3(contact[i].away, axis) >= PAL_BLOB_COSINE) grouped[i] = 1;
+    grouped[seed] = 1;
+    blob->force_N = pal_norm3(sum);
+    blob->gap_m = blob->k_N_m = 0;
+    pal_scale3(sum, -1, sum);
+    return pal_unit3(blob->normal, sum, 0);
+}
+
 bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m)
 {
     int i = find_entry(felt, blob);
@@ -327,7 +351,7 @@ void pal_felt_contact(pal_felt *felt, pal_blob *blob, const double at_m[3], pal_
     int n = 0;
     for (int i = 0; i < press->n_contact; i++) {
         double into = -pal_dot3(contact[i].away, blob->normal);
-        if (into < BLOB_COSINE || pal_dot3(contact[i].force, contact[i].force) == 0) continue;
+        if (into < PAL_BLOB_COSINE || pal_dot3(contact[i].force, contact[i].force) == 0) continue;
         if (ties->k_N_m[press->first + i] <= 0) continue;
         press->share[n] = into;
         row[n++] = press->first + i;

@@ -65,6 +65,12 @@ typedef struct pal_felt {
     int turn, step; /* entry to be replaced next; steps of the world */
 } pal_felt;
 
+/* contacts within 75 degrees of a patch's direction belong to it */
+#define PAL_BLOB_COSINE 0.25
+/* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
+ */
+bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blob *blob);
+
 /* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
  * more than `least_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
 bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m);

@@ -1,142 +1,10 @@
-/* Contact points of the shown surface: sampling, collection, evaluation, and forces back to the nodes. */
-#include "server/sim/touch.h"
+/* Contact points of the shown surface: collection, evaluation, and forces back to the nodes. */
+#include "server/sim/touch_sample.h"
 
 #include "server/base/vec3.h"
 
 #include <math.h>
 #include <string.h>
-
-/* passing samples of a step, and parts that an edge is cut into for them */
-enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
-
-static double longest_edge(const pal_surface *surface, int tri)
-{
-    const int32_t *corner = surface->tri + 3 * (size_t)tri;
-    double longest = 0;
-    for (int k = 0; k < 3; k++) {
-        const double *a = surface->x + 3 * (size_t)corner[k], *b = surface->x + 3 * (size_t)corner[(k + 1) % 3];
-        longest = fmax(longest, pal_dist3(a, b));
-    }
-    return longest;
-}
-
-static int cuts(const pal_surface *surface, int tri, double spacing_m)
-{
-    double n = ceil(longest_edge(surface, tri) / spacing_m);
-    return n < 2 ? 1 : (int)fmin(n, 1000);
-}
-
-static int64_t count_samples(const pal_surface *surface, double spacing_m)
-{
-    int64_t n = 0;
-    for (int t = 0; t < surface->n_tri; t++) {
-        int64_t c = cuts(surface, t, spacing_m);
-        if (c > 1) n += c * c;
-    }
-    return n;
-}
-
-static double tri_area(const pal_surface *surface, int tri)
-{
-    const int32_t *corner = surface->tri + 3 * (size_t)tri;
-    double e[3], f[3];
-    const double *a = surface->x + 3 * (size_t)corner[0];
-    pal_sub3(e, surface->x + 3 * (size_t)corner[1], a);
-    pal_sub3(f, surface->x + 3 * (size_t)corner[2], a);
-    pal_cross3(e, e, f);
-    return 0.5 * pal_norm3(e);
-}
-
-/* centroids of the n^2 equal triangles that a triangle cut into n parts an edge has */
-static int sample(int32_t *corner_out, float *share_out, const int32_t *corner, int n)
-{
-    int k = 0;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n - i; j++)
-            for (int half = 0; half < 2 && (half == 0 || j < n - i - 1); half++) {
-                double third = half ? 2.0 / 3 : 1.0 / 3, u = (i + third) / n, w = (j + third) / n;
-                memcpy(corner_out + 3 * (size_t)k, corner, 3 * sizeof *corner);
-                float *share = share_out + 3 * (size_t)k++;
-                share[0] = (float)(1 - u - w), share[1] = (float)u, share[2] = (float)w;
-            }
-    return k;
-}
-
-static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pal_touch *t)
-{
-    size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
-    size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0;
-    size_t n_tri = (size_t)body->surface->n_tri, room = (size_t)n_sample + PASSING_MAX;
-    t->corner = PAL_NEW(arena, int32_t, 3 * room);
-    t->share = PAL_NEW(arena, float, 3 * room);
-    t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
-    t->fan_start = PAL_NEW(arena, int32_t, n_vertex + 2);
-    t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
-    t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
-    t->live = PAL_NEW(arena, int32_t, n_vertex);
-    t->frame = PAL_NEW(arena, int32_t, n_frame);
-    t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
-    t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
-    t->x = PAL_NEW(arena, double, 3 * n_vertex);
-    t->v = PAL_NEW(arena, double, 3 * n_vertex);
-    size_t n_slot = body->skin ? n_frame : n_node;
-    t->slot = PAL_NEW(arena, int32_t, n_slot);
-    t->node = PAL_NEW(arena, int32_t, n_node);
-    t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->node_mark = PAL_NEW(arena, uint32_t, n_node);
-    t->turning = PAL_NEW(arena, pal_turn, n_slot);
-    t->turning_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->seen = PAL_NEW(arena, uint32_t, n_vertex);
-    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
-    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
-    t->force = PAL_NEW(arena, double, 3 * n_node);
-    bool all = t->corner && t->share && t->area_m2 && t->fan_start && t->fan && t->tri_mark && t->live && t->frame &&
-               t->live_mark && t->frame_mark && t->x && t->v && t->slot && t->node && t->slot_mark && t->node_mark &&
-               t->slot_force && t->slot_torque && t->force && t->turning && t->turning_mark && t->tool_mark && t->seen;
-    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
-}
-
-static void make_fans(const pal_surface *surface, pal_touch *t)
-{
-    /* starts are built one place ahead, so that filling leaves them in place */
-    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) t->fan_start[surface->tri[i] + 2]++;
-    for (int i = 0; i < t->n_vertex; i++) t->fan_start[i + 2] += t->fan_start[i + 1];
-    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++)
-        t->fan[t->fan_start[surface->tri[i] + 1]++] = (int32_t)(i / 3);
-}
-
-pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, pal_arena *arena, pal_touch *out)
-{
-    const pal_surface *surface = body->surface;
-    if (!surface || body->n_shown <= 0 || surface->n_vertex != body->n_shown || !(spacing_m > 0))
-        return PAL_ERR_REFUSED;
-    int64_t n_sample = count_samples(surface, spacing_m);
-    while (n_sample > most_sample) {
-        spacing_m *= 1.25;
-        n_sample = count_samples(surface, spacing_m);
-    }
-    pal_touch t = {.n_vertex = body->n_shown, .spacing_m = spacing_m};
-    t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
-    t.most_point = t.n_fixed + PASSING_MAX;
-    PAL_TRY(allocate(body, arena, (int)n_sample, &t));
-    make_fans(surface, &t);
-    int k = 0;
-    for (int i = 0; i < surface->n_tri; i++) {
-        const int32_t *corner = surface->tri + 3 * (size_t)i;
-        double area = tri_area(surface, i);
-        int n = cuts(surface, i, spacing_m);
-        if (n == 1) {
-            for (int c = 0; c < 3; c++) t.area_m2[corner[c]] += area / 3;
-            continue;
-        }
-        int made = sample(t.corner + 3 * (size_t)k, t.share + 3 * (size_t)k, corner, n);
-        for (int j = 0; j < made; j++) t.area_m2[t.n_vertex + k + j] = area / made;
-        k += made;
-    }
-    *out = t;
-    return PAL_ERR_OK;
-}
 
 void pal_touch_begin(pal_touch *touch)
 {
@@ -169,31 +37,22 @@ static inline double distance2(const double p[3], const double a[3], const doubl
     return x * x + y * y + z * z;
 }
 
-/* passing samples for triangles at the listed vertices that were short at rest and are long now */
-static void sample_stretched(pal_touch *touch, const pal_body *body, const int32_t *list, int n)
+/* the first run of fixed samples, from this one on, whose triangle meets the box: *point is its first point, or the
+ * first passing one; returns the run behind it */
+static int next_run(const pal_touch *touch, const pal_body *body, const float low[3], const float high[3], int run,
+                    int *point)
 {
-    double spacing2 = touch->spacing_m * touch->spacing_m;
-    for (int i = 0; i < n; i++)
-        for (int k = touch->fan_start[list[i]]; k < touch->fan_start[list[i] + 1]; k++) {
-            int32_t tri = touch->fan[k];
-            const int32_t *corner = body->surface->tri + 3 * (size_t)tri;
-            if (touch->tri_mark[tri] == touch->mark) continue;
-            touch->tri_mark[tri] = touch->mark;
-            double longest2 = 0;
-            for (int c = 0; c < 3; c++) {
-                const float *p = body->shown + 3 * (size_t)corner[c],
-                            *q = body->shown + 3 * (size_t)corner[(c + 1) % 3];
-                double x = (double)(p[0] - q[0]), y = (double)(p[1] - q[1]), z = (double)(p[2] - q[2]);
-                longest2 = fmax(longest2, x * x + y * y + z * z);
-            }
-            if (!(longest2 > spacing2) || cuts(body->surface, tri, touch->spacing_m) > 1) continue;
-            int cut = (int)fmin(ceil(sqrt(longest2 / spacing2)), PASSING_CUTS);
-            if (touch->n_point + cut * cut > touch->most_point) return;
-            size_t at = (size_t)(touch->n_point - touch->n_vertex);
-            int made = sample(touch->corner + 3 * at, touch->share + 3 * at, corner, cut);
-            double area = tri_area(body->surface, tri) / made;
-            for (int j = 0; j < made; j++) touch->area_m2[touch->n_point++] = area;
-        }
+    for (; run < touch->n_run; run++) {
+        const int32_t *corner = touch->corner + 3 * (size_t)touch->run[run];
+        const float *p = body->shown + 3 * (size_t)corner[0], *q = body->shown + 3 * (size_t)corner[1],
+                    *r = body->shown + 3 * (size_t)corner[2];
+        bool meets = true;
+        for (int c = 0; c < 3; c++)
+            meets &= fminf(p[c], fminf(q[c], r[c])) <= high[c] && fmaxf(p[c], fmaxf(q[c], r[c])) >= low[c];
+        if (meets) break;
+    }
+    *point = touch->n_vertex + touch->run[run];
+    return run < touch->n_run ? run + 1 : run;
 }
 
 int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3], const double b[3], double reach_m,
@@ -208,8 +67,10 @@ int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3],
         high[c] = (float)(fmax(a[c], b[c]) + reach_m);
     }
     int n = 0;
-    const float *s = body->shown;
-    for (int i = 0; i < touch->n_vertex; i++, s += 3) {
+    int n_vertex = body->shell ? body->n_active : touch->n_vertex;
+    for (int k = 0; k < n_vertex; k++) {
+        int i = body->shell ? body->active[k] : k;
+        const float *s = body->shown + 3 * (size_t)i;
         if (!((s[0] >= low[0]) & (s[0] <= high[0]) & (s[1] >= low[1]) & (s[1] <= high[1]) & (s[2] >= low[2]) &
               (s[2] <= high[2])))
             continue;
@@ -219,8 +80,11 @@ int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3],
         make_live(touch, body, i);
         list[n++] = i;
     }
-    sample_stretched(touch, body, list, n);
-    for (int i = touch->n_vertex; i < touch->n_point; i++) {
+    pal_touch_stretched(touch, body, list, n);
+    for (int i = touch->n_vertex, run = 0; i < touch->n_point; i++) {
+        if (run < touch->n_run && i == touch->n_vertex + touch->run[run])
+            run = next_run(touch, body, low, high, run, &i);
+        if (i == touch->n_point) break;
         const int32_t *corner = touch->corner + 3 * (size_t)(i - touch->n_vertex);
         const float *share = touch->share + 3 * (size_t)(i - touch->n_vertex);
         double p[3] = {0};
@@ -264,6 +128,12 @@ void pal_touch_forget(pal_touch *touch)
 void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s)
 {
     uint32_t before = touch->sub_step++;
+    for (int i = 0; i < touch->n_live && body->shell; i++) {
+        size_t at = 3 * (size_t)touch->live[i];
+        pal_copy3(touch->x + at, body->d + at);
+        pal_copy3(touch->v + at, body->dv + at);
+    }
+    if (body->shell) return;
     if (body->skin) pal_skin_frames_of(body->skin, body->d, touch->frame, touch->n_frame, body->skin_axes);
     for (int i = 0; i < touch->n_live; i++) {
         int vertex = touch->live[i];
@@ -351,7 +221,9 @@ bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const doubl
 {
     double best = INFINITY, at[3], sum[3] = {0};
     int nearest = -1;
-    for (int i = 0; i < touch->n_fixed; i++) {
+    int n_vertex = body->shell ? body->n_active : touch->n_vertex;
+    for (int k = 0; k < n_vertex + touch->n_fixed - touch->n_vertex; k++) {
+        int i = k >= n_vertex ? k - n_vertex + touch->n_vertex : body->shell ? body->active[k] : k;
         shown_point(touch, body, i, at);
         pal_sub3(at, at, p);
         double d2 = pal_dot3(at, at);
@@ -362,7 +234,7 @@ bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const doubl
     if (nearest >= touch->n_vertex)
         add_normal(body->shown, touch->corner + 3 * (size_t)(nearest - touch->n_vertex), sum);
     else
-        for (int k = touch->fan_start[nearest]; k < touch->fan_start[nearest + 1]; k++)
+        for (int k = touch->fan_start[nearest]; k < touch->fan_end[nearest]; k++)
             add_normal(body->shown, body->surface->tri + 3 * (size_t)touch->fan[k], sum);
     return pal_unit3(normal, sum, 0);
 }

@@ -10,6 +10,9 @@
  * their nodes. Forces go back by the exact transpose of that: w_i f on the node, and the torque w_i (R_i o_i) x f on
  * the frame as forces on the nodes of its fan. So contact does the same work on nodes as on the surface (without this
  * it feeds energy into tissue and a resting tool trembles), and total force and torque are those of the contact.
+ *
+ * A body that adapts (shell.h) has other triangles from time to time: points are the vertices in use and samples of
+ * what is drawn, taken over at the beginning of a step; a step costs what is in use.
  * Memory: the world's arena. Thread: [sim], pal_touch_make [load]. */
 #ifndef PAL_SIM_TOUCH_H
 #define PAL_SIM_TOUCH_H
@@ -21,11 +24,15 @@ typedef struct pal_touch {
     int n_vertex, n_fixed;   /* points [0, n_vertex) are the shown vertices, up to n_fixed fixed samples,     */
     int n_point, most_point; /* up to n_point passing samples of this step; room for most_point            */
     double spacing_m;
-    int32_t *corner;          /* shown vertices of each sample          [most_point - n_vertex][3]               */
-    float *share;             /* their shares, sum 1                    [most_point - n_vertex][3]               */
-    double *area_m2;          /* rest area that each point stands for   [most_point]                             */
-    int32_t *fan_start, *fan; /* triangles around shown vertices        [n_vertex+1] [3 n_tri]                   */
-    uint32_t *tri_mark;       /* sampled in this step                   [n_tri]                                  */
+    int32_t *corner; /* shown vertices of each sample          [most_point - n_vertex][3]               */
+    float *share;    /* their shares, sum 1                    [most_point - n_vertex][3]               */
+    double *area_m2; /* rest area that each point stands for   [most_point]                             */
+    int32_t *fan_start, *fan_end, *fan; /* triangles around shown vertices: fan[start..end-1] [n_vertex]        */
+    uint32_t *tri_mark; /* sampled in this step                   [n_tri]                                  */
+    /* of a body that adapts: first fixed sample of each triangle that has some, and one past the last; else NULL */
+    int n_run;
+    int32_t *run;      /* minus n_vertex                         [n_run + 1]                              */
+    uint64_t revision; /* of the triangles that all this belongs to                                       */
 
     /* this step's live part: vertices and frames near some tool */
     int n_live, n_frame;
@@ -41,7 +48,7 @@ typedef struct pal_touch {
     double *slot_force, *slot_torque; /* N, Nm, by slot [slots][3] each  */
     double *force;                    /* N, by node     [body n_node][3] */
     /* how a slot's frame turns with its fan, at the present sub-step; by slot */
-    pal_turn *turning; /* [slots] */
+    pal_turn *turning; /* [frames of the skin] */
     uint32_t *turning_mark, sub_step, *tool_mark;
     double dt_s; /* of the sub-step before */
 } pal_touch;
@@ -57,17 +64,21 @@ typedef struct pal_contact {
 /* points, at most most_sample samples (spacing grows to keep to it); body must show something; MEMORY, REFUSED */
 pal_err pal_touch_make(const pal_body *body, double spacing_m, int most_sample, pal_arena *arena, pal_touch *out);
 
+/* takes over the triangles as the body draws them now, before a step; false: they are those of the last time */
+bool pal_touch_follow(pal_touch *touch, const pal_body *body);
 /* a new step: nothing is live */
 void pal_touch_begin(pal_touch *touch);
 /* the body jumped (reset): velocities start anew */
 void pal_touch_forget(pal_touch *touch);
 /* adds the points of body->shown within reach_m of the segment a..b (body frame) to the live part and writes them to
- * list [most_point], ascending; returns how many; *nearest_m is the least distance found (reach_m when none) */
+ * list [most_point], vertices in ascending or the body's active order, then samples; returns how many; *nearest_m is
+ * the least distance found (reach_m when none) */
 int pal_touch_collect(pal_touch *touch, const pal_body *body, const double a[3], const double b[3], double reach_m,
                       int32_t *list, double *nearest_m);
 /* positions and velocities of the live vertices at the body's current state, in a sub-step of dt_s; frames of a skin
  * are brought up to date where live. A velocity is the way since the sub-step before over its time, which for a
- * symplectic step is exactly that of the nodes, turning of frames included. */
+ * symplectic step is exactly that of the nodes, turning of frames included; of a body that adapts it is the nodes' own
+ * (tool_push says why). */
 void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s);
 void pal_touch_point(const pal_touch *touch, int point, double x[3]);
 void pal_touch_velocity(const pal_touch *touch, int point, double v[3]);

@@ -5,15 +5,17 @@
 #include "server/base/vec3.h"
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
+#include "server/sim/shell.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* shown surface of a body, fixed while its revision is */
+/* shown surface of a body as at load */
 typedef struct part {
     int n_vertex, n_tri;
     float *rest_m;
     int32_t *tri;
+    int32_t *parent; /* of midpoints, of a body that adapts; else NULL */
 } part;
 
 struct pal_world {
@@ -73,7 +75,13 @@ static int count_substeps(const pal_world *w, double time_s, double limit_s)
     return n < 1 ? 1 : n > w->most_substep ? w->most_substep + 1 : (int)n;
 }
 
-/* the limit that holds at rest, whatever the bodies do now; leaves every solver's knowledge of its limit empty */
+static bool refines(const pal_world *w, int b)
+{
+    return w->plan.body[b].shell && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
+}
+
+/* the limit that holds at rest, whatever the bodies do now, and on the finest level that they may reach; leaves every
+ * solver's knowledge of its limit empty */
 static double find_rest_limit(pal_world *w)
 {
     double least = INFINITY, limit_s = w->limit_s;
@@ -87,6 +95,8 @@ static double find_rest_limit(pal_world *w)
         step.n_contact = 0;
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
+        /* refinement may bring the finest level, each level about half the step (C eq. 9) */
+        if (refines(w, b)) limit = ldexp(limit, body->shell->finest + 1 - body->shell->levels.n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
         if (!(limit >= least)) least = limit;
     }
@@ -98,12 +108,28 @@ static pal_err check_budget(pal_world *w, pal_note *note)
 {
     double limit = find_rest_limit(w);
     int n = count_substeps(w, w->step_s, limit);
+    bool adapts = false;
+    for (int b = 0; b < w->plan.n_body; b++) adapts |= refines(w, b);
     if (!(limit > 0) || n > w->most_substep)
         return pal_note_set(note, PAL_ERR_BUDGET,
-                            "a step of %g s needs %.0f sub-steps of %.3g s, most_substep allows %d: take a softer or "
-                            "denser material, larger elements or a shorter step",
-                            w->step_s, ceil(w->step_s / limit), limit, w->most_substep);
+                            "a step of %g s needs %.0f sub-steps of %.3g s%s, most_substep allows %d: take a softer or "
+                            "denser material, larger elements%s or a shorter step",
+                            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "",
+                            w->most_substep, adapts ? ", fewer levels" : "");
     w->rest_limit_s = limit;
+    return PAL_ERR_OK;
+}
+
+/* the two vertices that each midpoint of an adaptive body lies between, for those who code or draw them */
+static pal_err make_parents(pal_world *w, const pal_levels *levels, part *p)
+{
+    int n_coarse = levels->n_vertex[0];
+    p->parent = PAL_NEW(w->arena, int32_t, 2 * (size_t)(p->n_vertex - n_coarse) + 2);
+    if (!p->parent) return PAL_ERR_MEMORY;
+    for (int i = n_coarse; i < p->n_vertex; i++) {
+        const pal_winged_edge *edge = &levels->edge[pal_levels_vertex_parent(levels, i)];
+        for (int k = 0; k < 2; k++) p->parent[2 * (size_t)(i - n_coarse) + (size_t)k] = edge->vertex[k];
+    }
     return PAL_ERR_OK;
 }
 
@@ -113,20 +139,18 @@ static pal_err make_part(pal_world *w, int b)
     part *p = &w->part[b];
     const double *x = body->skin ? body->surface->x : body->x_rest;
     if (body->n_shown == 0) return PAL_ERR_OK;
+    const int32_t *tri = body->shell ? body->shell->slot : body->surface->tri;
     p->n_vertex = body->n_shown;
-    p->n_tri = body->skin ? body->surface->n_tri : body->tets->n_face;
+    p->n_tri = body->shell ? body->shell->n_slot : body->surface->n_tri;
     p->rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
     p->tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
-    int32_t *shown_of = PAL_NEW(w->arena, int32_t, body->n_node);
-    if (!p->rest_m || !p->tri || !shown_of) return PAL_ERR_MEMORY;
+    if (!p->rest_m || !p->tri) return PAL_ERR_MEMORY;
     for (int i = 0; i < p->n_vertex; i++) {
         int from = body->skin ? i : body->shown_node[i];
-        if (!body->skin) shown_of[from] = i;
         for (int c = 0; c < 3; c++) p->rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
     }
-    for (int i = 0; i < 3 * p->n_tri; i++)
-        p->tri[i] = body->skin ? body->surface->tri[i] : shown_of[body->tets->face[i]];
-    return PAL_ERR_OK;
+    memcpy(p->tri, tri, 3 * sizeof *tri * (size_t)p->n_tri);
+    return body->shell ? make_parents(w, &body->shell->levels, p) : PAL_ERR_OK;
 }
 
 /* tools with the defaults that depend on bodies */
@@ -215,7 +239,7 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
-    if (node < 0 || node >= b->n_node) return PAL_ERR_REFUSED;
+    if (node < 0 || node >= b->n_node || (b->shell && !pal_shell_has(b->shell, node))) return PAL_ERR_REFUSED;
     if (!b->outer) b->outer = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
     if (!b->outer) return PAL_ERR_MEMORY;
     pal_copy3(b->outer + 3 * node, force_N);
@@ -260,6 +284,10 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_n
     }
     double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
     for (int i = 0; i < body->n_dof; i++) body->mass_kg[i] *= ratio;
+    if (body->shell) {
+        body->shell->options.mass_kg *= ratio;
+        for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
+    }
     body->load_cap_N = 10 * to->young_Pa * body->h_m * body->h_m;
     w->material[b] = *to;
     return PAL_ERR_OK;
@@ -295,10 +323,29 @@ pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted
 
 /* ---- a step ---- */
 
+/* loads anew: the lasting ones. Nodes out of use have none (shell.h) and keep theirs in `outer` until they return */
+static void begin_loads(pal_body *body)
+{
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
+    for (int k = 0; k < body->n_active && body->active; k++) {
+        double *load = body->load + 3 * (size_t)body->active[k];
+        if (body->outer)
+            pal_copy3(load, body->outer + 3 * (size_t)body->active[k]);
+        else
+            pal_set3(load, 0, 0, 0);
+    }
+    if (body->active) return;
+    if (body->outer)
+        memcpy(body->load, body->outer, n_byte);
+    else
+        memset(body->load, 0, n_byte);
+}
+
 static void cap_loads(pal_body *body)
 {
     double cap2 = body->load_cap_N * body->load_cap_N;
-    for (int i = 0; i < body->n_node; i++) {
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 <= cap2) continue;
         pal_scale3(load, body->load_cap_N / sqrt(load2), load);
@@ -311,11 +358,7 @@ static void cap_loads(pal_body *body)
 static pal_err run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
-    size_t n3 = 3 * (size_t)body->n_node;
-    if (body->outer)
-        memcpy(body->load, body->outer, n3 * sizeof(double));
-    else
-        memset(body->load, 0, n3 * sizeof(double));
+    begin_loads(body);
     if (body->implicit && body->outer) cap_loads(body);
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
@@ -442,12 +485,37 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
     }
 }
 
+/* what of the table of triangles has changed since this frame was filled last, or all of it */
+static void copy_slots(const pal_shell *shell, pal_frame_part *to)
+{
+    size_t one = 3 * sizeof *to->slot;
+    if (to->slot_log > shell->n_log || shell->n_log - to->slot_log > (uint64_t)shell->n_log_room) {
+        memcpy(to->slot, shell->slot, one * (size_t)shell->n_slot);
+    } else {
+        for (uint64_t i = to->slot_log; i < shell->n_log; i++) {
+            size_t place = 3 * (size_t)shell->log[i % (uint64_t)shell->n_log_room];
+            memcpy(to->slot + place, shell->slot + place, one);
+        }
+    }
+    to->slot_log = shell->n_log;
+    to->n_active = shell->n_node;
+    to->n_spring = shell->n_spring;
+}
+
 static void copy_part(const pal_body *body, pal_frame_part *to)
 {
     copy_fields(body, to);
     const double *o = body->offset_m;
     to->revision = body->revision;
     to->frozen = body->frozen;
+    if (to->n_slot > 0) {
+        copy_slots(body->shell, to);
+        for (int k = 0; k < body->n_active; k++) {
+            size_t i = 3 * (size_t)body->active[k];
+            for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->shown[i + c] + o[c]);
+        }
+        return;
+    }
     if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
         if (to->n_vertex > 0) memcpy(to->position_m, body->shown, 3 * sizeof(float) * (size_t)to->n_vertex);
         return;
@@ -506,6 +574,8 @@ uint64_t pal_world_hash(const pal_world *world)
         const pal_body *body = &world->plan.body[b];
         hash = hash_bytes(hash, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
         hash = hash_bytes(hash, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
+        const pal_levels *levels = body->shell ? &body->shell->levels : NULL;
+        if (levels) hash = hash_bytes(hash, body->shell->face_state, (size_t)levels->first_face[levels->n_level]);
     }
     return hash;
 }
@@ -545,6 +615,13 @@ void pal_world_shown(const pal_world *world, int index, pal_shown *out)
                        .rest_m = p->rest_m,
                        .tri = p->tri,
                        .revision = body->revision};
+    if (!body->shell || p->n_vertex == 0) return;
+    const pal_levels *levels = &body->shell->levels;
+    out->adapts = true;
+    out->n_coarse = levels->n_vertex[0];
+    out->parent = p->parent;
+    out->n_coarse_tri = levels->first_face[1];
+    out->coarse_tri = levels->face;
 }
 
 double pal_world_limit_s(const pal_world *world)

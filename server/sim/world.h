@@ -22,8 +22,16 @@ typedef struct pal_shown {
     const char *name;
     int n_vertex, n_tri;
     const float *rest_m; /* scene frame             [n_vertex][3] */
-    const int32_t *tri;  /* counter-clockwise       [n_tri][3]    */
+    const int32_t *tri;  /* counter-clockwise, as at load; of a body that adapts the table of places, 0 0 0 in empty
+                          * ones (pal_frame_part.slot brings its changes)  [n_tri][3] */
     uint64_t revision;
+    bool adapts; /* triangles change while it runs */
+    /* how vertices hang together where they are more than `tri` shows: vertex i >= n_coarse is the midpoint of the
+     * smaller vertices parent[2 (i - n_coarse)], parent[.. + 1]; NULL: it is no such body */
+    int n_coarse;
+    const int32_t *parent;
+    int n_coarse_tri;
+    const int32_t *coarse_tri; /* triangles of the vertices below n_coarse [n_coarse_tri][3] */
 } pal_shown;
 
 pal_err pal_world_create(const pal_scene *scene, pal_note *note,
@@ -34,8 +42,9 @@ void pal_world_destroy(pal_world *world);  /* [load] */
  * not finite, a position farther than 100 body sizes, a tool that does not exist. [sim] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
 /* moves on by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number; BUDGET: more sub-steps than
- * scene->most_substep even at rest (both: nothing moved); FROZEN when a body diverged in this step and was frozen.
- * Where deformation alone asks for more than the budget, the step goes on with heavier nodes (pal_body.n_heavy). [sim]
+ * scene->most_substep even at rest, a body that refines being on its finest level (both: nothing moved); FROZEN when a
+ * body diverged in this step and was frozen. Where deformation alone asks for more than the budget, the step goes on
+ * with heavier nodes (pal_body.n_heavy). [sim]
  */
 pal_err pal_world_step(pal_world *world, double dt_s);
 /* every body back to rest, tools let go, time 0. [sim] */
@@ -43,7 +52,8 @@ void pal_world_reset(pal_world *world);
 /* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
 /* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body
- * takes memory. REFUSED: not finite, no such node; MEMORY. [load] */
+ * takes memory. Of a body that adapts a node out of use is no such node, and the load of one that goes out of use waits
+ * until it is in use again. REFUSED: not finite, no such node; MEMORY. [load] */
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
 /* A field of a body in colour (row field_out, 10 times a simulated second): wanted, the row is put into the running
@@ -59,7 +69,8 @@ pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memo
 pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
 void pal_frame_destroy(pal_frame *frame);
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
-uint64_t pal_world_hash(const pal_world *world); /* [sim] of tick, x and v of every body (FNV-1a over the bits) */
+uint64_t
+pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */
 
 int pal_world_rows(const pal_world *world);
 void pal_world_row(const pal_world *world, int row, pal_row_info *out);

@@ -41,6 +41,8 @@ try {
     check(`browser ${i + 1} sees the vertices move under the bridge's tool`, most[i] > before + 0.002, `${(1000 * most[i]).toFixed(2)} mm`);
   }
   await pages[0].screenshot({ path: join(pictures, "together.png") });
+  // the first press may come before its first contact model: a few more
+  await new Promise((done) => setTimeout(done, 3000));
   bridge.kill("SIGINT");
   await bridge.ended;
   const felt = JSON.parse(bridge.text);

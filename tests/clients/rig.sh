@@ -63,10 +63,10 @@ await() {
     done
 }
 
-# start_server [flags]: serves the ball; sets $server_pid, $port, $url
+# start_server [flags]: serves $scene, the ball when it is not set; sets $server_pid, $port, $url
 start_server() {
     : >"$work/serve.out"
-    timeout 120 "$bin/palpate" serve "$work/ball.json" --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
+    timeout 120 "$bin/palpate" serve "${scene:-$work/ball.json}" --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
     pids="$pids $!"
     server_job=$!
     if ! await 60 grep -q '"port"' "$work/serve.out"; then

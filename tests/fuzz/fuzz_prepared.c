@@ -1,4 +1,6 @@
-/* Prepared meshes from any bytes. The checksum is set right first, so that the checks behind it are reached. */
+/* Prepared meshes from any bytes. The checksum is set right first, so that the checks behind it are reached. What is
+ * taken is used: the skin on its tetrahedra, the surface to make levels of. */
+#include "server/mesh/levels.h"
 #include "server/mesh/prepared.h"
 
 #include <stdlib.h>
@@ -30,6 +32,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         }
         free(out);
         free(frames);
+        pal_levels levels;
+        const pal_levels_options options = {.n_level = 2, .budget_byte = 16 << 20};
+        if (!pal_levels_make(&p.surface, &options, &levels, &note)) pal_levels_free(&levels);
         pal_prepared_free(&p);
     }
     free(copy);

@@ -1,1 +1,2 @@
 pal_fuzz(prepared LINK pal_mesh)
+pal_fuzz(cell_file LINK pal_mesh)

@@ -5,6 +5,7 @@
 set -u
 palpate=$(realpath "$1")
 problems=$(realpath "$(dirname "$0")/../../deploy/problems")
+here=$(realpath "$(dirname "$0")")
 most_kb=${2:-0}
 dir=$(mktemp -d) || exit 2
 trap 'rm -rf "$dir"' EXIT
@@ -41,6 +42,7 @@ code_is() { [ "$code" -eq "$1" ]; }
 lines_are() { [ "$(lines "$1")" -eq "$2" ]; }
 is_empty() { [ ! -s "$1" ]; }
 has() { grep -q -- "$2" "$1"; }
+hasnt() { ! grep -q -- "$2" "$1"; }
 no_such() { [ ! -e "$1" ]; }
 is_json() { # one object, nothing else; with node when it is there
     [ "$(lines "$1")" -eq 1 ] || return 1
@@ -335,6 +337,162 @@ run prepare box.obj -o x --model fem --element brick
 refused 2 "--element: is not hex8_bbar"
 run prepare box.obj -o x --model fen
 refused 2 "--model: is not springs or fem"
+end
+
+# ---- surfaces that adapt ----
+begin "prepare --shape writes hollow bodies whose levels have the counts of paper C"
+run prepare --shape stomach -o stomach --json
+check "exit code $code" code_is 0
+check "not one JSON object" is_json out
+check "levels of the stomach" has out '"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
+check "not closed" has out '"closed":true,"open_edges":0,'
+check "two files" test "$(ls -A stomach | wc -l)" -eq 2
+check "model" has stomach/scene.json '"adaptive_springs"'
+check "two openings held" test "$(grep -c '"box"' stomach/scene.json)" -eq 2
+run prepare --shape sphere -o sphere --levels 3
+check "exit code $code" code_is 0
+for level in "level 0: 114 nodes, 336 springs" "level 1: 450 nodes, 1344 springs" "level 2: 1794 nodes, 5376 springs"; do
+    check "no $level" has out "$level"
+done
+check "anchors not in space" has sphere/scene.json '"world"'
+run prepare --shape sheet -o sheet --thickness-mm 1
+check "exit code $code" code_is 0
+check "not open along 64 edges" has out "open along 64 edges"
+check "40 g of 1 mm" has out "40.0 g"
+check "border not held" has sheet/scene.json '"rim":.*true'
+run prepare --shape organ -o x --no-tetgen --triangles 4000 --json
+check "exit code $code of the organ" code_is 0
+check "the organ is no longer made of tetrahedra" has out '"tets":[1-9]'
+rm -rf x
+end
+
+begin "plan tells nodes and springs of every level, and what is active"
+run plan stomach
+check "exit code $code" code_is 0
+check "active" has out "stomach: a surface that adapts, 188 nodes and 558 springs of"
+check "finest" has out "level 1: 746 nodes, 2232 springs"
+for row in edge_spring shape_spring viscous refine rk4 surface_out; do check "no row $row" has out "$row"; done
+run plan stomach --json
+check "not one JSON object" is_json out
+check "levels" has out '"nodes":188,"springs":558,"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
+end
+
+begin "prepare --model adaptive takes a surface as it is, and says so"
+run prepare box.obj -o hollow --model adaptive --units mm --levels 3 --inflate 200
+check "exit code $code" code_is 0
+check "box" has out "level 0: 8 nodes, 18 springs"
+check "no pressure" has hollow/scene.json '"pressure_Pa":.*200'
+check "TetGen files" test "$(ls -A hollow | wc -l)" -eq 2
+run plan hollow
+check "exit code $code of plan" code_is 0
+check "no row inflate" has out "inflate"
+run prepare box.obj -o again_hollow --model adaptive --units mm --levels 3 --inflate 200 --quiet
+check "not the same files" cmp -s hollow/box.palmesh again_hollow/box.palmesh
+end
+
+begin "a surface that adapts is made as coarse as asked, and refines as far as real time allows"
+run prepare --shape stomach -o coarse --triangles 200 --json
+check "exit code $code" code_is 0
+check "not 200 triangles" has out '"triangles":200,'
+check "a limit that nobody needs" hasnt coarse/scene.json most_node
+run prepare --shape sphere -o deep --levels 6 --young-Pa 500000
+check "exit code $code with six levels" code_is 0
+check "the limit is not told" has out "at most [0-9]* nodes at a time"
+check "the limit is not in the scene" has deep/scene.json '"most_node"'
+check "too much for real time is not told" has out "too much for real time"
+run prepare --shape sphere -o again_deep --levels 6 --young-Pa 5000
+check "too much for real time with soft tissue" hasnt out "too much"
+run plan deep
+check "exit code $code of plan" code_is 0
+end
+
+begin "surfaces that cannot adapt are refused in one sentence, with the way out"
+{ cat box.obj; printf 'v 50 -50 0\nf 1 2 9\n'; } >fin.obj
+run prepare fin.obj -o x --model adaptive
+refused 1 "fin.obj: line 9: levels: 3 triangles (.*) share the edge of vertices 0 and 1"
+check "no way out" has err "prepare it as voxels"
+sed '$d' box.obj >open.obj
+run prepare open.obj -o x --model adaptive --inflate 100
+refused 1 "open.obj: line 9: pressure is asked for, but the surface has 4 open edges"
+run prepare open.obj -o x --model adaptive
+check "exit code $code for an open surface" code_is 0
+check "open edges are not told" has out "open along 4 edges"
+check "open edges are not held" has x/scene.json '"rim":.*true'
+rm -rf x
+printf 'v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n' >line.obj
+run prepare line.obj -o x --model adaptive
+refused 1 "line.obj: "
+{ cat box.obj; printf 'f 1 2 2\n'; } >twice.obj
+run prepare twice.obj -o x --model adaptive
+check "exit code $code with a face without area" code_is 0
+check "the face without area is not told" has out "1 degenerate"
+rm -rf x
+run prepare --shape stomach -o x --levels 10
+refused 1 "10 levels need .* MiB, the budget is 512 MiB"
+check "a folder was made" no_such x
+end
+
+begin "thresholds that are no numbers are refused with their entry"
+for number in -1 1e999; do
+    sed "s/\"effects\":.*\[{/\"effects\": [{\"name\": \"refine\", \"force_N\": $number}, {/" stomach/scene.json >stomach/bad.json
+    run plan stomach/bad.json
+    refused 1 "bodies\[0\].effects\[0\].*force_N: "
+done
+sed 's/"effects":.*\[{/"effects": [{"name": "refine", "force_N": NaN}, {/' stomach/scene.json >stomach/bad.json
+run plan stomach/bad.json
+refused 1 "stomach/bad.json: line [0-9]*: not JSON"
+sed 's/"levels":.*2,/"levels": 10,/' stomach/scene.json >stomach/bad.json
+run plan stomach/bad.json
+refused 1 "10 levels need .* MiB, the budget is 512 MiB"
+sed 's/"adaptive_springs",/"tet_springs"/; /"levels":/d; /"thickness_m":/d' stomach/scene.json >stomach/bad.json
+run plan stomach/bad.json
+refused 1 'stomach/bad.json: body "stomach" model: "tet_springs" works on tetrahedra'
+end
+
+begin "flags of one model are refused with another"
+run prepare box.obj -o x --levels 3
+refused 2 "--levels: only goes with --model adaptive"
+run prepare box.obj -o x --thickness-mm 3 --model fem
+refused 2 "--thickness-mm: only goes with --model adaptive"
+run prepare box.obj -o x --inflate 3
+refused 2 "--inflate: only goes with --model adaptive"
+run prepare box.obj -o x --model adaptive --resolution 12
+refused 2 "--resolution: model adaptive has no voxels"
+run prepare box.obj -o x --model adaptive --area-springs
+refused 2 "--area-springs: model adaptive"
+run prepare box.obj -o x --model adaptive --tetgen
+refused 2 "--tetgen: model adaptive has no tetrahedra"
+run prepare box.obj -o x --model adaptive --element tet4
+refused 2 "--element: only goes with --model fem"
+run prepare box.obj -o x --model adaptive --levels 11
+refused 2 "--levels: 11 is outside 1 .. 10"
+run prepare box.obj -o x --model adaptive --inflate nan
+refused 2 "--inflate"
+run prepare --shape cube -o x
+refused 2 "--shape: is not organ, stomach, sphere or sheet"
+run prepare --shape stomach --procedural -o x
+refused 2 "--procedural and --shape exclude each other"
+run prepare box.obj --shape stomach -o x
+refused 2 "either a file or --procedural"
+check "a folder was made" no_such x
+end
+
+begin "a stomach and a sphere of the shared models adapt"
+shared=${PAL_SHARED:-$here/../../../shared}/data
+if [ -e "$shared/stomach_188.obj" ] && [ -e "$shared/sphere_114.obj" ]; then
+    run prepare "$shared/stomach_188.obj" -o x --model adaptive --json
+    check "exit code $code" code_is 0
+    check "stomach" has out '"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
+    run prepare "$shared/sphere_114.obj" -o x --model adaptive --json
+    check "exit code $code" code_is 0
+    check "sphere" has out '"levels":\[{"nodes":114,"springs":336},{"nodes":450,"springs":1344}\]'
+    run prepare "$shared/dragon_11k.ply" -o y --model adaptive
+    refused 1 "dragon_11k.ply: byte [0-9]*: levels: 4 triangles"
+    check "a folder was made" no_such y
+    rm -rf x
+else
+    echo "  left out: $shared is not there"
+fi
 end
 
 # ---- wrong usage ----

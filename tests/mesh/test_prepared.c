@@ -195,6 +195,47 @@ static void a_file_that_is_not_there_is_an_io_error(void)
     CHECK(strstr(note.text, "/nonexistent/mesh"));
 }
 
+static void a_surface_alone_is_saved_and_loaded_to_the_bit(void)
+{
+    pal_surface ball = shape_ball(0.1, 16, 8, 0.2);
+    pal_prepared p, q;
+    pal_note note = {""};
+    uint8_t *a, *b;
+    size_t n_a, n_b;
+    ball.origin_m[2] = -3.25;
+    REQUIRE(!pal_prepared_surface(&ball, &p));
+    CHECK_INT(p.tets.n_node + p.tets.n_tet + p.hexes.n_hex + p.skin.n_vertex, 0);
+    /* the mean edge of a ball of 16 x 8 fields */
+    CHECK(p.tets.h_m > 0.02 && p.tets.h_m < 0.06);
+    REQUIRE(!pal_prepared_bytes(&p, &a, &n_a));
+    if (pal_prepared_parse("alone", a, n_a, &q, &note)) CHECK_FAIL("%s", note.text);
+    REQUIRE(!note.text[0] && !pal_prepared_bytes(&q, &b, &n_b));
+    CHECK(n_a == n_b && same(a, b, n_a));
+    CHECK_INT(q.surface.n_vertex, ball.n_vertex);
+    CHECK(same(q.surface.x, ball.x, (size_t)ball.n_vertex * 24));
+    CHECK(same(q.surface.tri, ball.tri, (size_t)ball.n_tri * 12));
+    CHECK_NEAR(q.surface.origin_m[2], -3.25, 0);
+    CHECK_NEAR(q.tets.origin_m[2], -3.25, 0);
+    CHECK_NEAR(q.tets.h_m, p.tets.h_m, 0);
+    CHECK_INT(q.tets.n_node + q.tets.n_tet + q.hexes.n_hex + q.skin.n_vertex + q.skin.n_frame, 0);
+    pal_prepared_free(&q);
+    free(b);
+    /* a corner out of range is seen without tetrahedra too */
+    int32_t bad = ball.n_vertex;
+    for (size_t at = 0; at + 4 <= n_a; at += 4)
+        if (same(a + at, ball.tri, 24)) {
+            memcpy(a + at, &bad, 4);
+            break;
+        }
+    uint64_t sum = pal_prepared_checksum(a, n_a);
+    memcpy(a + 24, &sum, 8);
+    CHECK_INT(pal_prepared_parse("alone", a, n_a, &q, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "a triangle's corner is out of range") != NULL);
+    free(a);
+    pal_prepared_free(&p);
+    pal_surface_free(&ball);
+}
+
 int main(void)
 {
     RUN(ball_becomes_a_sound_mesh);
@@ -202,6 +243,7 @@ int main(void)
     RUN(damaged_files_are_refused_with_their_place);
     RUN(fill_that_does_not_fit_is_refused);
     RUN(a_file_of_version_2_is_read_with_its_hexahedra);
+    RUN(a_surface_alone_is_saved_and_loaded_to_the_bit);
     RUN(a_file_that_is_not_there_is_an_io_error);
     return check_report();
 }

@@ -5,6 +5,7 @@
 #include "protocol/control.h"
 #include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
+#include "protocol/patch_codec.h"
 #include "server/net/mem_road.h"
 #include "tests/check.h"
 
@@ -23,6 +24,10 @@ typedef struct mem_client {
     pal_frame_decoder *decoder;
     float *position_m; /* [n_vertex][3] */
     bool mute;         /* does not acknowledge */
+    int n_patch;
+    pal_patch_head patch;
+    uint32_t *tri; /* triangles as patched [n_triangle][3] */
+    bool patched;  /* a patch has come and not yet its frame */
 } mem_client;
 
 static inline void mem_say(mem_client *c, const pal_control *message)
@@ -38,7 +43,8 @@ static inline void mem_text(mem_client *c, const char *text)
     pal_mem_send(c->peer, text, strlen(text), true);
 }
 
-static inline void mem_join(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool)
+static inline void mem_join_as(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool,
+                               bool patches)
 {
     pal_control join = {.type = PAL_CONTROL_JOIN};
     memset(c, 0, sizeof *c);
@@ -46,8 +52,14 @@ static inline void mem_join(mem_client *c, pal_transport *road, const char *name
     c->peer = pal_mem_connect(road, "");
     join.join.role = role;
     join.join.tool = tool;
+    join.join.patches = patches;
     snprintf(join.join.name, sizeof join.join.name, "%s", name);
     mem_say(c, &join);
+}
+
+static inline void mem_join(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool)
+{
+    mem_join_as(c, road, name, role, tool, false);
 }
 
 static inline void mem_load_asset(mem_client *c)
@@ -60,6 +72,8 @@ static inline void mem_load_asset(mem_client *c)
     CHECK_INT(pal_frame_decoder_create(c->asset, &c->decoder), 0);
     c->position_m = calloc(c->asset->order->n_vertex, 3 * sizeof(float));
     c->level = calloc(c->asset->order->n_vertex, 1);
+    c->tri = calloc(c->asset->n_triangle, 3 * sizeof *c->tri);
+    memcpy(c->tri, c->asset->triangle, (size_t)c->asset->n_triangle * 3 * sizeof *c->tri);
     pal_packet_drop(reply.body);
 }
 
@@ -76,14 +90,32 @@ static inline void mem_take_text(mem_client *c, const pal_packet *p)
     if (in.type == PAL_CONTROL_HELLO) mem_load_asset(c);
 }
 
+/* the places change, and a frame of that part must be next */
+static inline void mem_take_patch(mem_client *c, const pal_packet *p)
+{
+    c->n_patch++;
+    uint32_t n = c->asset ? c->asset->n_triangle : 0;
+    uint8_t *work = malloc(PAL_PATCH_WORK_BYTES(n) + 1);
+    uint64_t before = c->patch.revision;
+    if (c->patched || pal_patch_get(p->bytes, p->n_byte, n, n ? c->asset->order->n_vertex : 0, work, &c->patch, c->tri))
+        c->n_bad++;
+    else if (c->patch.revision <= before || c->patch.part != 0 || c->patch.epoch != 1)
+        c->n_bad++;
+    c->patched = true;
+    free(work);
+}
+
 static inline void mem_take_binary(mem_client *c, const pal_packet *p)
 {
     pal_wire_head head;
     int refusal = pal_wire_get_head(p->bytes, p->n_byte, &head);
-    if (refusal) {
+    if (refusal || (c->patched && head.kind != PAL_WIRE_FRAME && head.kind != PAL_WIRE_HAPTIC)) {
         c->n_bad++;
+    } else if (head.kind == PAL_WIRE_PATCH) {
+        mem_take_patch(c, p);
     } else if (head.kind == PAL_WIRE_FRAME) {
         c->n_frame++;
+        c->patched = false;
         if (!c->decoder || pal_frame_get(c->decoder, p->bytes, p->n_byte, &c->frame, c->position_m)) c->n_bad++;
     } else if (head.kind == PAL_WIRE_TOOLS) {
         c->n_tools++;
@@ -130,6 +162,7 @@ static inline void mem_end(mem_client *c)
     pal_asset_destroy(c->asset);
     free(c->position_m);
     free(c->level);
+    free(c->tri);
     memset(c, 0, sizeof *c);
 }
 #endif

@@ -5,6 +5,7 @@
 #define TESTS_PROTOCOL_GOLDEN_H
 #include "protocol/control.h"
 #include "protocol/field_codec.h"
+#include "protocol/patch_codec.h"
 #include "protocol/wire.h"
 #include "tests/protocol/shapes.h"
 
@@ -160,6 +161,25 @@ static inline void golden_accuracy(pal_wire_hello *h)
     snprintf(h->accuracy, sizeof h->accuracy, "2.1 %% RMS of finite elements \"hex8\" \xC2\xB1");
 }
 
+/* changed places of the golden asset's table of 108 triangles: emptied, filled, turned; ends of the table */
+enum { GOLDEN_PATCH_PLACES = 8 };
+static const uint32_t golden_place[GOLDEN_PATCH_PLACES] = {0, 1, 5, 6, 7, 50, 51, 107};
+static const uint32_t golden_corner[GOLDEN_PATCH_PLACES][3] = {{0, 0, 0},    {3, 2, 1},    {55, 54, 0},  {0, 0, 0},
+                                                               {17, 40, 23}, {23, 40, 41}, {41, 17, 23}, {55, 1, 30}};
+
+static inline pal_patch_head golden_patch(void)
+{
+    return (pal_patch_head){.part = 2, .epoch = 5, .n_place = GOLDEN_PATCH_PLACES, .revision = 4503599627370497};
+}
+
+/* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
+enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 4 };
+static inline pal_control_type golden_line_type(int line)
+{
+    static const pal_control_type more[] = {PAL_CONTROL_HELLO, PAL_CONTROL_HELLO, PAL_CONTROL_STATUS, PAL_CONTROL_JOIN};
+    return line < PAL_CONTROL_COUNT ? (pal_control_type)line : more[line - PAL_CONTROL_COUNT];
+}
+
 static inline void golden_control(pal_control_type type, pal_control *c)
 {
     memset(c, 0, sizeof *c);
@@ -201,7 +221,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->problem = (pal_wire_problem){"tool_taken", "tool 0 is held by Ada"};
         break;
     case PAL_CONTROL_JOIN:
-        c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY};
+        c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY, false};
         break;
     case PAL_CONTROL_COMMAND:
         c->order = (pal_wire_order){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
@@ -219,5 +239,18 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     default:
         break;
     }
+}
+
+static inline void golden_line(int line, pal_control *c)
+{
+    golden_control(golden_line_type(line), c);
+    if (line == PAL_CONTROL_COUNT) golden_accuracy(&c->hello);
+    if (line == PAL_CONTROL_COUNT + 1) c->hello.part[1].adapts = true;
+    if (line == PAL_CONTROL_COUNT + 2) {
+        c->status.n_active = 2;
+        c->status.active[0] = (pal_wire_active){0, 133, 385, 450, 1344};
+        c->status.active[1] = (pal_wire_active){3, 188, 558, 746, 2232};
+    }
+    if (line == PAL_CONTROL_COUNT + 3) c->join.patches = true;
 }
 #endif

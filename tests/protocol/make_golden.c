@@ -139,6 +139,34 @@ static void make_field(void)
     fprintf(expected, "]},\n");
 }
 
+/* relative to the table of the golden asset, then that table as it results */
+static void make_patch(const pal_asset *asset)
+{
+    static uint8_t work[PAL_PATCH_WORK_BYTES(1024)], bytes[4096];
+    size_t n_corner = 3 * (size_t)asset->n_triangle, n = 0;
+    uint32_t *table = malloc(n_corner * sizeof *table), *again = malloc(n_corner * sizeof *again);
+    memcpy(table, asset->triangle, n_corner * sizeof *table);
+    memcpy(again, asset->triangle, n_corner * sizeof *again);
+    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++)
+        memcpy(table + 3 * (size_t)golden_place[i], golden_corner[i], sizeof golden_corner[i]);
+    pal_patch_head head = golden_patch();
+    need(!pal_patch_put(golden_place, table, &head, work, bytes, sizeof bytes, &n), "patch");
+    need(!pal_patch_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &head, again), "patch back");
+    need(!memcmp(table, again, n_corner * sizeof *table), "patched table");
+    save("patch.bin", bytes, n);
+    fprintf(expected, "\"patch\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"places\":[", head.part,
+            head.epoch, (unsigned long long)head.revision, head.n_place);
+    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) fprintf(expected, "%s%u", i ? "," : "", golden_place[i]);
+    fprintf(expected, "],\"corners\":[");
+    for (int i = 0; i < 3 * GOLDEN_PATCH_PLACES; i++)
+        fprintf(expected, "%s%u", i ? "," : "", golden_corner[i / 3][i % 3]);
+    fprintf(expected, "],\n\"triangles\":[");
+    for (size_t i = 0; i < n_corner; i++) fprintf(expected, "%s%u", i ? "," : "", table[i]);
+    fprintf(expected, "]},\n");
+    free(table);
+    free(again);
+}
+
 static void make_frame(const pal_asset *asset, pal_frame_encoder *e, int index, bool last)
 {
     static const float affine[12] = {0.8f, -0.6f, 0, 0.5f, 0.6f, 0.8f, 0, -0.25f, 0, 0, 1, 0.125f};
@@ -162,7 +190,8 @@ static void make_frame(const pal_asset *asset, pal_frame_encoder *e, int index, 
                                123456789012,
                                golden_motion[index].error_m,
                                given,
-                               golden_motion[index].affine ? affine : NULL};
+                               golden_motion[index].affine ? affine : NULL,
+                               NULL};
     pal_frame_result result;
     pal_frame_head head;
     pal_frame_decoder *d = NULL;
@@ -210,6 +239,7 @@ static void make_asset_and_frames(void)
     const pal_asset asset = {s.n_triangle, s.rest_m, s.triangle, order};
     for (int i = 0; i < GOLDEN_FRAMES; i++) make_frame(&asset, e, i, i + 1 == GOLDEN_FRAMES);
     fprintf(expected, "],\n");
+    make_patch(&asset);
     pal_frame_encoder_destroy(e);
     pal_frame_order_destroy(order);
     free(bytes);
@@ -223,12 +253,10 @@ static void make_control(void)
     size_t n_all = 0, n_byte;
     static pal_control c;
     fprintf(expected, "\"control\":[\n");
-    /* the last line is a hello with a text that servers of before did not know */
-    for (int type = 0; type <= PAL_CONTROL_COUNT; type++) {
-        golden_control(type < PAL_CONTROL_COUNT ? (pal_control_type)type : PAL_CONTROL_HELLO, &c);
-        if (type == PAL_CONTROL_COUNT) golden_accuracy(&c.hello);
+    for (int line = 0; line < GOLDEN_CONTROL_LINES; line++) {
+        golden_line(line, &c);
         need(!pal_control_put(text, sizeof text, &c, &n_byte), pal_control_name(c.type));
-        fprintf(expected, "%s%s", type ? ",\n" : "", text);
+        fprintf(expected, "%s%s", line ? ",\n" : "", text);
         need(n_all + n_byte + 1 <= sizeof all, "control room");
         memcpy(all + n_all, text, n_byte);
         all[n_all + n_byte] = '\n';

@@ -105,4 +105,53 @@ static inline void shape_move(const shape *s, shape_motion motion, int k, float 
         for (size_t c = 0; c < 3; c++) position_m[3 * i + c] = (float)x[c];
     }
 }
+
+/* a shape with the midpoints of its edges, level by level; vertices of the coarse one keep their numbers */
+typedef struct shape_family {
+    shape fine;
+    uint32_t n_coarse;
+    uint32_t *parent; /* of vertex n_coarse + i [..][2] */
+} shape_family;
+
+static inline uint32_t shape_midpoint(shape_family *f, uint32_t *table, uint32_t n_before, uint32_t a, uint32_t b)
+{
+    uint32_t *slot = &table[(size_t)(a < b ? a : b) * n_before + (a < b ? b : a)];
+    if (*slot == 0) {
+        uint32_t v = f->fine.n_vertex++;
+        float *x = f->fine.rest_m;
+        for (size_t c = 0; c < 3; c++) x[3 * (size_t)v + c] = 0.5f * (x[3 * (size_t)a + c] + x[3 * (size_t)b + c]);
+        f->parent[2 * (size_t)(v - f->n_coarse)] = a;
+        f->parent[2 * (size_t)(v - f->n_coarse) + 1] = b;
+        *slot = v;
+    }
+    return *slot;
+}
+
+static inline shape_family shape_family_create(int fineness, int n_level)
+{
+    shape s = shape_create(fineness);
+    size_t most = 4 * (size_t)s.n_vertex;
+    for (int l = 1; l < n_level; l++) most *= 4;
+    shape_family f = {{s.n_vertex, s.n_triangle, malloc(3 * most * sizeof(float)), malloc(6 * most * sizeof(uint32_t))},
+                      s.n_vertex,
+                      malloc(2 * most * sizeof(uint32_t))};
+    memcpy(f.fine.rest_m, s.rest_m, 3 * (size_t)s.n_vertex * sizeof(float));
+    memcpy(f.fine.triangle, s.triangle, 3 * (size_t)s.n_triangle * sizeof(uint32_t));
+    for (int l = 1; l < n_level; l++) {
+        uint32_t n_before = f.fine.n_vertex, n_tri = f.fine.n_triangle, *t = f.fine.triangle;
+        uint32_t *table = calloc((size_t)n_before * n_before, sizeof *table);
+        for (uint32_t i = n_tri; i-- > 0;) {
+            uint32_t v[3], m[3];
+            memcpy(v, t + 3 * (size_t)i, sizeof v);
+            for (int c = 0; c < 3; c++) m[c] = shape_midpoint(&f, table, n_before, v[c], v[(c + 1) % 3]);
+            const uint32_t four[12] = {v[0], m[0], m[2], m[0], v[1], m[1], m[2], m[1], v[2], m[0], m[1], m[2]};
+            memcpy(t + 12 * (size_t)i, four, sizeof four);
+        }
+        f.fine.n_triangle = 4 * n_tri;
+        free(table);
+    }
+    free(s.rest_m);
+    free(s.triangle);
+    return f;
+}
 #endif

@@ -22,6 +22,9 @@ static void reads_what_a_client_says(void)
     CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
     CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\"}"), 0);
     CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
+    CHECK(!c.join.patches);
+    CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\",\"patches\":true}"), 0);
+    CHECK(c.join.patches);
     CHECK_INT(from_client("{\"type\":\"command\",\"verb\":\"pause\"}"), 0);
     CHECK_TEXT(c.order.verb, "pause");
     CHECK_INT(c.order.n_arg, 0);
@@ -64,6 +67,7 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":\"join\",\"name\":\"\xC3\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
         {"{\"type\":\"join\",\"name\":\"\xED\xA0\x80\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
         {"{\"type\":\"join\",\"name\":\"\xC0\xAF\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"join\",\"name\":\"x\",\"role\":\"viewer\",\"patches\":1}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"take\"}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"take\",\"tool\":null}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"take\",\"tool\":32}", PAL_REFUSAL_RANGE},
@@ -131,9 +135,11 @@ static void reads_messages_of_before_fields(void)
         "\"skipped\":0,\"late\":0,\"refused\":0}";
     CHECK_INT(pal_control_get(hello, sizeof hello - 1, true, &c), 0);
     CHECK_INT(c.hello.part[0].n_field, 0);
+    CHECK(!c.hello.part[0].adapts);
     CHECK_TEXT(c.hello.accuracy, "");
     CHECK_INT(pal_control_get(status, sizeof status - 1, true, &c), 0);
     CHECK_INT(c.status.n_row_name, 0);
+    CHECK_INT(c.status.n_active, 0);
 }
 
 /* an empty text is as good as none, and is not written */
@@ -207,6 +213,20 @@ static void largest_messages_fit_their_limit(void)
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
     CHECK_INT(again.hello.n_row, PAL_WIRE_ROW_MAX);
     CHECK_TEXT(again.hello.tool[31].name, full.hello.tool[31].name);
+
+    memset(&full, 0, sizeof full);
+    golden_control(PAL_CONTROL_STATUS, &full);
+    full.status.n_active = PAL_WIRE_PART_MAX;
+    for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++)
+        full.status.active[i] = (pal_wire_active){i, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
+    full.status.n_row = full.status.n_row_name = PAL_WIRE_ROW_MAX;
+    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) {
+        full.status.row_ms[i] = 1 / 3.0;
+        memset(full.status.row[i], '"', PAL_WIRE_NAME_BYTES - 1);
+    }
+    CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
+    CHECK_INT(pal_control_get(text, n, true, &again), 0);
+    CHECK(again.status.n_active == PAL_WIRE_PART_MAX && again.status.active[15].n_all_spring == UINT32_MAX);
 }
 
 static void writer_refuses_what_the_reader_would(void)

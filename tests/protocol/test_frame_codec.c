@@ -104,6 +104,156 @@ static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
     rig_release(&r);
 }
 
+/* hides a share of the vertices and makes their positions nonsense */
+static void hide(rig *r, uint64_t *random, double share, uint8_t *hidden)
+{
+    for (uint32_t i = 0; i < r->s.n_vertex; i++) {
+        hidden[i] = (shape_random(random) + 1) / 2 < share;
+        for (size_t c = 0; c < 3 && hidden[i]; c++) r->given[3 * (size_t)i + c] = c ? NAN : 1e30f;
+    }
+}
+
+static void hidden_vertices_may_stand_anywhere_and_the_bound_holds_for_the_others(void)
+{
+    static const float turned[12] = {0, -1, 0, 0.5f, 1, 0, 0, 0, 0, 0, 1, 0.1f};
+    rig r;
+    uint64_t random = 3;
+    REQUIRE(rig_create(&r, 16));
+    uint8_t *hidden = malloc(r.s.n_vertex);
+    pal_frame_given given = given_of(&r, 5e-5);
+    given.hidden = hidden;
+    for (int motion = 0; motion < MOTION_COUNT; motion++)
+        for (int k = 0; k < 12; k++) {
+            pal_frame_result result;
+            pal_frame_head head;
+            shape_move(&r.s, (shape_motion)motion, k * 8, r.given);
+            hide(&r, &random, k / 11.0, hidden);
+            given.affine = k % 3 == 2 ? turned : NULL;
+            REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+            REQUIRE(pal_frame_get(r.d, r.bytes, result.n_byte, &head, r.shown) == 0);
+            for (uint32_t i = 0; i < r.s.n_vertex; i++)
+                for (size_t c = 0; c < 3; c++)
+                    if (hidden[i])
+                        CHECK(isfinite(r.shown[3 * (size_t)i + c]));
+                    else
+                        CHECK_LE(fabs((double)r.given[3 * (size_t)i + c] - (double)r.shown[3 * (size_t)i + c]),
+                                 result.error_m);
+            if (k == 11) CHECK_LE((double)result.n_byte, 150); /* nothing is seen, nothing is said */
+        }
+    /* only what is seen must be a number */
+    memset(hidden, 0, r.s.n_vertex);
+    shape_move(&r.s, MOTION_BEND, 0, r.given);
+    pal_frame_result result;
+    r.given[4] = NAN;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), PAL_REFUSAL_NAN);
+    hidden[1] = 1;
+    CHECK_INT(pal_frame_put(r.e, &given, r.bytes, r.cap, &result), 0);
+    free(hidden);
+    rig_release(&r);
+}
+
+static void a_move_of_hidden_vertices_alone_is_no_change(void)
+{
+    rig r;
+    REQUIRE(rig_create(&r, 8));
+    uint8_t *hidden = calloc(r.s.n_vertex, 1);
+    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_result result;
+    given.hidden = hidden;
+    hidden[5] = hidden[77] = 1;
+    shape_move(&r.s, MOTION_BEND, 20, r.given);
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0 && result.changed);
+    for (int c = 0; c < 3; c++) r.given[15 + c] = 3, r.given[231 + c] = -0.5f;
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    CHECK(!result.changed);
+    r.given[18] += 0.001f;
+    REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
+    CHECK(result.changed);
+    free(hidden);
+    rig_release(&r);
+}
+
+/* a predictor that extrapolates along a line, hidden all the way: X stays in the range that decoders take */
+static void chains_of_hidden_extrapolations_stay_in_range(void)
+{
+    enum { N = 64 };
+    uint32_t vertex_of[N], neighbour[4 * N] = {0}, level[N + 1];
+    int16_t weight[4 * N] = {0};
+    float rest[3 * N] = {0}, given_m[3 * N] = {0}, shown[3 * N];
+    uint8_t hidden[N], *bytes = malloc(pal_frame_bound(N));
+    for (uint32_t i = 0; i < N; i++) {
+        vertex_of[i] = level[i] = i;
+        hidden[i] = i > 1;
+        if (i < 2) continue;
+        neighbour[4 * i] = i - 1, neighbour[4 * i + 1] = i - 2;
+        weight[4 * i] = 6100, weight[4 * i + 1] = -2004;
+    }
+    level[N] = N;
+    pal_frame_order order = {N, N, level, vertex_of, neighbour, weight};
+    const pal_asset asset = {0, rest, NULL, &order};
+    pal_frame_encoder *e = NULL;
+    pal_frame_decoder *d = NULL;
+    pal_frame_head head;
+    pal_frame_result result;
+    given_m[0] = -1;
+    given_m[3] = 1;
+    REQUIRE(bytes && !pal_frame_encoder_create(rest, &order, &e) && !pal_frame_decoder_create(&asset, &d));
+    const pal_frame_given given = {.error_m = 1e-6, .position_m = given_m, .hidden = hidden};
+    REQUIRE(pal_frame_put(e, &given, bytes, pal_frame_bound(N), &result) == 0);
+    CHECK_INT(pal_frame_get(d, bytes, result.n_byte, &head, shown), 0);
+    CHECK_NEAR((double)shown[3], 1, result.error_m);
+    CHECK_NEAR((double)shown[3 * N - 3], 1, 1e-3); /* 1 is the end of the range, the prediction lies beyond */
+    pal_frame_encoder_destroy(e);
+    pal_frame_decoder_destroy(d);
+    free(bytes);
+}
+
+/* the coarse vertices bend, every midpoint is the mean of its parents: hidden or not, the fine ones cost next to
+ * nothing, and hidden ones come out where they would be */
+static void families_predict_what_is_linear_on_coarse_triangles(void)
+{
+    shape s = shape_create(6);
+    shape_family f = shape_family_create(6, 3);
+    const uint32_t n = f.fine.n_vertex;
+    pal_frame_order *order = NULL;
+    pal_frame_encoder *e = NULL;
+    pal_frame_decoder *d = NULL;
+    pal_frame_result result, seen;
+    pal_frame_head head;
+    float *given_m = malloc(3 * (size_t)n * sizeof(float)), *shown = malloc(3 * (size_t)n * sizeof(float));
+    uint8_t *bytes = malloc(pal_frame_bound(n)), *hidden = calloc(n, 1);
+    REQUIRE(!pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &order));
+    const pal_asset asset = {0, f.fine.rest_m, NULL, order};
+    REQUIRE(!pal_frame_encoder_create(f.fine.rest_m, order, &e) && !pal_frame_decoder_create(&asset, &d));
+    shape_move(&s, MOTION_BEND, 30, given_m);
+    for (uint32_t i = f.n_coarse; i < n; i++) {
+        const uint32_t *p = f.parent + 2 * (size_t)(i - f.n_coarse);
+        for (size_t c = 0; c < 3; c++)
+            given_m[3 * (size_t)i + c] = 0.5f * (given_m[3 * (size_t)p[0] + c] + given_m[3 * (size_t)p[1] + c]);
+    }
+    pal_frame_given given = {.error_m = 5e-5, .position_m = given_m};
+    REQUIRE(pal_frame_put(e, &given, bytes, pal_frame_bound(n), &seen) == 0);
+    for (uint32_t i = f.n_coarse; i < n; i++) hidden[i] = 1;
+    given.hidden = hidden;
+    REQUIRE(pal_frame_put(e, &given, bytes, pal_frame_bound(n), &result) == 0);
+    REQUIRE(pal_frame_get(d, bytes, result.n_byte, &head, shown) == 0);
+    printf("  %u coarse of %u vertices: %zu bytes, all shown %zu\n", f.n_coarse, n, result.n_byte, seen.n_byte);
+    CHECK_LE((double)seen.n_byte, 1.6 * (double)result.n_byte);
+    double worst = 0;
+    for (size_t i = 0; i < 3 * (size_t)n; i++) worst = fmax(worst, fabs((double)shown[i] - (double)given_m[i]));
+    CHECK_LE(worst, 1.2 * result.error_m);
+    pal_frame_encoder_destroy(e);
+    pal_frame_decoder_destroy(d);
+    pal_frame_order_destroy(order);
+    shape_release(&f.fine);
+    shape_release(&s);
+    free(f.parent);
+    free(given_m);
+    free(shown);
+    free(bytes);
+    free(hidden);
+}
+
 /* encodes motion k and decodes it with a new decoder: frames need no history */
 static void any_frame_serves_a_client_that_joins(void)
 {
@@ -363,6 +513,10 @@ int main(void)
 {
     RUN(error_stays_within_its_bound_in_every_frame);
     RUN(live_deformation_costs_less_than_half_a_byte_per_vertex);
+    RUN(hidden_vertices_may_stand_anywhere_and_the_bound_holds_for_the_others);
+    RUN(a_move_of_hidden_vertices_alone_is_no_change);
+    RUN(chains_of_hidden_extrapolations_stay_in_range);
+    RUN(families_predict_what_is_linear_on_coarse_triangles);
     RUN(any_frame_serves_a_client_that_joins);
     RUN(part_at_rest_is_reported_unchanged);
     RUN(refuses_positions_that_are_none_and_goes_on);

@@ -3,12 +3,9 @@
 #include "tests/check.h"
 #include "tests/protocol/shapes.h"
 
-/* creates, checks what a decoder trusts, and that each vertex is in a level behind those of its neighbours */
-static pal_frame_order *made(const float *rest, uint32_t n, const uint32_t *triangle, uint32_t n_triangle)
+/* what a decoder trusts, and that each vertex is in a level behind those of its neighbours */
+static pal_frame_order *checked(pal_frame_order *o, uint32_t n)
 {
-    pal_frame_order *o = NULL;
-    CHECK_INT(pal_frame_order_create(rest, n, triangle, n_triangle, &o), 0);
-    if (!o) return NULL;
     CHECK_INT(pal_frame_order_check(o), 0);
     CHECK_INT(o->n_vertex, n);
     CHECK_INT(o->level_begin[0], 0);
@@ -19,6 +16,13 @@ static pal_frame_order *made(const float *rest, uint32_t n, const uint32_t *tria
             for (int j = 0; j < 4; j++) late += o->neighbour[4 * i + (uint32_t)j] >= o->level_begin[level];
     CHECK_INT(late, 0);
     return o;
+}
+
+static pal_frame_order *made(const float *rest, uint32_t n, const uint32_t *triangle, uint32_t n_triangle)
+{
+    pal_frame_order *o = NULL;
+    CHECK_INT(pal_frame_order_create(rest, n, triangle, n_triangle, &o), 0);
+    return o ? checked(o, n) : NULL;
 }
 
 static void closed_surface_has_about_21_levels_and_a_small_base(void)
@@ -123,6 +127,51 @@ static void refuses_what_is_no_surface(void)
     CHECK(o == NULL);
 }
 
+static void midpoints_follow_the_coarse_order_as_the_mean_of_their_parents(void)
+{
+    shape s = shape_create(4);
+    shape_family f = shape_family_create(4, 4);
+    const uint32_t n = f.fine.n_vertex;
+    pal_frame_order *coarse = made(s.rest_m, s.n_vertex, s.triangle, s.n_triangle), *o = NULL;
+    REQUIRE(coarse && s.n_vertex == f.n_coarse);
+    REQUIRE(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o) == 0);
+    checked(o, n);
+    CHECK_INT(o->n_level, coarse->n_level + 3);
+    CHECK(memcmp(o->vertex_of, coarse->vertex_of, f.n_coarse * sizeof *o->vertex_of) == 0);
+    CHECK(memcmp(o->neighbour, coarse->neighbour, 4 * (size_t)f.n_coarse * sizeof *o->neighbour) == 0);
+    uint32_t wrong = 0;
+    for (uint32_t i = f.n_coarse; i < n; i++) {
+        const uint32_t *p = f.parent + 2 * (size_t)(i - f.n_coarse);
+        const int16_t *w = o->weight + 4 * (size_t)i;
+        wrong += o->vertex_of[i] != i || w[0] != 2048 || w[1] != 2048 || w[2] || w[3];
+        for (uint32_t k = 0; k < 2; k++) wrong += o->vertex_of[o->neighbour[4 * i + k]] != p[k];
+    }
+    CHECK_INT(wrong, 0);
+    pal_frame_order_destroy(o);
+    /* nothing but coarse vertices is the ordinary order */
+    REQUIRE(pal_frame_order_families(s.rest_m, s.n_vertex, s.n_vertex, NULL, s.triangle, s.n_triangle, &o) == 0);
+    checked(o, s.n_vertex);
+    CHECK_INT(o->n_level, coarse->n_level);
+    pal_frame_order_destroy(o);
+    pal_frame_order_destroy(coarse);
+    /* what is no family */
+    o = NULL;
+    f.parent[1] = f.n_coarse;
+    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
+              PAL_REFUSAL_RANGE);
+    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, n + 1, f.parent, s.triangle, s.n_triangle, &o),
+              PAL_REFUSAL_COUNT);
+    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, 0, f.parent, s.triangle, s.n_triangle, &o), PAL_REFUSAL_COUNT);
+    f.parent[1] = 0;
+    f.fine.rest_m[3 * (size_t)n - 1] = NAN;
+    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
+              PAL_REFUSAL_NAN);
+    CHECK(o == NULL);
+    free(f.parent);
+    shape_release(&f.fine);
+    shape_release(&s);
+}
+
 static void check_finds_every_broken_table(void)
 {
     shape s = shape_create(4);
@@ -189,6 +238,7 @@ int main(void)
     RUN(works_for_tiny_loose_and_degenerate_surfaces);
     RUN(works_for_many_components_and_hubs);
     RUN(refuses_what_is_no_surface);
+    RUN(midpoints_follow_the_coarse_order_as_the_mean_of_their_parents);
     RUN(check_finds_every_broken_table);
     RUN(real_organs_get_a_valid_order);
     return check_report();

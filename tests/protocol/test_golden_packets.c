@@ -163,6 +163,30 @@ static void field_is_read_and_written_as_committed(void)
     free(bytes);
 }
 
+static void patch_is_read_and_written_as_committed(void)
+{
+    static uint8_t work[PAL_PATCH_WORK_BYTES(1024)], again[4096];
+    size_t n = 0, n_asset = 0, n_again = 0;
+    uint8_t *bytes = load("patch.bin", &n), *file = load("asset.bin", &n_asset);
+    pal_asset *asset = NULL;
+    pal_patch_head h, wanted = golden_patch();
+    REQUIRE(bytes && file && pal_asset_decode(file, n_asset, &asset) == 0);
+    REQUIRE(pal_patch_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &h, asset->triangle) == 0);
+    const cJSON *e = cJSON_GetObjectItem(expected, "patch");
+    CHECK_NEAR(h.part, number(e, "part"), 0);
+    CHECK_NEAR(h.epoch, number(e, "epoch"), 0);
+    CHECK_NEAR((double)h.revision, number(e, "revision"), 0);
+    CHECK_INT(h.n_place, number(e, "n"));
+    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) CHECK_INT(golden_place[i], element(e, "places", i));
+    for (int i = 0; i < 3 * (int)asset->n_triangle; i++) CHECK_INT(asset->triangle[i], element(e, "triangles", i));
+    CHECK_INT(pal_patch_put(golden_place, asset->triangle, &wanted, work, again, sizeof again, &n_again), 0);
+    CHECK_INT(n_again, n);
+    CHECK(memcmp(again, bytes, n) == 0);
+    pal_asset_destroy(asset);
+    free(bytes);
+    free(file);
+}
+
 static void asset_and_frames_are_read_to_the_committed_numbers(void)
 {
     size_t n = 0;
@@ -218,19 +242,21 @@ static void control_lines_are_read_and_written_as_committed(void)
     size_t n = 0, n_again = 0;
     char *bytes = (char *)load("control.jsonl", &n), *line = bytes;
     REQUIRE(bytes);
-    for (int type = 0; type <= PAL_CONTROL_COUNT; type++) {
-        const pal_control_type kind = type < PAL_CONTROL_COUNT ? (pal_control_type)type : PAL_CONTROL_HELLO;
+    for (int at = 0; at < GOLDEN_CONTROL_LINES; at++) {
+        const pal_control_type kind = golden_line_type(at);
         char *end = strchr(line, '\n');
         REQUIRE(end);
         *end = 0;
         CHECK_INT(pal_control_get(line, strlen(line), kind < PAL_CONTROL_JOIN, &c), 0);
         CHECK_INT(c.type, kind);
-        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.accuracy[0] != 0, type == PAL_CONTROL_COUNT);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.accuracy[0] != 0, at == PAL_CONTROL_COUNT);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].adapts, at == PAL_CONTROL_COUNT + 1);
+        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
+        if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.patches, at == PAL_CONTROL_COUNT + 3);
         /* what was read writes the same text, and so does the content itself */
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
         CHECK_TEXT(again, line);
-        golden_control(kind, &c);
-        if (type == PAL_CONTROL_COUNT) golden_accuracy(&c.hello);
+        golden_line(at, &c);
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
         CHECK_TEXT(again, line);
         line = end + 1;
@@ -247,6 +273,7 @@ int main(void)
     RUN(tools_are_read_and_written_as_committed);
     RUN(haptic_model_is_read_and_written_as_committed);
     RUN(field_is_read_and_written_as_committed);
+    RUN(patch_is_read_and_written_as_committed);
     RUN(asset_and_frames_are_read_to_the_committed_numbers);
     RUN(control_lines_are_read_and_written_as_committed);
     cJSON_Delete(expected);

@@ -51,14 +51,14 @@ function readHead(bytes) {
  * u32 values from four byte planes.
  * @param {Uint8Array} raw @param {number} at @param {number} n
  */
-function planes(raw, at, n) {
+export function planes(raw, at, n) {
   const out = new Uint32Array(n);
   for (let i = 0; i < n; i++) out[i] = raw[at + i] | (raw[at + n + i] << 8) | (raw[at + 2 * n + i] << 16) | (raw[at + 3 * n + i] << 24);
   return out;
 }
 
 /** @param {number} v folded difference */
-const unfold = (v) => (v >>> 1) ^ -(v & 1);
+export const unfold = (v) => (v >>> 1) ^ -(v & 1);
 
 /** @param {Asset} asset @param {number} n */
 function check(asset, n) {

@@ -1,8 +1,10 @@
-// One shown part: geometry that takes decoded frames, tissue material, fields as colours, picking.
+// One shown part: geometry that takes decoded frames and, of a part that adapts, new triangles; tissue material, fields as
+// colours, lines of the triangles, picking. Only vertices of the triangles shown count: positions of others mean nothing.
 import { COLOURS } from "./legend.js";
 import * as THREE from "./three.js";
 
 const BLEND_MS = 100; // from one set of values to the next, which come ten times a second
+const LINES = { color: 0xf2dccb, opacity: 0.36 };
 const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 }, MATT = { clearcoat: 0.06, sheen: 0.02, specularIntensity: 0.3 };
 
 /**
@@ -82,10 +84,12 @@ export class BodyMesh {
   /**
    * @param {THREE.Scene} scene
    * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
+   * @param {Uint32Array | null} visible the vertices in the triangles, null: all
    */
-  constructor(scene, rest, triangles) {
+  constructor(scene, rest, triangles, visible) {
     this.scene = scene;
     this.rest = rest;
+    this.visible = visible;
     /** @type {MapUniforms} */
     this.uniforms = {
       mix: { value: 0 }, range: { value: new THREE.Vector2(0, 1) }, older: { value: new THREE.Vector2() }, newer: { value: new THREE.Vector2() },
@@ -105,19 +109,84 @@ export class BodyMesh {
     this.newer = new THREE.BufferAttribute(new Uint8Array(rest.length / 3), 1, true).setUsage(THREE.DynamicDrawUsage);
     this.geometry.setAttribute("older", this.older);
     this.geometry.setAttribute("newer", this.newer);
-    this.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
-    this.geometry.computeBoundingSphere();
+    this.nCorner = 0;
+    this.takeTriangles(triangles);
     this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.uniforms));
     if (isClosed(rest, triangles)) this.mesh.material.side = THREE.FrontSide;
     this.mesh.frustumCulled = false;
+    // the body lies a little behind its lines
+    Object.assign(this.mesh.material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+    /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> | null} */
+    this.lines = null;
     scene.add(this.mesh);
+  }
+
+  nVisible() {
+    return this.visible ? this.visible.length : this.rest.length / 3;
   }
 
   /** does a frame lie within `least` m of what is shown, in every coordinate? @param {Float32Array} positions @param {number} least */
   near(positions, least) {
-    const x = this.position.array;
-    for (let i = 0; i < x.length; i++) if (Math.abs(x[i] - positions[i]) > least) return false;
+    const x = this.position.array, visible = this.visible, n = this.nVisible();
+    for (let k = 0; k < n; k++) {
+      const i = 3 * (visible ? visible[k] : k);
+      if (Math.abs(x[i] - positions[i]) > least || Math.abs(x[i + 1] - positions[i + 1]) > least || Math.abs(x[i + 2] - positions[i + 2]) > least) return false;
+    }
     return this.shown;
+  }
+
+  /** into an index with room to grow, so that a change moves no more bytes than it must @param {Uint32Array} triangles */
+  takeTriangles(triangles) {
+    const index = this.geometry.index;
+    if (index && triangles.length <= index.array.length) {
+      index.array.set(triangles);
+      index.clearUpdateRanges();
+      index.addUpdateRange(0, triangles.length);
+      index.needsUpdate = true;
+    } else {
+      const room = new Uint32Array(index ? Math.max(triangles.length, 2 * index.array.length) : triangles.length);
+      room.set(triangles);
+      // what the renderer made of the former index goes with it
+      if (index) this.geometry.dispose();
+      this.geometry.setIndex(new THREE.BufferAttribute(room, 1).setUsage(index ? THREE.DynamicDrawUsage : THREE.StaticDrawUsage));
+    }
+    this.geometry.setDrawRange(0, triangles.length);
+    this.nCorner = triangles.length;
+  }
+
+  /**
+   * other triangles from now on, of a part that adapts; the frame that shows them follows at once
+   * @param {{triangles: Uint32Array, visible: Uint32Array | null}} shown
+   */
+  reshape({ triangles, visible }) {
+    if (this.values) this.spreadField(triangles);
+    this.takeTriangles(triangles);
+    this.visible = visible;
+  }
+
+  /** new vertices take the mean value of their neighbours until values come for them @param {Uint32Array} triangles */
+  spreadField(triangles) {
+    const n = this.rest.length / 3, known = new Uint8Array(n);
+    if (!this.visible) return;
+    for (const v of this.visible) known[v] = 1;
+    for (const attribute of [this.older, this.newer]) {
+      /** @type {Map<number, {sum: number, n: number}>} */
+      const fresh = new Map();
+      for (let t = 0; t < triangles.length; t += 3)
+        for (let c = 0; c < 3; c++) {
+          const v = triangles[t + c];
+          if (known[v]) continue;
+          const mean = fresh.get(v) ?? { sum: 0, n: 0 };
+          for (const w of [triangles[t + ((c + 1) % 3)], triangles[t + ((c + 2) % 3)]])
+            if (known[w]) {
+              mean.sum += attribute.array[w];
+              mean.n++;
+            }
+          fresh.set(v, mean);
+        }
+      for (const [v, mean] of fresh) attribute.array[v] = mean.n ? mean.sum / mean.n : 0;
+      attribute.needsUpdate = fresh.size > 0;
+    }
   }
 
   /**
@@ -148,9 +217,23 @@ export class BodyMesh {
     u.blend.value = first ? 1 : 0;
     this.older.needsUpdate = true;
     this.newer.needsUpdate = true;
-    this.values = { low, high };
+    this.values = this.valuesOf(level, low, high);
     this.valuesAt = now;
     this.colour(true);
+  }
+
+  /**
+   * least and largest value of what is shown
+   * @param {Uint8Array} level @param {number} low @param {number} high
+   */
+  valuesOf(level, low, high) {
+    let least = 255, most = 0;
+    if (!this.visible) return { low, high };
+    for (const v of this.visible) {
+      least = Math.min(least, level[v]);
+      most = Math.max(most, level[v]);
+    }
+    return { low: low + ((high - low) * least) / 255, high: low + ((high - low) * most) / 255 };
   }
 
   /** no colours: tissue again, or the values of another field are waited for */
@@ -177,17 +260,23 @@ export class BodyMesh {
     return true;
   }
 
-  /** @param {boolean} on */
+  /** lines of the triangles over the body @param {boolean} on */
   wireframe(on) {
-    /** @type {THREE.MeshPhysicalMaterial} */ (this.mesh.material).wireframe = on;
+    if (on && !this.lines) {
+      const material = new THREE.MeshBasicMaterial({ wireframe: true, transparent: true, depthWrite: false, toneMapped: false, ...LINES });
+      this.lines = new THREE.Mesh(this.geometry, material);
+      this.lines.frustumCulled = false;
+      this.scene.add(this.lines);
+    }
+    if (this.lines) this.lines.visible = on;
   }
 
   /** largest displacement of the shown frame, m */
   moved() {
-    const x = this.position.array, r = this.rest;
+    const x = this.position.array, r = this.rest, visible = this.visible, n = this.nVisible();
     let most = 0;
-    for (let i = 0; i < r.length; i += 3) {
-      const d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
+    for (let k = 0; k < n; k++) {
+      const i = 3 * (visible ? visible[k] : k), d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
       if (d > most) most = d;
     }
     return Math.sqrt(most);
@@ -199,7 +288,7 @@ export class BodyMesh {
     const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3(), hit = new THREE.Vector3();
     let best = Infinity, found = -1;
     const point = new THREE.Vector3();
-    for (let t = 0; t < index.length; t += 3) {
+    for (let t = 0; t < this.nCorner; t += 3) {
       a.fromArray(x, 3 * index[t]);
       b.fromArray(x, 3 * index[t + 1]);
       c.fromArray(x, 3 * index[t + 2]);
@@ -221,6 +310,8 @@ export class BodyMesh {
 
   dispose() {
     this.scene.remove(this.mesh);
+    if (this.lines) this.scene.remove(this.lines);
+    this.lines?.material.dispose();
     this.geometry.dispose();
     /** @type {THREE.Material} */ (this.mesh.material).dispose();
   }

@@ -4,6 +4,7 @@ import { decodeAsset } from "./asset.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
 import { vertexNormals } from "./normals.js";
+import { applyPatch, readPatchHead, shownOf } from "./patch_decoder.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
 const RETRY_MS = 500, RETRY_MOST_MS = 5000;
@@ -23,7 +24,9 @@ const FINAL = new Map([
  *   now: () => number,
  *   later: (call: () => void, ms: number) => any,
  * }} Surroundings
- * @typedef {{decoder: FrameDecoder, triangles: Uint32Array, epoch: number, n: number, spare: {positions: Float32Array, normals: Float32Array}[]}} Part
+ * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: import("./patch_decoder.js").Shown, patched: boolean, epoch: number, n: number,
+ *   spare: {positions: Float32Array, normals: Float32Array}[]}} Part table: of triangles, as patched; shown: of the table, but for the patches since
+ *   the last frame (patched)
  */
 
 export { BEAT_MS };
@@ -53,6 +56,8 @@ export class Link {
   kept = new Map();
   /** @type {Map<number, Uint8Array>} the same for fields */
   keptField = new Map();
+  /** @type {Map<number, Uint8Array[]>} and all patches: each is relative to the one before */
+  keptPatches = new Map();
   decodeUs = 0;
   nDecoded = 0;
   decodeSum = 0;
@@ -74,6 +79,7 @@ export class Link {
     this.wanted.clear();
     this.kept.clear();
     this.keptField.clear();
+    this.keptPatches.clear();
     this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
     this.latency = this.rtt = this.echo = 0;
     this.myTool = -1;
@@ -98,7 +104,8 @@ export class Link {
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     socket.onopen = () => {
-      if (generation === this.generation) this.send({ type: "join", name: this.want.name, role: this.want.role, tool: this.want.role === "viewer" ? null : -1 });
+      if (generation !== this.generation) return;
+      this.send({ type: "join", name: this.want.name, role: this.want.role, tool: this.want.role === "viewer" ? null : -1, patches: true });
     };
     socket.onmessage = (event) => {
       if (generation !== this.generation) return;
@@ -174,6 +181,7 @@ export class Link {
     if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
     else if (head.kind === KIND.TOOLS) this.tools(bytes);
     else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
+    else if (head.kind === KIND.PATCH) this.patch(head.index, bytes);
   }
 
   /** @param {any} message */
@@ -206,15 +214,21 @@ export class Link {
       if (generation !== this.generation || this.wanted.get(index) !== info.epoch) return;
       // a server whose assets cannot be read is asked again ever more slowly
       this.tries = 0;
-      const n = asset.rest.length / 3;
-      this.parts.set(index, { decoder: new FrameDecoder(asset), triangles: asset.triangles, epoch: info.epoch, n, spare: [] });
-      this.around.post({ type: "part", part: index, rest: asset.rest.slice(), triangles: asset.triangles.slice() });
+      const n = asset.rest.length / 3, shown = shownOf(asset.triangles, n);
+      this.parts.set(index, { decoder: new FrameDecoder(asset), table: asset.triangles, shown, patched: false, epoch: info.epoch, n, spare: [] });
+      this.around.post({ type: "part", part: index, rest: asset.rest.slice(), ...shown });
+      this.laterMessages(index);
     } catch (error) {
       if (generation === this.generation && this.wanted.get(index) === info.epoch) this.socket?.close(4900, reason(error));
-      return;
     }
-    const kept = this.kept.get(index);
+  }
+
+  /** what came before the asset @param {number} index of the part that is there now */
+  laterMessages(index) {
+    const kept = this.kept.get(index), patches = this.keptPatches.get(index) ?? [];
     this.kept.delete(index);
+    this.keptPatches.delete(index);
+    for (const patch of patches) this.patch(index, patch);
     if (kept) this.frame(index, kept);
     const keptField = this.keptField.get(index);
     this.keptField.delete(index);
@@ -233,6 +247,21 @@ export class Link {
     this.around.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [level.buffer]);
   }
 
+  /** into the table at once, shown together with the frame that follows @param {number} index @param {Uint8Array} bytes */
+  patch(index, bytes) {
+    const part = this.parts.get(index), { epoch } = readPatchHead(bytes);
+    if (!part || epoch > part.epoch) {
+      const before = this.keptPatches.get(index) ?? [];
+      this.keptPatches.set(index, [...before.filter((older) => readPatchHead(older).epoch === epoch), bytes.slice()]);
+      // a frame from before does not know the new vertices
+      this.kept.delete(index);
+      return;
+    }
+    if (epoch < part.epoch) return;
+    applyPatch(bytes, part.table, part.n);
+    part.patched = true;
+  }
+
   /** @param {number} index @param {Uint8Array} bytes */
   frame(index, bytes) {
     const part = this.parts.get(index), { epoch } = readFrameHead(bytes);
@@ -244,12 +273,14 @@ export class Link {
     const begin = this.around.now();
     const { positions, normals } = part.spare.pop() ?? { positions: new Float32Array(3 * part.n), normals: new Float32Array(3 * part.n) };
     part.decoder.decode(bytes, positions);
-    const ms = this.around.now() - begin;
-    vertexNormals(positions, part.triangles, normals);
+    const ms = this.around.now() - begin, shown = part.patched ? shownOf(part.table, part.n) : null;
+    if (shown) part.shown = shown;
+    part.patched = false;
+    vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
     this.decodeUs += Math.round(1000 * ms);
     this.decodeSum += ms;
     this.nDecoded++;
-    this.around.post({ type: "frame", part: index, positions, normals }, [positions.buffer, normals.buffer]);
+    this.around.post({ type: "frame", part: index, positions, normals, shown }, [positions.buffer, normals.buffer]);
   }
 
   /** arrays come back from the page @param {{part: number, positions: Float32Array, normals: Float32Array}} old */

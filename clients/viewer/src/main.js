@@ -27,7 +27,8 @@ const state = {
   /** @type {any} */ hello: null,
   /** @type {any} */ status: null,
   /** @type {Map<number, BodyMesh>} */ bodies: new Map(),
-  /** @type {Map<number, {positions: Float32Array, normals: Float32Array}>} newest undrawn frame of each part */ frames: new Map(),
+  /** @type {Map<number, {positions: Float32Array, normals: Float32Array, shown: import("./patch_decoder.js").Shown | null}>} newest undrawn frame of
+   * each part, with the triangles that came since the last drawn one */ frames: new Map(),
   /** @type {import("./wire.js").Tool[]} */ tools: [],
   /** @type {Map<number, any>} */ members: new Map(),
   me: 0,
@@ -39,6 +40,7 @@ const state = {
   drawn: 0,
   here: { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0 },
   field: "none", // shown in colour
+  wires: false, // lines of the triangles are shown
   /** @type {{low: number, high: number} | null} what the colours mean, null: no values yet */ range: null,
   /** @type {string[]} names of the plan's rows as the panel has them */ rows: [],
 };
@@ -238,7 +240,7 @@ const control = {
     else if (!told) notice("");
     const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
     showState(m.frozen ? "lost" : "live", slow);
-    if (!byId("panel").hidden) panel.status(m, state.here);
+    if (!byId("panel").hidden) panel.status(m, state.here, state.hello.parts);
   },
   members(m) {
     state.members = new Map(m.members.map((/** @type {any} */ p) => [p.id, p]));
@@ -275,17 +277,18 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
       break;
     case "part": {
       state.bodies.get(data.part)?.dispose();
-      const body = new BodyMesh(stage.scene, data.rest, data.triangles);
-      body.wireframe(byId("wireframe").checked);
+      const body = new BodyMesh(stage.scene, data.rest, data.triangles, data.visible);
+      body.wireframe(state.wires);
       state.bodies.set(data.part, body);
-      state.here.vertices = [...state.bodies.values()].reduce((n, b) => n + b.rest.length / 3, 0);
+      state.frames.delete(data.part); // of the body before
+      countVertices();
       stage.dirty = true;
       break;
     }
     case "frame": {
       const older = state.frames.get(data.part);
-      if (older) worker.postMessage({ type: "reuse", part: data.part, ...older }, [older.positions.buffer, older.normals.buffer]);
-      state.frames.set(data.part, { positions: data.positions, normals: data.normals });
+      if (older) giveBack(data.part, older);
+      state.frames.set(data.part, { positions: data.positions, normals: data.normals, shown: data.shown ?? older?.shown ?? null });
       break;
     }
     case "field": {
@@ -314,6 +317,15 @@ function showForce() {
   byId("force-value").textContent = force.toFixed(2);
 }
 
+/** arrays that the worker may fill anew @param {number} part @param {{positions: Float32Array, normals: Float32Array}} arrays */
+function giveBack(part, { positions, normals }) {
+  worker.postMessage({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]);
+}
+
+function countVertices() {
+  state.here.vertices = [...state.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
+}
+
 /** the newest frames, where they differ from what is shown @returns {boolean} some do */
 function takeFrames() {
   let fresh = false;
@@ -321,9 +333,12 @@ function takeFrames() {
     const body = state.bodies.get(part);
     if (!body || body.rest.length !== frame.positions.length) continue;
     state.frames.delete(part);
-    const differs = !body.near(frame.positions, NEAR * stage.size);
-    const old = differs ? body.take(frame.positions, frame.normals) : frame;
-    worker.postMessage({ type: "reuse", part, ...old }, [old.positions.buffer, old.normals.buffer]);
+    const differs = frame.shown !== null || !body.near(frame.positions, NEAR * stage.size);
+    if (frame.shown) {
+      body.reshape(frame.shown);
+      countVertices();
+    }
+    giveBack(part, differs ? body.take(frame.positions, frame.normals) : frame);
     fresh ||= differs;
   }
   return fresh;
@@ -371,7 +386,7 @@ const togglePause = () => command(state.status?.paused ? "resume" : "pause");
 const togglePanel = () => {
   byId("panel").hidden = !byId("panel").hidden;
   byId("panel-toggle").setAttribute("aria-expanded", String(!byId("panel").hidden));
-  if (state.status) panel.status(state.status, state.here);
+  if (state.status) panel.status(state.status, state.here, state.hello.parts);
 };
 byId("mode-pull").onclick = () => setMode("pull");
 byId("mode-press").onclick = () => setMode("press");
@@ -393,11 +408,14 @@ const nextField = () => {
   const names = [...byId("field").options].map((o) => o.value);
   chooseField(names[(names.indexOf(state.field) + 1) % names.length]);
 };
-byId("wireframe").onchange = () => {
-  for (const body of state.bodies.values()) body.wireframe(byId("wireframe").checked);
+const toggleWires = () => {
+  state.wires = !state.wires;
+  byId("mesh").setAttribute("aria-pressed", String(state.wires));
+  for (const body of state.bodies.values()) body.wireframe(state.wires);
   stage.dirty = true;
 };
-const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField }, stage);
+byId("mesh").onclick = toggleWires;
+const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
 window.addEventListener("keydown", (e) => {
   const action = actionOf(e);
   if (action) {

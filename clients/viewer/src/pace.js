@@ -3,6 +3,7 @@
 const QUICK_MS = 10; // a picture that costs no more needs no pause: 60 a second leave enough room
 const SLOW_MS = 28; // pictures that cost more give up sharpness
 const SLOW_RUN = 3, QUICK_RUN = 90; // so many in a row: one slow picture is a shader being made
+const MOST_PAUSE_MS = 700; // one picture that took seconds, as the first with its shaders, holds up none after it
 const LOST_MS = 3000; // an answer that never comes stands for one that came
 
 export class Pace {
@@ -19,7 +20,7 @@ export class Pace {
     this.sharpness = Math.max(least, sharpness);
   }
 
-  /** may the next picture begin? One at a time, and as long a pause as it took @param {number} now ms */
+  /** may the next picture begin? One at a time, and about as long a pause as it took @param {number} now ms */
   ready(now) {
     return this.drawing ? now - this.begun > LOST_MS : now >= this.restUntil;
   }
@@ -34,7 +35,7 @@ export class Pace {
   done(now) {
     this.drawing = false;
     this.costMs = now - this.begun;
-    this.restUntil = this.costMs > QUICK_MS ? now + this.costMs : now;
+    this.restUntil = this.costMs > QUICK_MS ? now + Math.min(this.costMs, MOST_PAUSE_MS) : now;
     this.slow = this.costMs > SLOW_MS ? this.slow + 1 : 0;
     this.quick = this.costMs < QUICK_MS / 2 ? this.quick + 1 : 0;
     const before = this.sharpness;

@@ -53,6 +53,7 @@ export class ToolMarks {
    * @param {number} radiusLimit smallest drawn radius, m
    */
   update(tools, nameOf, mine, radiusLimit) {
+    this.drawn = tools;
     tools.forEach((tool, i) => {
       const mark = this.mark(i);
       mark.shown = tool.held && !tool.away;

@@ -4,7 +4,7 @@
 export const PROTOCOL = "palpate.v1";
 export const VERSION = 1;
 export const MAGIC = 0x314c4150;
-export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, POSE: 16, ACK: 17 });
+export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, PATCH: 5, POSE: 16, ACK: 17 });
 export const POSE_FLAG = Object.freeze({
   CONTACT: 1, CLUTCHED: 2, FORCES_ON: 4, SATURATED: 8, STIFF_CLAMPED: 16, STALE: 32, ESTOP: 64, POSE_ONLY: 128, AWAY: 256,
 });

@@ -6,6 +6,7 @@ import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
 import { decodeField, readFieldHead } from "../src/field_decoder.js";
 import { FrameDecoder, readFrameHead } from "../src/frame_decoder.js";
+import { applyPatch } from "../src/patch_decoder.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHaptic, readHead, readTools, WireError, writeAck, writePose } from "../src/wire.js";
 
 /** @param {string} name */
@@ -59,6 +60,15 @@ test("refuses fields of bad kinds, ranges, counts and blocks", () => {
   assert.throws(() => decodeField(changed(40, 255), level), WireError);
 });
 
+test("reads the golden patch into the golden asset's table", () => {
+  const { triangles, rest } = decodeAsset(load("asset.bin")), wanted = expected.patch, before = triangles.slice();
+  const head = applyPatch(load("patch.bin"), triangles, rest.length / 3);
+  same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "patch");
+  assert.deepEqual([...triangles], wanted.triangles);
+  wanted.places.forEach((/** @type {number} */ place, /** @type {number} */ i) => before.set(wanted.corners.slice(3 * i, 3 * i + 3), 3 * place));
+  assert.deepEqual(triangles, before);
+});
+
 test("reads the golden asset, whose hash is its name", () => {
   const bytes = load("asset.bin"), asset = decodeAsset(bytes);
   same(asset, { ...expected.asset, levels: {}, hash: undefined, rest: Object.assign({}, expected.asset.rest) }, "asset");
@@ -88,6 +98,7 @@ test("refuses every message cut anywhere, and with a byte too many", () => {
   /** @type {[string, (bytes: Uint8Array) => any][]} */
   const readers = [["tools.bin", readTools], ["haptic.bin", readHaptic], ["asset.bin", decodeAsset],
     ["field.bin", (bytes) => decodeField(bytes, new Uint8Array(expected.field.n))],
+    ["patch.bin", (bytes) => applyPatch(bytes, asset.triangles.slice(), asset.rest.length / 3)],
     ["frame_bend.bin", (bytes) => decoder.decode(bytes, positions)], ["frame_affine.bin", (bytes) => decoder.decode(bytes, positions)]];
   for (const [name, read] of readers) {
     const bytes = load(name);

@@ -28,7 +28,15 @@ test("a quick machine draws every turn, all pixels", () => {
   assert.equal(pace.sharpness, 1);
 });
 
-test("pictures take at most half of the time, whatever they cost", () => {
+test("a first picture that takes seconds, as its shaders are made, holds up none after it", () => {
+  const pace = new Pace(1);
+  pace.begin(0);
+  pace.done(8000);
+  assert.equal(pace.ready(8600), false);
+  assert.equal(pace.ready(8701), true);
+});
+
+test("pictures take at most half of the time, up to seconds for one", () => {
   for (const c of [12, 20, 40, 200, 700]) {
     const { n, share } = run(new Pace(1), 20000, () => c);
     assert.ok(share <= 0.5 + (2 * c) / 20000, `${c} ms: ${share}`);

@@ -9,6 +9,8 @@
  * distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
  * diverged is for its guard to say.
  *
+ * A body that adapts (sim/shell.h) shows 0 at vertices out of use.
+ *
  * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness"), rate_hz (10): so often in simulated time it is
  * taken anew. */
 #include "server/sim/effect_list.h"
@@ -22,6 +24,7 @@ typedef struct field_out {
     double period_s, next_s;
     double *sum, *volume_m3; /* NULL: displacement [n_node] */
     pal_body *body;
+    uint64_t revision; /* of the triangles at the last values */
 } field_out;
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -67,7 +70,9 @@ static float finite_or_0(double value)
 static void displacement(const pal_body *body, float *value)
 {
     const double *rest = body->surface->x;
-    for (int i = 0; i < body->n_shown; i++) {
+    int n = body->shell ? body->n_active : body->n_shown;
+    for (int k = 0; k < n; k++) {
+        int i = body->shell ? body->active[k] : k;
         double sum = 0;
         for (int c = 0; c < 3; c++) {
             double moved = (double)body->shown[3 * (size_t)i + (size_t)c] - rest[3 * (size_t)i + (size_t)c];
@@ -110,6 +115,8 @@ static pal_err run(void *self, pal_step *step)
     field_out *out = self;
     /* the step nearest to the time wanted, so that a period of whole steps stays one */
     if (step->time_s + 0.5 * step->dt_s < out->next_s) return PAL_ERR_OK;
+    if (out->revision != step->body->revision) memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->n_shown);
+    out->revision = step->body->revision;
     if (out->kind == PAL_FIELD_DISPLACEMENT_M)
         displacement(step->body, out->shown.value);
     else

@@ -1,17 +1,22 @@
 /* Freezes a body that diverges, so that one bad body never takes the session with it (numerics.md part 3).
  *
  * Diverged means: a position or velocity is not finite, a node is farther than `reach` box diagonals from its rest
- * place, or the root mean square speed is beyond `speed_m_s`. The last good state (a copy of every step) comes back,
+ * place, or the root mean square speed is beyond `speed_m_s`. The last good positions (a copy of every step) come back,
  * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it).
- */
+ * Of a body that adapts (sim/shell.h) the active points are looked at and copied. Which are active is not taken back:
+ * one that came into use since the last good state is put between the ends of its edge. */
+#include "server/base/vec3.h"
 #include "server/sim/effect.h"
+#include "server/sim/shell.h"
 
 #include <math.h>
 #include <string.h>
 
 typedef struct finite_guard {
     pal_body *body;
-    double *x, *v; /* last good state [n_dof][3] */
+    double *x;      /* last good positions [n_dof][3] */
+    uint32_t *kept; /* turn in which a point was copied last, of a body that adapts; else NULL [n_dof] */
+    uint32_t turn;
     double reach;
     double speed_m_s, asked_speed_m_s; /* in use; as the scene gave it, 0: from the material */
     double gravity_m_s2, mass_kg;
@@ -27,8 +32,41 @@ static double auto_speed(const finite_guard *guard, const pal_material *material
 
 static void keep(finite_guard *guard, const pal_body *body)
 {
+    guard->turn++;
+    for (int k = 0; k < body->n_active && guard->kept; k++) {
+        size_t i = 3 * (size_t)body->active[k];
+        pal_copy3(guard->x + i, body->x + i);
+        guard->kept[body->active[k]] = guard->turn;
+    }
+    if (guard->kept) return;
     memcpy(guard->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
-    memcpy(guard->v, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
+}
+
+/* where a point of a body that adapts was in the last good state, or would have been */
+static void last_place(const finite_guard *guard, const pal_levels *levels, int32_t i, double x[3])
+{
+    int32_t edge = pal_levels_vertex_parent(levels, i);
+    if (guard->kept[i] == guard->turn || edge < 0) {
+        pal_copy3(x, guard->x + 3 * (size_t)i);
+        return;
+    }
+    double end[3];
+    last_place(guard, levels, levels->edge[edge].vertex[0], x);
+    last_place(guard, levels, levels->edge[edge].vertex[1], end);
+    for (int c = 0; c < 3; c++) x[c] = 0.5 * (x[c] + end[c]);
+}
+
+static void put_back(finite_guard *guard, pal_body *body)
+{
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    for (int k = 0; k < body->n_active && guard->kept; k++) {
+        int32_t i = body->active[k];
+        last_place(guard, &body->shell->levels, i, body->x + 3 * (size_t)i);
+        pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
+    }
+    if (guard->kept) return;
+    memcpy(body->x, guard->x, n_byte);
+    memset(body->v, 0, n_byte);
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
@@ -49,8 +87,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     finite_guard *guard = PAL_NEW(build->arena, finite_guard, 1);
     if (!guard) return PAL_ERR_MEMORY;
     guard->x = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-    guard->v = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-    if (!guard->x || !guard->v) return PAL_ERR_MEMORY;
+    if (body->shell) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
+    if (!guard->x || (body->shell && !guard->kept)) return PAL_ERR_MEMORY;
     guard->body = body;
     guard->reach = reach;
     guard->gravity_m_s2 = fabs(build->scene->gravity_m_s2);
@@ -67,7 +105,9 @@ static bool sound(const finite_guard *guard, const pal_body *body)
 {
     double energy = 0, limit = guard->reach * body->size_m;
     bool near = true;
-    for (size_t i = 0; i < (size_t)body->n_dof; i++) {
+    const int32_t *active = body->active;
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)(active ? active[k] : k);
         const double *x = body->x + 3 * i, *r = body->x_rest + 3 * i, *v = body->v + 3 * i;
         near &= fabs(x[0] - r[0]) <= limit && fabs(x[1] - r[1]) <= limit && fabs(x[2] - r[2]) <= limit;
         energy += body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -84,8 +124,7 @@ static pal_err run(void *self, pal_step *step)
         if (!body->frozen) keep(guard, body);
         return PAL_ERR_OK;
     }
-    memcpy(body->x, guard->x, 3 * sizeof(double) * (size_t)body->n_dof);
-    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    put_back(guard, body);
     body->frozen = true;
     return PAL_ERR_OK;
 }

@@ -23,7 +23,9 @@ static pal_err run(void *self, pal_step *step)
     const gravity *row = self;
     const double *m = step->body->mass_kg, gx = row->g[0], gy = row->g[1], gz = row->g[2];
     double *f = step->body->f;
-    for (int i = 0; i < step->body->n_node; i++) {
+    const int32_t *active = step->body->active;
+    for (int k = 0; k < step->body->n_active; k++) {
+        int i = active ? active[k] : k;
         f[3 * i] += m[i] * gx;
         f[3 * i + 1] += m[i] * gy;
         f[3 * i + 2] += m[i] * gz;
@@ -35,7 +37,10 @@ static double energy(void *self, const pal_body *body)
 {
     const gravity *row = self;
     double sum = 0;
-    for (int i = 0; i < body->n_node; i++) sum -= body->mass_kg[i] * pal_dot3(row->g, body->d + 3 * i);
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        sum -= body->mass_kg[i] * pal_dot3(row->g, body->d + 3 * i);
+    }
     return sum;
 }
 

@@ -1,25 +1,77 @@
 /* Shown vertices are the surface nodes of the simulated mesh themselves: no skin, the boundary faces are what is
- * shown. */
+ * shown.
+ *
+ * A body that adapts (sim/shell.h) shows all its points, those out of use where they are at rest, and the triangles of
+ * its present leaves; a step costs what its active points do. */
 #include "server/sim/effect.h"
+#include "server/sim/shell.h"
+
+#include <string.h>
 
 typedef struct surface_out {
     pal_body *body;
     pal_surface surface; /* boundary faces on shown vertices; arena memory, never freed on its own */
+    /* bodies that adapt: points shown at the last revision */
+    uint64_t revision;
+    int n_was;
+    int32_t *was; /* [n_was] */
 } surface_out;
+
+static void show(pal_body *body, int vertex, const double x[3])
+{
+    float *to = body->shown + 3 * (size_t)vertex;
+    for (int c = 0; c < 3; c++) to[c] = (float)x[c];
+}
 
 static void evaluate(pal_body *body)
 {
-    for (int i = 0; i < body->n_shown; i++) {
-        const double *x = body->d + 3 * (size_t)body->shown_node[i];
-        float *to = body->shown + 3 * (size_t)i;
-        for (int c = 0; c < 3; c++) to[c] = (float)x[c];
+    for (int i = 0; i < body->n_shown; i++) show(body, i, body->d + 3 * (size_t)body->shown_node[i]);
+}
+
+/* the active points; those that went out of use go back to rest */
+static void evaluate_active(surface_out *out)
+{
+    pal_body *body = out->body;
+    if (out->revision != body->revision) {
+        for (int k = 0; k < out->n_was; k++) show(body, out->was[k], body->x_rest + 3 * (size_t)out->was[k]);
+        memcpy(out->was, body->active, sizeof *out->was * (size_t)body->n_active);
+        out->n_was = body->n_active;
+        out->revision = body->revision;
     }
+    for (int k = 0; k < body->n_active; k++) {
+        int i = body->active[k];
+        show(body, i, body->d + 3 * (size_t)i);
+    }
+}
+
+static pal_err make_adaptive(pal_build *build, void **self)
+{
+    pal_body *body = build->body;
+    size_t n = (size_t)body->n_node;
+    surface_out *out = PAL_NEW(build->arena, surface_out, 1);
+    int32_t *node = PAL_NEW(build->arena, int32_t, n);
+    float *shown = PAL_NEW(build->arena, float, 3 * n);
+    if (out) out->was = PAL_NEW(build->arena, int32_t, n);
+    if (!out || !out->was || !node || !shown) return PAL_ERR_MEMORY;
+    for (int i = 0; i < body->n_node; i++) node[i] = i;
+    out->body = body;
+    out->revision = body->revision;
+    body->surface = &body->shell->surface;
+    body->n_shown = body->n_node;
+    body->shown = shown;
+    body->shown_node = node;
+    evaluate(body);
+    memcpy(out->was, body->active, sizeof *out->was * (size_t)body->n_active);
+    out->n_was = body->n_active;
+    *self = out;
+    return PAL_ERR_OK;
 }
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     PAL_TRY(pal_item_done(item, build->note));
     pal_body *body = build->body;
+    if (body->shell) return make_adaptive(build, self);
     const pal_tets *tets = body->tets;
     if (!tets || tets->n_face == 0 || tets->n_node > body->n_node)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body has no boundary faces to show", item->path);
@@ -62,15 +114,20 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 
 static pal_err run(void *self, pal_step *step)
 {
-    (void)self;
-    evaluate(step->body);
+    if (step->body->shell)
+        evaluate_active(self);
+    else
+        evaluate(step->body);
     return PAL_ERR_OK;
 }
 
 static void reset(void *self, const pal_body *body)
 {
-    (void)body;
-    evaluate(((surface_out *)self)->body);
+    surface_out *out = self;
+    if (body->shell)
+        evaluate_active(out);
+    else
+        evaluate(out->body);
 }
 
 const pal_effect pal_effect_surface_out = {

@@ -15,6 +15,12 @@
  * so tissue follows a faster tool late. Where caps leave less than the spring's force, it becomes a constant force and
  * the solver goes round once more (pal_tangent.settle).
  *
+ * On a body that adapts (sim/shell.h) weights go with the masses of the nodes as well, so that fine and coarse parts of
+ * the patch come along alike, and a grip goes on when nodes come and go: a new midpoint weighs as its edge's ends do in
+ * the mean, one that goes leaves the others their weights, and its own to the ends of its edge where neither was held.
+ * The force is the same on both sides of the change: o goes with y, and F = k (tool + o + shift - y), where shift makes
+ * up for another k and fades in SHIFT_S.
+ *
  * For a haptic bridge the tool's bilateral part is published as f0 - K (x - x0) - b v, K = k_s 1: k_s starts as this
  * spring in series with the tissue under the patch, 2 E R / (1 - nu^2), and follows least squares on the tool's moves
  * (haptics.md 2.3 steps 3 and 6). Where the solver has a compliance, K = (C + 1/k)^-1 with the 3 x 3 compliance C of
@@ -25,6 +31,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/effect.h"
 #include "server/sim/patch.h"
+#include "server/sim/shell.h"
 #include "server/sim/touch.h"
 
 #include <math.h>
@@ -37,6 +44,7 @@
 #define LEAST_K_N_M  10.0
 #define RISE_S       0.02
 #define BELOW_CAP    0.98
+#define SHIFT_S      0.15
 
 /* what a grip needs beside with an implicit solver */
 typedef struct firm_grip {
@@ -48,6 +56,13 @@ typedef struct firm_grip {
     int n_give, next_give;        /* columns known                                                                */
 } firm_grip;
 
+/* what a grip needs beside on a body that adapts */
+typedef struct live_grip {
+    double *even;                       /* weights but for the masses of nodes [n_node]   */
+    double y[3], shift[3], k_N_m, dt_s; /* patch and spring in the sub-step before        */
+    bool renewed;                       /* other nodes since then                         */
+} live_grip;
+
 typedef struct grip {
     bool held, button; /* has tissue; button in the last step                              */
     int n_node;
@@ -56,11 +71,20 @@ typedef struct grip {
     double offset[3];               /* patch minus tool in the tool's axes at quaternion 1              */
     double k_most_N_m, c_most_Ns_m; /* explicit limits in this sub-step                    */
     double force[3];                /* on the tool, this sub-step                                       */
+    struct live_grip *live;         /* bodies that adapt only, else NULL */
     /* felt stiffness */
     double last_m[3], last_N[3], xx, xf, k_start_N_m, k_felt_N_m;
     bool pulls;      /* implicit solvers only: in this sub-step */
     firm_grip *firm; /* implicit solvers only, else NULL */
 } grip;
+
+/* points of a body that adapts that were in use when its grips were last looked at */
+typedef struct in_use {
+    uint64_t revision;
+    int n;
+    int32_t *point; /* [n] */
+    uint8_t *known; /* 1: in the list [n_node] */
+} in_use;
 
 typedef struct tool_grab {
     int n_tool;
@@ -69,6 +93,7 @@ typedef struct tool_grab {
     double *gather;     /* weights of a new grab [n_node], 0 between grabs */
     double asked_N_m, damping_s, asked_reach_m;
     double young_Pa, poisson;
+    in_use *use; /* bodies that adapt only, else NULL */
 } tool_grab;
 
 static double reach_m(const tool_grab *grab, const pal_tool *tool)
@@ -107,6 +132,33 @@ static void reset(void *self, const pal_body *body)
     memset(grab->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
 }
 
+static void look(in_use *use, const pal_body *body)
+{
+    for (int i = 0; i < use->n; i++) use->known[use->point[i]] = 0;
+    use->n = body->n_active;
+    for (int i = 0; i < use->n; i++) use->known[use->point[i] = body->active[i]] = 1;
+    use->revision = body->revision;
+}
+
+static pal_err make_use(tool_grab *grab, pal_build *build)
+{
+    size_t n_node = (size_t)build->body->n_node;
+    grab->use = PAL_NEW(build->arena, in_use, 1);
+    if (!grab->use) return PAL_ERR_MEMORY;
+    grab->use->point = PAL_NEW(build->arena, int32_t, n_node);
+    grab->use->known = PAL_NEW(build->arena, uint8_t, n_node);
+    if (!grab->use->point || !grab->use->known) return PAL_ERR_MEMORY;
+    look(grab->use, build->body);
+    return PAL_ERR_OK;
+}
+
+static pal_err make_live(grip *g, size_t n_node, pal_arena *arena)
+{
+    g->live = PAL_NEW(arena, live_grip, 1);
+    if (g->live) g->live->even = PAL_NEW(arena, double, n_node);
+    return g->live && g->live->even ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     tool_grab *grab = PAL_NEW(build->arena, tool_grab, 1);
@@ -132,11 +184,13 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         grab->grip[t].node = PAL_NEW(build->arena, int32_t, n_node);
         grab->grip[t].weight = PAL_NEW(build->arena, double, n_node);
         if (!grab->grip[t].node || !grab->grip[t].weight) return PAL_ERR_MEMORY;
+        if (build->body->shell) PAL_TRY(make_live(&grab->grip[t], n_node, build->arena));
         if (!build->body->implicit) continue;
         grab->grip[t].firm = PAL_NEW(build->arena, firm_grip, 1);
         if (!grab->grip[t].firm) return PAL_ERR_MEMORY;
     }
     material(grab, build->body, &build->def->material, NULL);
+    if (build->body->shell) PAL_TRY(make_use(grab, build));
     *self = grab;
     return PAL_ERR_OK;
 }
@@ -154,7 +208,9 @@ static bool close_on(tool_grab *grab, const pal_body *body, const double p[3], d
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
     int nearest = -1;
-    for (int i = 0; i < body->n_shown; i++) {
+    int n_shown = body->shell ? body->n_active : body->n_shown;
+    for (int k = 0; k < n_shown; k++) {
+        int i = body->shell ? body->active[k] : k;
         const float *s = body->shown + 3 * (size_t)i;
         double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
         double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
@@ -179,27 +235,40 @@ static void patch_place(const grip *g, const pal_body *body, double y[3], double
     }
 }
 
-static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body)
+/* the grip's nodes and weights from those in gather, which is then 0 again */
+static void take_gathered(tool_grab *grab, grip *g, const pal_body *body)
 {
-    double last[3], y[3], v[3], reach = reach_m(grab, tool), sum = 0;
-    pal_sub3(last, tool->last.position_m, body->offset_m);
-    if (!close_on(grab, body, last, reach)) return;
+    double sum = 0;
     g->n_node = 0;
-    for (int i = 0; i < body->n_node; i++) {
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
         if (grab->gather[i] == 0) continue;
         g->node[g->n_node] = i;
-        sum += g->weight[g->n_node++] = grab->gather[i];
+        if (g->live) g->live->even[g->n_node] = grab->gather[i];
+        sum += g->weight[g->n_node++] = grab->gather[i] * (g->live ? body->mass_kg[i] : 1);
         grab->gather[i] = 0;
     }
     for (int i = 0; i < g->n_node; i++) {
         g->weight[i] /= sum;
         grab->sum_weight[g->node[i]] += g->weight[i];
     }
+}
+
+static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body)
+{
+    double last[3], y[3], v[3], reach = reach_m(grab, tool);
+    pal_sub3(last, tool->last.position_m, body->offset_m);
+    if (!close_on(grab, body, last, reach)) return;
+    take_gathered(grab, g, body);
     patch_place(g, body, y, v);
     double back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
     pal_sub3(g->offset, y, last);
     pal_quat_rotate(g->offset, back, g->offset);
     g->held = true;
+    if (g->live) {
+        g->live->renewed = false;
+        pal_set3(g->live->shift, 0, 0, 0);
+    }
     double k = stiffness_N_m(grab, reach), tissue = 2 * grab->young_Pa * reach / (1 - grab->poisson * grab->poisson);
     g->k_start_N_m = g->k_felt_N_m = fmax(LEAST_K_N_M, k * tissue / (k + tissue));
     g->xx = g->xf = 0;
@@ -209,6 +278,63 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
         g->firm->stretch_m = 0;
         g->firm->n_give = g->firm->next_give = 0;
     }
+}
+
+/* what a point weighs in gather, or would if it had been there before */
+static double weight_of(const tool_grab *grab, const pal_levels *levels, int32_t point)
+{
+    int32_t edge = pal_levels_vertex_parent(levels, point);
+    if (grab->use->known[point] || edge < 0) return fabs(grab->gather[point]);
+    const int32_t *end = levels->edge[edge].vertex;
+    return 0.5 * (weight_of(grab, levels, end[0]) + weight_of(grab, levels, end[1]));
+}
+
+/* a point that is gone: its weight to the ends of its edge, below 0 where they were not in the grip before, unless one
+ * was; those that are gone themselves hand it on */
+static void hand_on(tool_grab *grab, const pal_shell *shell, int32_t point)
+{
+    double weight = fabs(grab->gather[point]);
+    const int32_t *end = shell->levels.edge[pal_levels_vertex_parent(&shell->levels, point)].vertex;
+    grab->gather[point] = 0;
+    if (weight == 0 || grab->gather[end[0]] > 0 || grab->gather[end[1]] > 0) return;
+    for (int k = 0; k < 2; k++) {
+        grab->gather[end[k]] -= 0.5 * weight;
+        if (!pal_shell_has(shell, end[k])) hand_on(grab, shell, end[k]);
+    }
+}
+
+/* the same grip on the points that are in use now */
+static void grip_again(tool_grab *grab, grip *g, const pal_body *body)
+{
+    const pal_shell *shell = body->shell;
+    for (int i = 0; i < g->n_node; i++) {
+        grab->sum_weight[g->node[i]] -= g->weight[i];
+        grab->gather[g->node[i]] = g->live->even[i];
+    }
+    /* finest first, so that the ends of an edge are asked while they still weigh */
+    for (int level = shell->levels.n_level - 1; level > 0; level--)
+        for (int i = 0; i < g->n_node; i++)
+            if (shell->levels.vertex_level[g->node[i]] == level && !pal_shell_has(shell, g->node[i]))
+                hand_on(grab, shell, g->node[i]);
+    for (int k = 0; k < body->n_active; k++) {
+        int32_t i = body->active[k];
+        if (!grab->use->known[i]) grab->gather[i] = weight_of(grab, &shell->levels, i);
+    }
+    for (int k = 0; k < body->n_active; k++) {
+        double *weight = &grab->gather[body->active[k]];
+        *weight = fabs(*weight);
+    }
+    take_gathered(grab, g, body);
+    g->live->renewed = true;
+}
+
+/* once a step: points that came and went */
+static void follow(tool_grab *grab, const pal_body *body)
+{
+    if (!grab->use || grab->use->revision == body->revision) return;
+    for (int t = 0; t < grab->n_tool; t++)
+        if (grab->grip[t].held) grip_again(grab, &grab->grip[t], body);
+    look(grab->use, body);
 }
 
 /* once a step: the button's edges */
@@ -235,6 +361,32 @@ static double spring_N_m(const tool_grab *grab, const grip *g, const pal_tool *t
     return fmin(stiffness_N_m(grab, reach_m(grab, tool)), g->k_most_N_m);
 }
 
+/* Bodies that adapt: goal, with the force as it was before the nodes changed. The patch y of the new nodes is the same
+ * tissue, so the hold o goes with it for good; that the spring's k may be another is made up for by shift. */
+static void keep_force(grip *g, const pal_tool *tool, const double y[3], const double v[3], double k_N_m, double dt_s,
+                       double goal[3])
+{
+    live_grip *l = g->live;
+    double fade = fmax(0, 1 - dt_s / SHIFT_S);
+    pal_scale3(l->shift, fade, l->shift);
+    if (l->renewed && k_N_m > 0) {
+        double moved[3], back[4] = {tool->next.quat[0], -tool->next.quat[1], -tool->next.quat[2], -tool->next.quat[3]};
+        pal_sub3(moved, y, l->y);
+        pal_axpy3(moved, -l->dt_s, v);
+        pal_add3(goal, goal, moved);
+        pal_quat_rotate(moved, back, moved);
+        pal_add3(g->offset, g->offset, moved);
+        pal_scale3(l->shift, l->k_N_m / k_N_m, l->shift);
+        for (int c = 0; c < 3; c++) l->shift[c] += (l->k_N_m / k_N_m - 1) * (goal[c] - y[c]);
+    }
+    if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
+    pal_add3(goal, goal, l->shift);
+    pal_copy3(l->y, y);
+    l->k_N_m = k_N_m;
+    l->dt_s = dt_s;
+    l->renewed = false;
+}
+
 static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
@@ -244,7 +396,9 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     pal_quat_rotate(goal, tool->next.quat, g->offset);
     pal_add3(goal, goal, tool->here_m);
     pal_sub3(goal, goal, body->offset_m);
-    double k = spring_N_m(grab, g, tool), c = fmin(k * grab->damping_s, g->c_most_Ns_m);
+    double k = spring_N_m(grab, g, tool);
+    if (g->live) keep_force(g, tool, y, v, k, step->dt_s, goal);
+    double c = fmin(k * grab->damping_s, g->c_most_Ns_m);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
     pal_set3(g->force, 0, 0, 0);
     if (!pal_finite3(force)) return;
@@ -377,6 +531,7 @@ static pal_err run(void *self, pal_step *step)
     int n_tool = tools->n_tool < grab->n_tool ? tools->n_tool : grab->n_tool;
     for (int t = 0; t < n_tool; t++) {
         grip *g = &grab->grip[t];
+        if (step->sub == 0 && t == 0) follow(grab, step->body);
         if (step->sub == 0) begin_tool(grab, g, &tools->tool[t], step->body);
         g->pulls = false;
         if (!g->held || step->body->frozen) continue;

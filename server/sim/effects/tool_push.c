@@ -16,13 +16,19 @@
  * sub-step (sim/press.h, which also says how caps are kept). Patches are then published after the solve, their k1 from
  * the solver's compliance where it has one, at most two of them a step.
  *
+ * A body that adapts (sim/shell.h) has a solver that holds loads over a sub-step (rk4), so that they lag by dt/2. With
+ * f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the lag, and
+ * a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact changes at
+ * once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force does not rise
+ * in that moment, and grows again in EASE_S.
+ *
  * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
- * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: penetration correction a
- * step, in box diagonals), near_m (0: the larger of a radius and 10 mm; within it a patch is published), slip_S (0.25),
- * slip_s (0.5). */
+ * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: correction a step, in
+ * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
+ * (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/effect.h"
 #include "server/sim/patch.h"
@@ -35,10 +41,12 @@
 
 #define ALPHA         1.2
 #define GAMMA         0.5
+#define ALPHA_HELD    0.5
+#define GAMMA_HELD    1.0
+#define EASE_S        (1.0 / 6)
 #define SAFETY        1.3
 #define SHARE_RISE    1.01
 #define DEEPEST_RADII 0.5
-#define BLOB_COSINE   0.25
 /* implicit: contact over tissue stiffness; a point that is nearly as near as the nearest belongs to a near patch */
 #define STIFFER     15.0
 #define NEAR_RADII  0.125
@@ -52,6 +60,7 @@
 #define STIFFEST      8.0
 #define SHALLOW_RADII 0.05
 #define BELOW_CAP     0.98
+#define LEAST_EASE    0.01
 enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10, FELT_A_STEP = 2, NEAR_MAX = 256 };
 
 /* what a tool needs beside with an implicit solver */
@@ -78,6 +87,8 @@ typedef struct holder {
     pal_contact *contact; /* [CONTACT_MAX] */
     int n_contact;
     double slip[3];  /* sideways way of the tool over tissue that friction still holds, m */
+    double raw_N;    /* normal force of the last sub-step before caps */
+    bool renewed;    /* other triangles are drawn since the step before */
     double share;    /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3]; /* on the tool, this sub-step, this body */
     pal_patches patches;
@@ -270,11 +281,14 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
         pal_sub3(last, tool->last.position_m, body->offset_m);
         seat(push, h, body, last, tool->radius_m);
         h->ease = 1;
+        /* it has neither touched nor slipped before */
+        h->renewed = false;
+        pal_set3(h->slip, 0, 0, 0);
     } else if (h->behind_s > push->slip_s) {
         seat(push, h, body, next, tool->radius_m);
         h->ease = 0;
     }
-    h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
+    if (!body->shell) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);
     pal_copy3(h->limits.a, h->proxy.x);
     pal_copy3(h->limits.b, next);
@@ -354,12 +368,12 @@ static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step 
     pal_arena_return(step->scratch, used);
 }
 
-/* force on one contact point: penalty with damping */
-static void contact_force(const tool_push *push, pal_contact *c, double k, double dt_s)
+/* force on one contact point: penalty with damping over a time */
+static void contact_force(const tool_push *push, pal_contact *c, double k, double damping_s)
 {
     double v[3];
     pal_touch_velocity(&push->touch, c->point, v);
-    double f = k * (c->depth_m - GAMMA * dt_s * pal_dot3(v, c->away));
+    double f = k * (c->depth_m - damping_s * pal_dot3(v, c->away));
     pal_scale3(c->force, f > 0 ? f : 0, c->away);
 }
 
@@ -398,7 +412,8 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
             pal_touch_share(&push->touch, step->body, h->contact, h->n_contact, other->contact, other->n_contact);
     }
     double rate = SAFETY * n_share * pal_touch_stiffest(&push->touch, step->body, h->contact, h->n_contact);
-    double most = ALPHA / (step->dt_s * step->dt_s), share = rate > most ? most / rate : 1;
+    double most = (step->body->shell ? ALPHA_HELD : ALPHA) / (step->dt_s * step->dt_s),
+           share = rate > most ? most / rate : 1;
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
 }
 
@@ -411,20 +426,39 @@ static void follow_side(holder *h, const double before[3])
     pal_unit3(h->proxy.normal, side, 1e-9);
 }
 
+/* other triangles since the step before: the force does not rise in that moment; returns what it was shortened to */
+static double keep_force(holder *h, double sum[3])
+{
+    double size = pal_norm3(sum), part = 1;
+    if (h->renewed && size > h->raw_N) {
+        part = fmax(h->raw_N / size, LEAST_EASE);
+        h->ease *= part;
+        pal_scale3(sum, part, sum);
+        for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, part, h->contact[i].force);
+    }
+    h->renewed = false;
+    h->raw_N = part * size;
+    return part;
+}
+
 /* forces of one tool to the nodes and back */
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
+    if (body->shell) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
     double soft = tool->ramp * h->ease * h->share, sum[3] = {0}, stiffness = 0;
+    double damping_s = step->dt_s * (body->shell ? GAMMA_HELD : GAMMA);
     if (h->n_contact == 0 || soft <= 0) {
         pal_set3(h->slip, 0, 0, 0);
+        h->raw_N = 0;
         return;
     }
     for (int i = 0; i < h->n_contact; i++) {
-        contact_force(push, &h->contact[i], soft * h->contact[i].k_N_m, step->dt_s);
+        contact_force(push, &h->contact[i], soft * h->contact[i].k_N_m, damping_s);
         pal_add3(sum, sum, h->contact[i].force);
         stiffness += soft * h->contact[i].k_N_m;
     }
+    if (body->shell) stiffness *= keep_force(h, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, h, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
@@ -473,34 +507,6 @@ static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step
     h->n_contact = h->firm->press.n_contact;
 }
 
-/* the strongest contacts not yet grouped, within 75 degrees of their mean */
-static bool contact_blob(const holder *h, uint8_t *grouped, pal_blob *blob)
-{
-    double axis[3], sum[3];
-    int seed = -1;
-    double most = 0;
-    for (int i = 0; i < h->n_contact; i++) {
-        double f2 = pal_dot3(h->contact[i].force, h->contact[i].force);
-        if (!grouped[i] && f2 > most) most = f2, seed = i;
-    }
-    if (seed < 0) return false;
-    pal_copy3(axis, h->contact[seed].away);
-    for (int pass = 0; pass < 2; pass++) {
-        pal_set3(sum, 0, 0, 0);
-        for (int i = 0; i < h->n_contact; i++)
-            if (!grouped[i] && pal_dot3(h->contact[i].away, axis) >= BLOB_COSINE)
-                pal_add3(sum, sum, h->contact[i].force);
-        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
-    }
-    for (int i = 0; i < h->n_contact; i++)
-        if (pal_dot3(h->contact[i].away, axis) >= BLOB_COSINE) grouped[i] = 1;
-    grouped[seed] = 1;
-    blob->force_N = pal_norm3(sum);
-    blob->gap_m = blob->k_N_m = 0;
-    pal_scale3(sum, -1, sum);
-    return pal_unit3(blob->normal, sum, 0);
-}
-
 /* the nearest tissue not in the direction of an earlier blob (beside a contact: only what faces it, since the tissue
  * around a dent goes along with the tool); directions of what is about as near are averaged */
 static bool near_blob(const holder *h, const double *x, double near, const pal_blob *earlier, int n_earlier,
@@ -516,7 +522,7 @@ static bool near_blob(const holder *h, const double *x, double near, const pal_b
             if (!pal_unit3(out, out, 1e-9 * radius)) continue;
             bool seen = false;
             for (int b = 0; b < n_earlier && !seen; b++)
-                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : BLOB_COSINE);
+                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : PAL_BLOB_COSINE);
             if (seen) continue;
             if (pass == 0)
                 least = fmin(least, distance);
@@ -573,7 +579,7 @@ static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list);
     uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, h->n_contact);
     if (x && grouped) {
-        while (n < PAL_PATCH_MAX && contact_blob(h, grouped, &blob[n])) n++;
+        while (n < PAL_PATCH_MAX && pal_press_blob(h->contact, h->n_contact, grouped, &blob[n])) n++;
         for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
         while (n < PAL_PATCH_MAX && near_blob(h, x, near_m(push, tool->radius_m), blob, n, &blob[n])) n++;
         for (int b = 0; b < n && step->body->compliance; b++) feel(push, h, tool, step, x, &blob[b]);
@@ -595,6 +601,8 @@ static pal_err run(void *self, pal_step *step)
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     if (step->body->frozen) return PAL_ERR_OK;
     if (step->sub == 0) {
+        bool renewed = pal_touch_follow(&push->touch, step->body);
+        for (int t = 0; t < n_tool; t++) push->holder[t].renewed = renewed;
         pal_touch_begin(&push->touch);
         for (int t = 0; t < n_tool; t++) begin_tool(push, &push->holder[t], &tools->tool[t], step);
     }

@@ -26,8 +26,11 @@ static pal_err run(void *self, pal_step *step)
 {
     const viscous *row = self;
     const pal_body *body = step->body;
-    for (int i = 0; i < body->n_node; i++)
+    const int32_t *active = body->active;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = active ? active[k] : k;
         for (int c = 0; c < 3; c++) body->f[3 * i + c] -= row->rate_1_s * body->mass_kg[i] * body->dv[3 * i + c];
+    }
     return PAL_ERR_OK;
 }
 
@@ -38,7 +41,10 @@ static double drag(void *self)
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += drag(self) * body->mass_kg[i];
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        bound_Ns_m[i] += drag(self) * body->mass_kg[i];
+    }
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)

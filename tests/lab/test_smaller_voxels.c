@@ -1,5 +1,5 @@
 /* Voxels split into smaller ones: the body, its fill and its volume stay, the lattice is finer. */
-#include "server/lab/refine.h"
+#include "server/lab/smaller_voxels.h"
 #include "server/mesh/organ.h"
 #include "tests/check.h"
 

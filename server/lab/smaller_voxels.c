@@ -1,5 +1,5 @@
 /* Voxels split into equal parts, by way of the grid that they came from. */
-#include "server/lab/refine.h"
+#include "server/lab/smaller_voxels.h"
 
 #include <math.h>
 #include <stdlib.h>

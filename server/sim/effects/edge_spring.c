@@ -1,0 +1,335 @@
+/* Row edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and the
+ * opposite on the second (C eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
+ *
+ * Every spring has k times its share (shell.h: the law of the body) and c in the same proportion (C eq. 8: KD_l = KD_0
+ * KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides. Constants that are not
+ * given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). shell->spring_ramp multiplies k.
+ *
+ * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
+ * so that a collapsed surface opens again.
+ *
+ * The springs in use are taken from the shell whenever its revision is a new one. Positions, velocities and forces of
+ * their ends stand in arrays of this row, four numbers a node in the order of shell->node: then the ends of a spring
+ * are one load each, and a force one load and one store. */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/lanes.h"
+#include "server/sim/shell.h"
+
+#include <math.h>
+
+/* of (l/l0)^2 */
+#define LEAST_Q 1e-18
+
+/* x y z 0 of a node */
+typedef double quad __attribute__((vector_size(32)));
+
+/* springs at a time, so that the processor has several blocks under way */
+enum { BATCH = 8 };
+
+typedef struct edge_spring {
+    double k_N_m, c_Ns_m; /* c_Ns_m only when given */
+    double thickness_m;
+    bool k_given, c_given;
+    const pal_shell *shell;
+    double young_Pa; /* of the body, to which E of regions is compared */
+    float *young;    /* E at the middles of all edges, NaN: the body's; NULL: no regions [n edges] */
+
+    uint64_t revision; /* of the shell, what follows was made for; 0: none yet */
+    int n_spring, n_block, n_node;
+    int32_t *place;  /* of a vertex in shell->node                                  [finest vertices] */
+    int32_t *end;    /* places of both ends, in blocks of 8: first ends, then second [n_block][2][8]  */
+    double *w2, *q;  /* 1/l0^2 and share; 0 in lanes without a spring                [n_block][8]     */
+    double *bound;   /* sum of 2 q over the springs of a node                        [n_node]         */
+    quad *x, *v, *f; /* working arrays  [n_node] */
+} edge_spring;
+
+static double derived_k(const edge_spring *e, double young_Pa)
+{
+    return e->k_given ? e->k_N_m : sqrt(3) / 2 * young_Pa * e->thickness_m;
+}
+
+/* a live edit changes the masses after the rows */
+static double damping_now(const edge_spring *e)
+{
+    return e->c_given ? e->c_Ns_m : 0.02 * sqrt(e->k_N_m * e->shell->level_mass_kg[0]);
+}
+
+/* E at the middles of all edges */
+static pal_err find_young(edge_spring *e, const pal_build *build)
+{
+    const pal_levels *levels = &e->shell->levels;
+    int32_t n_edge = levels->first_edge[levels->n_level];
+    if (build->def->n_region == 0) return PAL_ERR_OK;
+    e->young = PAL_NEW(build->arena, float, n_edge);
+    if (!e->young) return PAL_ERR_MEMORY;
+    pal_material base = build->def->material, at;
+    base.young_Pa = NAN;
+    for (int32_t i = 0; i < n_edge; i++) {
+        const int32_t *vertex = levels->edge[i].vertex;
+        const double *a = levels->x + 3 * (size_t)vertex[0], *b = levels->x + 3 * (size_t)vertex[1];
+        double middle[3] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
+        pal_material_over(build->def, &base, middle, &at);
+        e->young[i] = (float)at.young_Pa;
+    }
+    return PAL_ERR_OK;
+}
+
+/* E at the middle of an edge over the body's */
+static double young_ratio(const edge_spring *e, int32_t edge)
+{
+    return e->young && !isnan(e->young[edge]) ? (double)e->young[edge] / e->young_Pa : 1;
+}
+
+static pal_err allocate(edge_spring *e, pal_arena *arena)
+{
+    const pal_levels *levels = &e->shell->levels;
+    int finest = levels->n_level - 1;
+    size_t n_vertex = (size_t)levels->n_vertex[finest];
+    size_t n_lane = ((size_t)pal_levels_n_edge(levels, finest) + PAL_LANES - 1) / PAL_LANES * PAL_LANES;
+    e->place = PAL_NEW(arena, int32_t, n_vertex);
+    e->end = PAL_NEW(arena, int32_t, 2 * n_lane);
+    e->w2 = PAL_NEW(arena, double, n_lane);
+    e->q = PAL_NEW(arena, double, n_lane);
+    e->bound = PAL_NEW(arena, double, n_vertex);
+    e->x = PAL_NEW(arena, quad, n_vertex);
+    e->v = PAL_NEW(arena, quad, n_vertex);
+    e->f = PAL_NEW(arena, quad, n_vertex);
+    bool all = e->place && e->end && e->w2 && e->q && e->bound && e->x && e->v && e->f;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    const pal_shell *shell = build->body->shell;
+    if (!shell)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                            item->path, item->name);
+    edge_spring *e = PAL_NEW(build->arena, edge_spring, 1);
+    if (!e) return PAL_ERR_MEMORY;
+    e->shell = shell;
+    e->k_given = pal_item_has(item, "k_N_m");
+    e->c_given = pal_item_has(item, "c_Ns_m");
+    PAL_TRY(pal_item_number(item, "k_N_m", 0, 1e60, &e->k_N_m, build->note));
+    PAL_TRY(pal_item_number(item, "c_Ns_m", 0, 1e60, &e->c_Ns_m, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    /* the model's key, also for an entry that stands in the place of the model's row */
+    pal_item model = build->def->model;
+    e->thickness_m = 0.003;
+    PAL_TRY(pal_item_number(&model, "thickness_m", 0, 1e9, &e->thickness_m, build->note));
+    e->young_Pa = build->def->material.young_Pa;
+    e->k_N_m = derived_k(e, e->young_Pa);
+    PAL_TRY(find_young(e, build));
+    PAL_TRY(allocate(e, build->arena));
+    *self = e;
+    return PAL_ERR_OK;
+}
+
+/* the springs in use */
+static void take_springs(edge_spring *e)
+{
+    const pal_shell *shell = e->shell;
+    const double *x = shell->levels.x;
+    if (e->revision == shell->revision && e->n_block > 0) return;
+    e->revision = shell->revision;
+    e->n_spring = shell->n_spring, e->n_node = shell->n_node;
+    e->n_block = (e->n_spring + PAL_LANES - 1) / PAL_LANES;
+    for (int k = 0; k < e->n_node; k++) {
+        e->place[shell->node[k]] = k;
+        e->bound[k] = 0;
+        e->f[k] = (quad){0};
+    }
+    for (int s = 0; s < PAL_LANES * e->n_block; s++) {
+        int32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
+        end[0] = end[PAL_LANES] = 0;
+        e->w2[s] = e->q[s] = 0;
+        if (s >= e->n_spring) continue;
+        int32_t edge = shell->spring[s], a = shell->levels.edge[edge].vertex[0], b = shell->levels.edge[edge].vertex[1];
+        double d[3];
+        pal_sub3(d, x + 3 * (size_t)b, x + 3 * (size_t)a);
+        end[0] = e->place[a], end[PAL_LANES] = e->place[b];
+        e->w2[s] = 1 / pal_dot3(d, d);
+        e->q[s] = (double)shell->spring_share[s] * young_ratio(e, edge);
+        e->bound[end[0]] += 2 * e->q[s];
+        e->bound[end[PAL_LANES]] += 2 * e->q[s];
+    }
+}
+
+/* sums of x y z over 8 nodes' products */
+PAL_INLINE pal_v8 sum_quads(const quad p[PAL_LANES])
+{
+    quad half[2];
+    for (int h = 0; h < 2; h++) {
+        const quad *a = p + 4 * h;
+        /* x + y and z + 0 of two nodes each */
+        quad s = __builtin_shufflevector(a[0], a[1], 0, 4, 2, 6) + __builtin_shufflevector(a[0], a[1], 1, 5, 3, 7);
+        quad t = __builtin_shufflevector(a[2], a[3], 0, 4, 2, 6) + __builtin_shufflevector(a[2], a[3], 1, 5, 3, 7);
+        half[h] = __builtin_shufflevector(s, t, 0, 1, 4, 5) + __builtin_shufflevector(s, t, 2, 3, 6, 7);
+    }
+    return __builtin_shufflevector(half[0], half[1], 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+/* first ends to second ends of a block */
+PAL_INLINE void differences(const quad *at, const int32_t *end, quad d[PAL_LANES])
+{
+    for (int l = 0; l < PAL_LANES; l++) d[l] = at[end[PAL_LANES + l]] - at[end[l]];
+}
+
+/* (l/l0)^2 of n blocks, and their strains' rates (dv.d)/l0^2 when damped; d [n][8] */
+PAL_INLINE void measure_blocks(const edge_spring *e, int first, int n, bool damped, quad *d, pal_v8 *q, pal_v8 *rate)
+{
+    const quad *x = e->x, *v = e->v;
+    for (int b = 0; b < n; b++) {
+        const int32_t *end = e->end + 2 * PAL_LANES * (first + b);
+        pal_v8 w2 = pal_load8(e->w2 + PAL_LANES * (first + b));
+        quad p[PAL_LANES], *to = d + PAL_LANES * b;
+        differences(x, end, to);
+        for (int l = 0; l < PAL_LANES; l++) p[l] = to[l] * to[l];
+        q[b] = sum_quads(p) * w2;
+        if (!damped) continue;
+        differences(v, end, p);
+        for (int l = 0; l < PAL_LANES; l++) p[l] *= to[l];
+        rate[b] = sum_quads(p) * w2;
+    }
+}
+
+/* with q = (l/l0)^2 and r = 1/sqrt(q): k (l - l0) d/l = k (1 - r) d, and c (dv.d)/l^2 d; returns the least q */
+PAL_INLINE double run_springs(edge_spring *e, double k, double c, bool damped)
+{
+    const pal_v8 floor = LEAST_Q - (pal_v8){0}, none = {0}, one = 1 - none;
+    pal_v8 least = one;
+    quad *f = e->f;
+    for (int first = 0; first < e->n_block; first += BATCH) {
+        const int n = e->n_block - first < BATCH ? e->n_block - first : BATCH;
+        quad d[BATCH * PAL_LANES];
+        pal_v8 q[BATCH], rate[BATCH];
+        double s[BATCH * PAL_LANES];
+        measure_blocks(e, first, n, damped, d, q, rate);
+        for (int b = 0; b < n; b++) {
+            pal_v8 share = pal_load8(e->q + PAL_LANES * (first + b)), known = pal_pick8(share > none, q[b], one);
+            least = pal_pick8(known < least, known, least);
+            pal_v8 r = pal_inverse_root8(pal_pick8(q[b] < floor, floor, q[b])), s8 = k * (one - r);
+            if (damped) s8 += c * rate[b] * r * r;
+            *(pal_lanes *)(s + PAL_LANES * b) = pal_pick8(q[b] < floor, none, share * s8);
+        }
+        for (int b = 0; b < n; b++) {
+            const int32_t *end = e->end + 2 * PAL_LANES * (first + b);
+            for (int l = 0; l < PAL_LANES; l++) {
+                quad force = s[PAL_LANES * b + l] * d[PAL_LANES * b + l];
+                f[end[l]] += force;
+                f[end[PAL_LANES + l]] -= force;
+            }
+        }
+    }
+    for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
+    return least[0];
+}
+
+static void spring_ends(const edge_spring *e, int s, int32_t vertex[2])
+{
+    const int32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
+    vertex[0] = e->shell->node[end[0]], vertex[1] = e->shell->node[end[PAL_LANES]];
+}
+
+/* what the vectors leave out: springs without length push their ends apart along the rest direction */
+static void reopen(const edge_spring *e, const pal_body *body, double k)
+{
+    for (int s = 0; s < e->n_spring; s++) {
+        int32_t vertex[2];
+        double d[3];
+        spring_ends(e, s, vertex);
+        size_t a = 3 * (size_t)vertex[0], b = 3 * (size_t)vertex[1];
+        pal_sub3(d, body->d + b, body->d + a);
+        if (pal_dot3(d, d) * e->w2[s] >= LEAST_Q) continue;
+        pal_sub3(d, body->x_rest + b, body->x_rest + a);
+        pal_axpy3(body->f + b, k * e->q[s], d);
+        pal_axpy3(body->f + a, -k * e->q[s], d);
+    }
+}
+
+static void gather_nodes(const edge_spring *e, const double *from, quad *to)
+{
+    const int32_t *node = e->shell->node;
+    for (int k = 0; k < e->n_node; k++) {
+        const double *a = from + 3 * (size_t)node[k];
+        to[k] = (quad){a[0], a[1], a[2], 0};
+    }
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    edge_spring *e = self;
+    pal_body *body = step->body;
+    take_springs(e);
+    double k = e->k_N_m * e->shell->spring_ramp, c = damping_now(e), least;
+    gather_nodes(e, body->d, e->x);
+    if (c > 0) {
+        gather_nodes(e, body->dv, e->v);
+        least = run_springs(e, k, c, true);
+    } else {
+        least = run_springs(e, k, 0, false);
+    }
+    /* forces out, and back to zero for the next time */
+    const int32_t *node = e->shell->node;
+    for (int i = 0; i < e->n_node; i++) {
+        double *f = body->f + 3 * (size_t)node[i];
+        for (int q = 0; q < 3; q++) f[q] += e->f[i][q];
+        e->f[i] = (quad){0};
+    }
+    if (least < LEAST_Q) reopen(e, body, k);
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    edge_spring *e = self;
+    take_springs(e);
+    double sum = 0;
+    for (int s = 0; s < e->n_spring; s++) {
+        int32_t vertex[2];
+        spring_ends(e, s, vertex);
+        double longer =
+            pal_dist3(body->d + 3 * (size_t)vertex[1], body->d + 3 * (size_t)vertex[0]) - 1 / sqrt(e->w2[s]);
+        sum += e->q[s] * longer * longer;
+    }
+    return 0.5 * e->k_N_m * e->shell->spring_ramp * sum;
+}
+
+/* k at both ends along the spring; across it k (1 - l0/l) is never more for l > l0 and none for l < l0 */
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    edge_spring *e = self;
+    (void)body;
+    take_springs(e);
+    double k = e->k_N_m * e->shell->spring_ramp;
+    for (int i = 0; i < e->n_node; i++) bound_N_m[e->shell->node[i]] += k * e->bound[i];
+}
+
+static void damping(void *self, const pal_body *body, double *bound_Ns_m)
+{
+    edge_spring *e = self;
+    (void)body;
+    take_springs(e);
+    double c = damping_now(e);
+    for (int i = 0; i < e->n_node; i++) bound_Ns_m[e->shell->node[i]] += c * e->bound[i];
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    edge_spring *e = self;
+    (void)body, (void)note;
+    if (!e->k_given) e->young_Pa = to->young_Pa;
+    e->k_N_m = derived_k(e, e->young_Pa);
+    e->n_block = 0;
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_edge_spring = {.name = "edge_spring",
+                                           .stage = PAL_STAGE_FORCE,
+                                           .internal = true,
+                                           .make = make,
+                                           .run = run,
+                                           .energy = energy,
+                                           .stiffness = stiffness,
+                                           .damping = damping,
+                                           .material = material};

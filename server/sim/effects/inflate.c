@@ -1,0 +1,254 @@
+/* Row inflate: what a closed hollow body is filled with pushes its walls. f_i = p dV/dx_i, V the volume within the
+ * drawn triangles (watertight on every mixture of levels), dV/dx_i a third of the area normals of the triangles at i.
+ * Without net force and moment, whatever the shape.
+ *
+ * With s = V/V_rest, both of the triangles drawn now, so that a switch of level does not change s:
+ *   kind "pressure"  p = pressure_Pa
+ *   kind "gas"       p = pressure_Pa + absolute_Pa (1/s - 1), the temperature kept: p_absolute V = const. Below
+ *                    s = 1/11, squeezed flat or turned inside out, the second part stays at 10 absolute_Pa: finite, and
+ *                    blowing the body up again
+ *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part at most 10 bulk_Pa either way
+ * The energy is -V_0 times the integral of p over s from 1, with V_0 the rest volume of the finest level; forces are
+ * its gradient. A coarse level, whose volume is a little less, so gets a pressure that is a little more and does the
+ * same work. pressure_Pa > 0 inflates, < 0 sucks; it comes in smoothly over the first ramp_s of simulated time, again
+ * after a reset.
+ *
+ * Pieces that do not hang together share one volume. A surface whose faces look inwards is turned.
+ * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/shell.h"
+
+#include <string.h>
+
+/* least rest volume over S^3 */
+#define LEAST_FILL 1e-9
+
+typedef enum filling { PRESSURE, GAS, FLUID } filling;
+
+typedef struct inflate {
+    filling kind;
+    double pressure_Pa, stiff_Pa, ramp_s; /* stiff_Pa: absolute_Pa or bulk_Pa             */
+    double share;                         /* of pressure_Pa at the last run               */
+    double fine_m3;                       /* V_0, signed                                  */
+    double rest_m3;                       /* V_rest of the triangles at `revision`        */
+    uint64_t revision;
+    double *gradient; /* dV/dx_i, m^2, of the active nodes [n_node][3] */
+} inflate;
+
+/* stiff parts of pressure are at most this often stiff_Pa */
+static const double most = 10;
+
+static pal_err read_keys(inflate *row, pal_item *item, pal_note *note)
+{
+    static const char *const names[] = {"pressure", "gas", "fluid"};
+    const char *kind = names[PRESSURE];
+    PAL_TRY(pal_item_text(item, "kind", &kind, note));
+    while (row->kind <= FLUID && strcmp(kind, names[row->kind]) != 0) row->kind++;
+    if (row->kind > FLUID)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s.kind: \"%s\", wanted \"pressure\", \"gas\" or \"fluid\"",
+                            item->path, kind);
+    row->ramp_s = 0.5;
+    row->stiff_Pa = row->kind == GAS ? 101325 : row->kind == FLUID ? 20000 : 0;
+    PAL_TRY(pal_item_number(item, "pressure_Pa", -1e12, 1e12, &row->pressure_Pa, note));
+    PAL_TRY(pal_item_number(item, "ramp_s", 0, 1e6, &row->ramp_s, note));
+    if (row->kind == GAS) PAL_TRY(pal_item_number(item, "absolute_Pa", 0, 1e12, &row->stiff_Pa, note));
+    if (row->kind == FLUID) PAL_TRY(pal_item_number(item, "bulk_Pa", 0, 1e12, &row->stiff_Pa, note));
+    return pal_item_done(item, note);
+}
+
+/* 6 V of a triangle and a point */
+static double six_volumes(const double *x, const int32_t *tri, const double from[3])
+{
+    double e[3][3], n[3];
+    for (int c = 0; c < 3; c++) pal_sub3(e[c], x + 3 * (size_t)tri[c], from);
+    pal_cross3(n, e[1], e[2]);
+    return pal_dot3(e[0], n);
+}
+
+static double volume(const double *x, const int32_t *tri, int n_tri)
+{
+    double sum = 0;
+    for (int t = 0; t < n_tri; t++) sum += six_volumes(x, tri + 3 * (size_t)t, x + 3 * (size_t)tri[0]);
+    return sum / 6;
+}
+
+static pal_err check_surface(inflate *row, const pal_item *item, const pal_build *build)
+{
+    const pal_shell *shell = build->body->shell;
+    if (!shell)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                            item->path, item->name);
+    const pal_levels *levels = &shell->levels;
+    int n_open = 0, last = levels->n_level - 1;
+    for (int32_t e = 0; e < pal_levels_n_edge(levels, 0); e++) n_open += levels->edge[e].face[1] < 0;
+    if (n_open > 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path, item->name,
+                            n_open);
+    row->fine_m3 =
+        volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
+    double size = build->body->size_m, least_m3 = LEAST_FILL * size * size * size;
+    if (!(fabs(row->fine_m3) > least_m3))
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
+                            fabs(row->fine_m3));
+    return PAL_ERR_OK;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    inflate keys = {.revision = UINT64_MAX};
+    PAL_TRY(check_surface(&keys, item, build));
+    PAL_TRY(read_keys(&keys, item, build->note));
+    inflate *row = PAL_NEW(build->arena, inflate, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *row = keys;
+    row->gradient = PAL_NEW(build->arena, double, 3 * (size_t)build->body->n_node);
+    if (!row->gradient) return PAL_ERR_MEMORY;
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+/* V_rest of what is drawn now; where that encloses next to nothing, that of the finest level */
+static void follow(inflate *row, const pal_shell *shell)
+{
+    if (row->revision == shell->revision) return;
+    row->revision = shell->revision;
+    row->rest_m3 = volume(shell->levels.x, shell->tri, shell->n_tri);
+    if (!(row->rest_m3 / row->fine_m3 > 0.01)) row->rest_m3 = row->fine_m3;
+}
+
+/* row->gradient of the active nodes at the present positions; returns V. On a closed surface the area normals give the
+ * exact gradient, and V is a third of the sum of x . dV/dx */
+static double measure_volume(inflate *row, const pal_body *body)
+{
+    const pal_shell *shell = body->shell;
+    const double *from = body->d + 3 * (size_t)pal_body_point(body, 0);
+    double sum = 0;
+    for (int k = 0; k < body->n_active; k++)
+        memset(row->gradient + 3 * (size_t)pal_body_point(body, k), 0, 3 * sizeof(double));
+    for (int t = 0; t < shell->n_tri; t++) {
+        const int32_t *tri = shell->tri + 3 * (size_t)t;
+        const double *a = body->d + 3 * (size_t)tri[0];
+        double p[3], q[3], n[3];
+        pal_sub3(p, body->d + 3 * (size_t)tri[1], a);
+        pal_sub3(q, body->d + 3 * (size_t)tri[2], a);
+        pal_cross3(n, p, q);
+        for (int c = 0; c < 3; c++) pal_axpy3(row->gradient + 3 * (size_t)tri[c], 1.0 / 6, n);
+    }
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        double arm[3];
+        pal_sub3(arm, body->d + i, from);
+        sum += pal_dot3(arm, row->gradient + i);
+    }
+    return sum / 3;
+}
+
+/* over stiff_Pa: the stiff part of the pressure, its slope -d/ds and its integral over s from 1 */
+typedef struct answer {
+    double value, slope, sum;
+} answer;
+
+static answer answer_gas(double s)
+{
+    double low = 1 / (1 + most), least = fmax(s, low);
+    answer a = {.value = 1 / least - 1, .slope = s > low ? 1 / (s * s) : 0, .sum = log(least) - (least - 1)};
+    a.sum += a.value * (s - least);
+    return a;
+}
+
+static answer answer_fluid(double s)
+{
+    double at = fmin(fmax(s, 1 - most), 1 + most);
+    answer a = {.value = 1 - at, .slope = s == at ? 1 : 0, .sum = -0.5 * (1 - at) * (1 - at)};
+    a.sum += a.value * (s - at);
+    return a;
+}
+
+static answer answer_to(const inflate *row, double s)
+{
+    return row->kind == GAS ? answer_gas(s) : row->kind == FLUID ? answer_fluid(s) : (answer){0};
+}
+
+/* p V_0/V_rest: the force is that times row->gradient; s and the gradient at the present positions */
+static double push(inflate *row, const pal_body *body, double *s)
+{
+    follow(row, body->shell);
+    *s = measure_volume(row, body) / row->rest_m3;
+    double p = row->share * row->pressure_Pa + row->stiff_Pa * answer_to(row, *s).value;
+    return p * fabs(row->fine_m3) / row->rest_m3;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    inflate *row = self;
+    pal_body *body = step->body;
+    double s, t = step->time_s;
+    row->share = t < row->ramp_s ? 0.5 * (1 - cos(M_PI * t / row->ramp_s)) : 1;
+    double p = push(row, body, &s);
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        pal_axpy3(body->f + i, p, row->gradient + i);
+    }
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    inflate *row = self;
+    double s;
+    push(row, body, &s);
+    double sum = row->share * row->pressure_Pa * (s - 1) + row->stiff_Pa * answer_to(row, s).sum;
+    return -fabs(row->fine_m3) * sum;
+}
+
+/* Two parts. The change of p stiffens along g = dV/dx alone: k g g', whose largest w^2, k sum of g.g/m over the free
+ * nodes, is taken at every node. And at constant p the edge (i, j) between corners k and l couples its ends by
+ * p |x_k - x_l|/6, at most the way from both to its middle */
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    inflate *row = self;
+    const pal_shell *shell = body->shell;
+    double s, sum = 0;
+    (void)push(row, body, &s);
+    const answer now = answer_to(row, s);
+    double w = fabs(row->fine_m3 / row->rest_m3), k = row->stiff_Pa * now.slope * w / fabs(row->rest_m3);
+    /* all of pressure_Pa, whatever has come in so far: a limit is kept while nodes hardly move */
+    double p = w * (fabs(row->pressure_Pa) + row->stiff_Pa * fabs(now.value));
+    for (int n = 0; n < body->n_active; n++) {
+        int i = pal_body_point(body, n);
+        const double *g = row->gradient + 3 * (size_t)i;
+        if (!body->held[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
+    }
+    for (int n = 0; n < body->n_active; n++) {
+        int i = pal_body_point(body, n);
+        bound_N_m[i] += k * sum * body->mass_kg[i];
+    }
+    for (int t = 0; t < shell->n_tri && p != 0; t++) {
+        const int32_t *tri = shell->tri + 3 * (size_t)t;
+        for (int c = 0; c < 3; c++) {
+            int32_t a = tri[(c + 1) % 3], b = tri[(c + 2) % 3];
+            double middle[3];
+            pal_add3(middle, body->d + 3 * (size_t)a, body->d + 3 * (size_t)b);
+            pal_scale3(middle, 0.5, middle);
+            double bound = p / 6 * pal_dist3(body->d + 3 * (size_t)tri[c], middle);
+            bound_N_m[a] += bound, bound_N_m[b] += bound;
+        }
+    }
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    ((inflate *)self)->share = 0;
+}
+
+const pal_effect pal_effect_inflate = {.name = "inflate",
+                                       .stage = PAL_STAGE_FORCE,
+                                       .make = make,
+                                       .run = run,
+                                       .energy = energy,
+                                       .stiffness = stiffness,
+                                       .reset = reset};

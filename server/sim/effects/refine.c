@@ -1,0 +1,551 @@
+/* Row refine: splits the faces of a shell where it is pressed, moves or bends, and joins them where it is quiet (C,
+ * criterion for refinement and simplification, fig. 2). Once in every_s of simulated time
+ *
+ *   split   every leaf that has a node beyond a threshold, as a corner or hanging on a side, by one level
+ *   join    every face whose children are leaves when all their corners are below half of every threshold, and the
+ *           middles of its edges stand where they would be put if it were split now: the coarse face would lose less
+ *           bend than a quarter of the threshold, so that it is not split again for what it has just lost
+ *
+ * of external force, speed relative to the rigid motion and change of curvature (refine_measure.h).
+ *
+ * Departures. The paper has one threshold for both directions and flickers at it: here a face stays for dwell_s as it
+ * has become, also where a finer neighbour would have it split, which is then put off, so that a face switches at most
+ * 1/dwell_s times a second; one that was joined too early waits up to 8 times as long the next time. A node that bears
+ * a lasting load is not taken away. New nodes are first let down towards balance between the others, which stand still,
+ * as long as they hold more energy than there was: a bent coarse face does not strain, but its finer springs would.
+ * What one evaluation changes is one switch, and it keeps energy, momentum and angular momentum. The stiffness of
+ * springs and of anchors gets one factor each that leaves their energies as they were (where that is more than 0.25 %
+ * of the whole beside rigid motion) and goes back to 1 in ramp_s. The velocities of the changed region (new nodes and
+ * those of another mass) are changed by a rigid motion, until both momenta of the free nodes are what they were, and
+ * their deviations from the region's rigid motion are scaled until the sum of energies is; those of the whole body
+ * where the region is too small for that. Velocities are scaled by 1/2 to 2, stiffness by 1/4 to 2.
+ *
+ * Keys: force_N (absent: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s (absent:
+ * 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (absent: 0.3/h_0); 0 switches a criterion off, and with all three off nothing
+ * ever changes. What stands as it was looked at last is looked at again after dwell_s only. dwell_s (0.2), every_s
+ * (1/120), most_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/refine_measure.h"
+
+#include <limits.h>
+
+enum { NOTHING, SPLIT, JOIN };
+static const double still_h = 1e-4; /* of the mean edge of level 0 */
+
+typedef struct refine {
+    pal_shell *shell;
+    pal_body *body;
+    pal_refine_measure measure;
+    pal_refine_limits limits;
+    bool given_force, given_speed; /* by the scene: a live edit of the material leaves them */
+    double k_N_m;                  /* given by the model; 0: from the material             */
+    double thickness_m, h_m, kg_per_density;
+    double dwell_s, every_s, ramp_s;
+    int most_node;
+
+    double clock_s, wait_s;           /* simulated since reset; until the next evaluation              */
+    double seen_s, seen_load2, way_m; /* clock and sum of squared loads at the last one; no node went farther since */
+    uint64_t seen_revision;           /* 0: there was none                                             */
+    uint8_t *patience;                /* twos by which a face waits longer to be joined                  [n faces]  */
+    double *switched_s;               /* clock of a face's last switch                       [n faces]  */
+    uint8_t *wish;                    /* what each leaf of the list, or its parent, shall do [n_slot]   */
+    double *mass_was;                 /* before the switch, where `seen` is its number       [n_vertex] */
+    uint64_t *seen;                   /* [n_vertex]                                                     */
+    double *still, *bound_N_m;        /* velocities 0 [n_vertex][3]; stiffness of the rows [n_vertex]   */
+    double spring_slope, shape_slope; /* of the ramps, 1/s                                             */
+    double inner_J;                   /* kinetic beside the rigid motion, before the switch             */
+    pal_switch_report report;
+} refine;
+
+/* shares: of the mass, of the energy, of the largest inertia */
+static const double mass_changed = 1e-3, ramp_from = 2.5e-3, least_inertia = 1e-6;
+static const double most_factor = 2, least_ramp = 0.25, most_ramp = 2;
+enum { MOST_PATIENCE = 3, LET_DOWN_MOST = 8 };
+
+/* ---- load ---- */
+
+static void clear(refine *row)
+{
+    const pal_levels *levels = &row->shell->levels;
+    for (int32_t f = 0; f < levels->first_face[levels->n_level]; f++) {
+        row->switched_s[f] = -INFINITY;
+        row->patience[f] = 0;
+    }
+    row->clock_s = row->wait_s = row->spring_slope = row->shape_slope = row->way_m = 0;
+    row->seen_revision = 0;
+    for (int32_t i = 0; i < levels->n_vertex[levels->n_level - 1]; i++) row->seen[i] = 0;
+    row->report = (pal_switch_report){0};
+    pal_set3(row->measure.frame.quat + 1, 0, 0, 0);
+    row->measure.frame.quat[0] = 1;
+}
+
+/* thresholds that the scene did not give */
+static void derive(refine *row, const pal_material *material)
+{
+    double k = row->k_N_m > 0 ? row->k_N_m : 0.5 * sqrt(3) * material->young_Pa * row->thickness_m;
+    double m = row->kg_per_density * material->density_kg_m3;
+    if (!row->given_force) row->limits.force_N = 0.005 * k * row->h_m;
+    if (!row->given_speed) row->limits.speed_m_s = 0.05 * row->h_m * sqrt(k / m);
+}
+
+static pal_err read_keys(refine *row, pal_item *item, const pal_build *build)
+{
+    pal_note *note = build->note;
+    pal_item model = build->def->model;
+    row->thickness_m = 0.003, row->dwell_s = 0.2, row->every_s = 1.0 / 120, row->ramp_s = 0.15;
+    PAL_TRY(pal_item_number(&model, "thickness_m", 1e-9, 1e9, &row->thickness_m, note));
+    PAL_TRY(pal_item_number(&model, "k_spring_N_m", 0, 1e30, &row->k_N_m, note));
+    row->given_force = pal_item_has(item, "force_N"), row->given_speed = pal_item_has(item, "speed_m_s");
+    row->limits.curvature_1_m = 0.3 / row->h_m;
+    derive(row, &build->def->material);
+    PAL_TRY(pal_item_number(item, "force_N", 0, 1e12, &row->limits.force_N, note));
+    PAL_TRY(pal_item_number(item, "speed_m_s", 0, 1e12, &row->limits.speed_m_s, note));
+    PAL_TRY(pal_item_number(item, "curvature_1_m", 0, 1e12, &row->limits.curvature_1_m, note));
+    PAL_TRY(pal_item_number(item, "dwell_s", 0, 1e6, &row->dwell_s, note));
+    PAL_TRY(pal_item_number(item, "every_s", 0, 1e6, &row->every_s, note));
+    PAL_TRY(pal_item_number(item, "ramp_s", 0, 1e6, &row->ramp_s, note));
+    PAL_TRY(pal_item_count(item, "most_node", 0, INT_MAX, &row->most_node, note));
+    return pal_item_done(item, note);
+}
+
+static double mean_edge(const pal_levels *levels)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < levels->first_edge[1]; e++) {
+        const int32_t *end = levels->edge[e].vertex;
+        sum += pal_dist3(levels->x + 3 * (size_t)end[0], levels->x + 3 * (size_t)end[1]);
+    }
+    return sum / levels->first_edge[1];
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    pal_shell *shell = build->body->shell;
+    if (!shell)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "%s: refine needs a surface of levels, model adaptive_springs", item->path);
+    const pal_levels *levels = &shell->levels;
+    size_t n_vertex = (size_t)levels->n_vertex[levels->n_level - 1];
+    refine *row = PAL_NEW(build->arena, refine, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->shell = shell;
+    row->body = build->body;
+    row->h_m = mean_edge(levels);
+    row->kg_per_density = shell->level_mass_kg[0] / build->def->material.density_kg_m3;
+    PAL_TRY(read_keys(row, item, build));
+    PAL_TRY(pal_refine_measure_make(&row->measure, shell, build->arena));
+    row->switched_s = PAL_NEW(build->arena, double, levels->first_face[levels->n_level]);
+    row->patience = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
+    row->wish = PAL_NEW(build->arena, uint8_t, shell->n_slot);
+    row->mass_was = PAL_NEW(build->arena, double, n_vertex);
+    row->seen = PAL_NEW(build->arena, uint64_t, n_vertex);
+    row->still = PAL_NEW(build->arena, double, 3 * n_vertex);
+    row->bound_N_m = PAL_NEW(build->arena, double, n_vertex);
+    if (!row->switched_s || !row->patience || !row->wish || !row->mass_was || !row->seen || !row->still ||
+        !row->bound_N_m)
+        return PAL_ERR_MEMORY;
+    clear(row);
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    (void)body, (void)note;
+    derive(self, to);
+    return PAL_ERR_OK;
+}
+
+/* ---- wishes, from the state as it is ---- */
+
+/* has the face kept its state long enough? */
+static bool settled(const refine *row, int32_t face)
+{
+    bool split = row->shell->face_state[face] == PAL_FACE_SPLIT;
+    return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->patience[face] : 0) * (1 - 1e-9);
+}
+
+/* the face is split: was it joined too early? */
+static void note_split(refine *row, int32_t face)
+{
+    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MOST_PATIENCE);
+    if (!early)
+        row->patience[face] = 0;
+    else if (row->patience[face] < MOST_PATIENCE)
+        row->patience[face]++;
+    row->switched_s[face] = row->clock_s;
+}
+
+/* may the leaf be split, and with it the coarser neighbours that 2:1 asks for? */
+static bool may_split(const refine *row, int32_t face)
+{
+    const pal_shell *shell = row->shell;
+    const pal_levels *levels = &shell->levels;
+    if (!settled(row, face)) return false;
+    for (int k = 0; k < 3; k++) {
+        const pal_winged_edge *edge = &levels->edge[levels->face_edge[3 * (size_t)face + k]];
+        int32_t beside = edge->face[edge->face[0] == face];
+        if (beside < 0 || shell->face_state[beside] != PAL_FACE_ABSENT) continue;
+        if (!may_split(row, pal_levels_face_parent(levels, beside))) return false;
+    }
+    return true;
+}
+
+static bool wants_split(const refine *row, int32_t leaf)
+{
+    const pal_shell *shell = row->shell;
+    const pal_levels *levels = &shell->levels;
+    if (levels->face_level[leaf] + 1 >= levels->n_level) return false;
+    for (int k = 0; k < 3; k++) {
+        int32_t edge = levels->face_edge[3 * (size_t)leaf + k];
+        if (row->measure.mark[levels->face[3 * (size_t)leaf + k]] == PAL_REFINE_STRONG) return true;
+        if (shell->edge_split[edge] > 0 &&
+            row->measure.mark[pal_levels_edge_midpoint(levels, edge)] == PAL_REFINE_STRONG)
+            return true;
+    }
+    return false;
+}
+
+/* does the edge's midpoint stand where the coarse edge would have it, but for a bend far below the threshold? */
+static bool is_straight(const refine *row, const pal_body *body, int32_t edge)
+{
+    const pal_shell *shell = row->shell;
+    const int32_t *end = shell->levels.edge[edge].vertex, middle = pal_levels_edge_midpoint(&shell->levels, edge);
+    if (!(row->limits.curvature_1_m > 0)) return true;
+    double at[3], h = pal_dist3(body->x_rest + 3 * (size_t)end[0], body->x_rest + 3 * (size_t)end[1]);
+    double bend = row->limits.curvature_1_m * ldexp(1, shell->levels.edge_level[edge]);
+    pal_shell_middle(shell, body, edge, at);
+    return pal_dist3(at, body->x + 3 * (size_t)middle) < 0.25 * bend * h * h / 8;
+}
+
+static bool wants_join(const refine *row, const pal_body *body, int32_t face)
+{
+    const pal_levels *levels = &row->shell->levels;
+    for (int k = 0; k < 3; k++) {
+        int32_t middle = pal_levels_edge_midpoint(levels, levels->face_edge[3 * (size_t)face + k]);
+        if (row->measure.mark[levels->face[3 * (size_t)face + k]] != PAL_REFINE_QUIET) return false;
+        if (row->measure.mark[middle] != PAL_REFINE_QUIET) return false;
+        if (!is_straight(row, body, levels->face_edge[3 * (size_t)face + k])) return false;
+        if (body->outer && pal_dot3(body->outer + 3 * (size_t)middle, body->outer + 3 * (size_t)middle) > 0)
+            return false;
+    }
+    return true;
+}
+
+/* the first child speaks for its parent */
+static int32_t parent_of_first(const pal_levels *levels, int32_t leaf)
+{
+    int level = levels->face_level[leaf];
+    return level > 0 && (leaf - levels->first_face[level]) % 4 == 0 ? pal_levels_face_parent(levels, leaf) : -1;
+}
+
+/* fills wish for the leaves of the list; false: there is none */
+static bool take_wishes(refine *row, const pal_body *body)
+{
+    const pal_shell *shell = row->shell;
+    bool any = false;
+    for (int k = 0; k < shell->n_leaf; k++) {
+        int32_t leaf = shell->leaf[k], parent = parent_of_first(&shell->levels, leaf);
+        row->wish[k] = NOTHING;
+        if (wants_split(row, leaf))
+            row->wish[k] = may_split(row, leaf) ? SPLIT : NOTHING;
+        else if (parent >= 0 && settled(row, parent) && pal_shell_can_join(shell, parent) &&
+                 wants_join(row, body, parent))
+            row->wish[k] = JOIN;
+        any |= row->wish[k] != NOTHING;
+    }
+    return any;
+}
+
+/* ---- a switch ---- */
+
+static bool grant_wishes(refine *row, pal_body *body)
+{
+    pal_shell *shell = row->shell;
+    uint64_t n_split = 0, n_join = 0;
+    for (int k = 0; k < shell->n_leaf; k++)
+        if (row->wish[k] == SPLIT && shell->face_state[shell->leaf[k]] == PAL_FACE_LEAF)
+            n_split += (uint64_t)pal_shell_split(shell, body, shell->leaf[k], row->most_node);
+    /* every leaf of the list is split at most once in a switch, by its own wish or a neighbour's */
+    for (int k = 0; k < shell->n_leaf && n_split > 0; k++)
+        if (shell->face_state[shell->leaf[k]] == PAL_FACE_SPLIT) note_split(row, shell->leaf[k]);
+    for (int k = 0; k < shell->n_leaf; k++) {
+        if (row->wish[k] != JOIN) continue;
+        int32_t parent = pal_levels_face_parent(&shell->levels, shell->leaf[k]);
+        if (!pal_shell_can_join(shell, parent) || !pal_shell_join(shell, body, parent)) continue;
+        row->switched_s[parent] = row->clock_s;
+        n_join++;
+    }
+    row->report.n_split += n_split, row->report.n_join += n_join;
+    return n_split + n_join > 0;
+}
+
+/* of all FORCE rows */
+static double elastic_J(const pal_step *step)
+{
+    double sum = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->energy) sum += step->force[i].effect->energy(step->force[i].self, step->body);
+    return sum;
+}
+
+/* one step of Jacobi's for the new nodes alone, to the balance of the rows' forces at rest; f is left as it comes */
+static bool let_down_once(refine *row, pal_step *step)
+{
+    pal_body *body = step->body;
+    /* v as well: the frame of anchors is fitted to it */
+    double *v = body->v, *dv = body->dv;
+    body->v = body->dv = row->still;
+    bool done = pal_gather(step) == PAL_ERR_OK;
+    body->v = v, body->dv = dv;
+    for (int k = 0; k < body->n_active && done; k++) {
+        const size_t i = (size_t)pal_body_point(body, k);
+        if (row->seen[i] == row->report.n_switch || body->held[i] || !(row->bound_N_m[i] > 0)) continue;
+        double move[3];
+        for (int c = 0; c < 3; c++)
+            move[c] = (body->f[3 * i + (size_t)c] - body->load[3 * i + (size_t)c]) / row->bound_N_m[i];
+        done = isfinite(pal_norm3(move));
+        if (done) pal_add3(body->x + 3 * i, body->x + 3 * i, move);
+    }
+    return done;
+}
+
+/* new nodes go towards balance while springs, anchors and the like hold more energy than before the switch */
+static void let_down(refine *row, pal_step *step)
+{
+    const pal_body *body = step->body;
+    const pal_switch_side *before = &row->report.before;
+    const double was = pal_switch_total_J(before) - before->kinetic_J, least = ramp_from * (was + row->inner_J);
+    for (int k = 0; k < body->n_active; k++) row->bound_N_m[pal_body_point(body, k)] = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->stiffness)
+            step->force[i].effect->stiffness(step->force[i].self, body, row->bound_N_m);
+    for (int turn = 0; turn < LET_DOWN_MOST && elastic_J(step) - was > least; turn++)
+        if (!let_down_once(row, step)) return;
+}
+
+/* free, and of the changed region, where that is not all of the body */
+static bool in_region(const refine *row, const pal_body *body, bool whole, int i)
+{
+    if (body->held[i]) return false;
+    if (whole || row->seen[i] != row->report.n_switch) return true;
+    return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
+}
+
+/* the factor that makes `now` J what it was; what is nothing beside `other` J is left alone */
+static double ramp_after(double ramp, double was, double now, double other)
+{
+    if (!(was > 1e-9 * other) || !(now > 1e-9 * other)) return ramp;
+    return fmin(fmax(ramp * was / now, least_ramp), most_ramp);
+}
+
+/* sets the ramps; returns by how much the energy of springs and anchors has grown all the same, J */
+static double keep_elastic(refine *row)
+{
+    const pal_switch_side *before = &row->report.before, *raw = &row->report.raw;
+    pal_shell *shell = row->shell;
+    double was[2] = {shell->spring_ramp, shell->shape_ramp};
+    double least = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
+    if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > least) {
+        shell->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
+        row->spring_slope = (1 - shell->spring_ramp) / row->ramp_s;
+    }
+    if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > least) {
+        shell->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
+        row->shape_slope = (1 - shell->shape_ramp) / row->ramp_s;
+    }
+    return raw->spring_J * shell->spring_ramp / was[0] - before->spring_J + raw->shape_J * shell->shape_ramp / was[1] -
+           before->shape_J;
+}
+
+/* the region's free nodes as one: their mean motion is rigid, V + Omega x (x - centre) */
+typedef struct region {
+    double mass, centre[3], V[3], turn[3], inertia_axis[9], inertia[3], inner_J;
+} region;
+
+/* I^-1 L; no turn about an axis without inertia */
+static void spin_of(const region *r, const double turn[3], double Omega[3])
+{
+    pal_set3(Omega, 0, 0, 0);
+    for (int k = 0; k < 3; k++)
+        if (r->inertia[k] > least_inertia * r->inertia[2])
+            pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, turn) / r->inertia[k], r->inertia_axis + 3 * k);
+}
+
+/* velocity beside the rigid motion, and the place beside the centre */
+static void beside(const region *r, const double Omega[3], const pal_body *body, int i, double arm[3], double d[3])
+{
+    double rigid[3];
+    pal_sub3(arm, body->x + 3 * (size_t)i, r->centre);
+    pal_cross3(rigid, Omega, arm);
+    for (int c = 0; c < 3; c++) d[c] = body->v[3 * (size_t)i + (size_t)c] - r->V[c] - rigid[c];
+}
+
+static bool find_region(const refine *row, const pal_body *body, bool whole, region *r, double Omega[3])
+{
+    static const double none[3];
+    double s[6] = {0}, arm[3], d[3], cross[3];
+    *r = (region){.mass = 0};
+    for (int k = 0; k < body->n_active; k++) {
+        const int i = pal_body_point(body, k);
+        if (!in_region(row, body, whole, i)) continue;
+        r->mass += body->mass_kg[i];
+        pal_axpy3(r->centre, body->mass_kg[i], body->x + 3 * (size_t)i);
+        pal_axpy3(r->V, body->mass_kg[i], body->v + 3 * (size_t)i);
+    }
+    if (!(r->mass > 0)) return false;
+    pal_scale3(r->centre, 1 / r->mass, r->centre);
+    pal_scale3(r->V, 1 / r->mass, r->V);
+    for (int k = 0; k < body->n_active; k++) {
+        const int i = pal_body_point(body, k);
+        if (!in_region(row, body, whole, i)) continue;
+        const double m = body->mass_kg[i];
+        beside(r, none, body, i, arm, d);
+        pal_cross3(cross, arm, d);
+        pal_axpy3(r->turn, m, cross);
+        s[0] += m * arm[0] * arm[0], s[1] += m * arm[1] * arm[1], s[2] += m * arm[2] * arm[2];
+        s[3] += m * arm[0] * arm[1], s[4] += m * arm[0] * arm[2], s[5] += m * arm[1] * arm[2];
+    }
+    const double inertia[9] = {s[1] + s[2], -s[3], -s[4], -s[3], s[0] + s[2], -s[5], -s[4], -s[5], s[0] + s[1]};
+    pal_eigen3(inertia, r->inertia, r->inertia_axis);
+    spin_of(r, r->turn, Omega);
+    for (int k = 0; k < body->n_active; k++) {
+        const int i = pal_body_point(body, k);
+        if (!in_region(row, body, whole, i)) continue;
+        beside(r, Omega, body, i, arm, d);
+        r->inner_J += 0.5 * body->mass_kg[i] * pal_dot3(d, d);
+    }
+    return true;
+}
+
+/* both momenta of the free nodes become those from before, and the kinetic energy that less `gained` J, by the
+ * velocities of the changed region, or those of the whole body; false: the region is too small for that and nothing
+ * was done, which with the whole body never happens */
+static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool whole)
+{
+    const pal_switch_side *before = &row->report.before, *raw = &row->report.raw;
+    region r;
+    double Omega[3], V[3], turn[3], spin[3], push[3], moment[3], arm[3], d[3], rigid[3];
+    if (!find_region(row, body, whole, &r, Omega)) return whole;
+    pal_sub3(push, before->momentum_kg_m_s, raw->momentum_kg_m_s);
+    pal_sub3(turn, before->turn_kg_m2_s, raw->turn_kg_m2_s);
+    pal_cross3(moment, r.centre, push);
+    pal_sub3(turn, turn, moment);
+    pal_add3(turn, turn, r.turn);
+    spin_of(&r, turn, spin);
+    pal_copy3(V, r.V);
+    pal_axpy3(V, 1 / r.mass, push);
+    double rigid_J = 0.5 * (r.mass * pal_dot3(r.V, r.V) + pal_dot3(Omega, r.turn));
+    double wanted_J = before->kinetic_J - gained_J - (raw->kinetic_J - rigid_J - r.inner_J) -
+                      0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, turn));
+    /* nothing to scale where the region moves as one */
+    double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
+    bool enough = scale >= 1 / most_factor && scale <= most_factor && r.inertia[0] > least_inertia * r.inertia[2];
+    if (!enough && !whole) return false;
+    scale = fmin(fmax(scale, 1 / most_factor), most_factor);
+    for (int k = 0; k < body->n_active; k++) {
+        const int i = pal_body_point(body, k);
+        if (!in_region(row, body, whole, i)) continue;
+        beside(&r, Omega, body, i, arm, d);
+        pal_cross3(rigid, spin, arm);
+        for (int c = 0; c < 3; c++) body->v[3 * (size_t)i + (size_t)c] = V[c] + rigid[c] + scale * d[c];
+    }
+    return true;
+}
+
+static double ease(double ramp, double *slope, double dt_s)
+{
+    double next = ramp + *slope * dt_s;
+    if (*slope != 0 && (next - 1) * *slope < 0) return next;
+    *slope = 0;
+    return 1;
+}
+
+/* all wishes of one evaluation, energy and momentum kept */
+static void change(refine *row, pal_step *step)
+{
+    pal_body *body = step->body;
+    pal_switch_report *report = &row->report;
+    pal_switch_side before;
+    pal_switch_take(&before, step);
+    /* a state that is no number is left to the guard */
+    if (!isfinite(pal_switch_total_J(&before))) return;
+    region whole;
+    double Omega[3];
+    row->inner_J = find_region(row, body, true, &whole, Omega) ? whole.inner_J : 0;
+    report->n_switch++;
+    for (int k = 0; k < body->n_active; k++) {
+        const int i = pal_body_point(body, k);
+        row->mass_was[i] = body->mass_kg[i];
+        row->seen[i] = report->n_switch;
+    }
+    if (!grant_wishes(row, body)) {
+        report->n_switch--;
+        return;
+    }
+    pal_shell_update(row->shell, body);
+    report->time_s = row->clock_s;
+    report->before = before;
+    if (row->ramp_s > 0) let_down(row, step);
+    pal_switch_take(&report->raw, step);
+    double gained_J = keep_elastic(row);
+    if (!keep_motion(row, body, gained_J, false)) keep_motion(row, body, gained_J, true);
+    pal_switch_take(&report->after, step);
+}
+
+/* would an evaluation look at what the last one saw? then it can wait, for dwell_s at most */
+static bool is_still(refine *row, const pal_body *body, double dt_s, double *load2)
+{
+    double most2 = 0;
+    *load2 = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        const size_t i = 3 * (size_t)pal_body_point(body, k);
+        double v2 = pal_dot3(body->v + i, body->v + i);
+        most2 = v2 > most2 ? v2 : most2;
+        *load2 += pal_dot3(body->load + i, body->load + i);
+    }
+    row->way_m += dt_s * sqrt(most2);
+    return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->h_m &&
+           fabs(*load2 - row->seen_load2) <= 1e-6 * *load2 && row->clock_s - row->seen_s < row->dwell_s;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    refine *row = self;
+    pal_shell *shell = row->shell;
+    row->clock_s += step->dt_s;
+    row->wait_s -= step->dt_s;
+    shell->spring_ramp = ease(shell->spring_ramp, &row->spring_slope, step->dt_s);
+    shell->shape_ramp = ease(shell->shape_ramp, &row->shape_slope, step->dt_s);
+    double load2;
+    const bool still = is_still(row, step->body, step->dt_s, &load2);
+    if (row->wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
+    row->wait_s = fmax(row->wait_s + row->every_s, 0);
+    if (!(row->limits.force_N > 0 || row->limits.speed_m_s > 0 || row->limits.curvature_1_m > 0)) return PAL_ERR_OK;
+    if (still) return PAL_ERR_OK;
+    row->seen_revision = step->body->revision + 1, row->seen_s = row->clock_s;
+    row->seen_load2 = load2, row->way_m = 0;
+    pal_refine_mark_nodes(&row->measure, shell, step->body, &row->limits);
+    if (take_wishes(row, step->body)) change(row, step);
+    return PAL_ERR_OK;
+}
+
+/* the body is at rest, but may have another level than at load */
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    refine *row = self;
+    pal_shell_level(row->shell, row->body, row->shell->options.start_level);
+    pal_shell_update(row->shell, row->body);
+    clear(row);
+}
+
+const pal_switch_report *pal_refine_report(const void *self)
+{
+    return &((const refine *)self)->report;
+}
+
+const pal_effect pal_effect_refine = {
+    .name = "refine", .stage = PAL_STAGE_ADAPT, .make = make, .run = run, .material = material, .reset = reset};

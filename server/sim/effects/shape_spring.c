@@ -1,0 +1,208 @@
+/* Row shape_spring: every node hangs on its place in the shape at rest (C eq. 10, the shape-preserving springs).
+ *     f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))]
+ * X_i the place at rest, m_0 the mass of a node of level 0, k' and c' the constants of such a node. As anchors go by
+ * mass, they add up to the same whatever is refined and pull every level alike: translation has (w^2 = k'/m_0).
+ *
+ * frame "world": the places at rest themselves, R 1, V and Omega 0; the force goes to the ground.
+ * frame "body": the rigid frame that fits the body best (shell.h), so that the body may move freely. The fit is
+ * weighted by mass as the anchors are; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2, the force
+ * is its exact gradient although the frame follows (envelope theorem), and neither force nor damping has a resultant or
+ * a moment.
+ *
+ * Departures: errata C7 (the paper's damping is divided by the spring's length, which is 0 at rest, and its anchors
+ * stop rigid motion) and C6 (its constant does not know levels: refinement stiffens 4 times a level).
+ *
+ * Keys: k_N_m (0.3 k_0, k_0 the model's constant of springs), c_Ns_m (0.6 sqrt(k' m_0): damping ratio 0.3), frame
+ * (as the model has it). What is not given follows a live material edit. */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/shell.h"
+
+#include <string.h>
+
+typedef struct shape_spring {
+    double k_N_m, c_Ns_m; /* of a node of level 0; c_Ns_m < 0: from k_N_m and its mass */
+    double per_young;     /* k_N_m over the material's E; 0: given                      */
+    bool world;
+    pal_shell_frame frame; /* of the last run */
+} shape_spring;
+
+/* x -> R x + shift is the place where a node belongs, v -> V + Omega x x its velocity there; constants per mass */
+typedef struct hold {
+    double R[9], shift[3], V[3], Omega[3], k, c;
+} hold;
+
+static const double anchor_share = 0.3, damping_share = 0.6;
+
+/* k' as the model's keys have it, and how it goes with E */
+static pal_err derive(shape_spring *row, pal_build *build)
+{
+    pal_item model = build->def->model;
+    double thickness_m = 0.003, k_0 = -1, young_Pa = build->def->material.young_Pa;
+    PAL_TRY(pal_item_number(&model, "thickness_m", 1e-9, 1e9, &thickness_m, build->note));
+    PAL_TRY(pal_item_number(&model, "k_spring_N_m", 0, 1e60, &k_0, build->note));
+    row->per_young = k_0 < 0 ? anchor_share * sqrt(0.75) * thickness_m : 0;
+    row->k_N_m = k_0 < 0 ? row->per_young * young_Pa : anchor_share * k_0;
+    return PAL_ERR_OK;
+}
+
+static void turn_back(shape_spring *row)
+{
+    row->frame = (pal_shell_frame){.quat = {1, 0, 0, 0}};
+}
+
+static bool is_held(const pal_body *body)
+{
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->held[i]) return true;
+    return false;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    const char *frame = is_held(build->body) ? "world" : "body";
+    if (!build->body->shell)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                            item->path, item->name);
+    shape_spring *row = PAL_NEW(build->arena, shape_spring, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->c_Ns_m = -1;
+    if (!pal_item_has(item, "k_N_m")) PAL_TRY(derive(row, build));
+    PAL_TRY(pal_item_number(item, "k_N_m", 0, 1e60, &row->k_N_m, build->note));
+    PAL_TRY(pal_item_number(item, "c_Ns_m", 0, 1e60, &row->c_Ns_m, build->note));
+    PAL_TRY(pal_item_text(item, "frame", &frame, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    if (strcmp(frame, "body") != 0 && strcmp(frame, "world") != 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.frame: \"%s\", wanted \"body\" or \"world\"", item->path,
+                            frame);
+    row->world = frame[0] == 'w';
+    turn_back(row);
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+/* constants over mass */
+static double stiff_1_s2(const shape_spring *row, const pal_shell *shell)
+{
+    return row->k_N_m * shell->shape_ramp / shell->level_mass_kg[0];
+}
+
+static double damp_1_s(const shape_spring *row, const pal_shell *shell)
+{
+    double m = shell->level_mass_kg[0];
+    return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
+}
+
+/* frame: where the last fit ended, and the new one */
+static hold find_hold(const shape_spring *row, const pal_body *body, pal_shell_frame *frame)
+{
+    hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .k = stiff_1_s2(row, body->shell), .c = damp_1_s(row, body->shell)};
+    if (row->world) return h;
+    double at[3];
+    pal_shell_fit_frame(body->shell, body, frame);
+    memcpy(h.R, frame->R, sizeof h.R);
+    pal_mul33(at, h.R, frame->rest_centre_m);
+    pal_sub3(h.shift, frame->centre_m, at);
+    pal_copy3(h.Omega, frame->Omega_1_s);
+    pal_cross3(at, h.Omega, frame->centre_m);
+    pal_sub3(h.V, frame->V_m_s, at);
+    return h;
+}
+
+static inline void strain(const hold *h, const pal_body *body, size_t i, double out[3])
+{
+    double at[3];
+    pal_mul33(at, h->R, body->x_rest + 3 * i);
+    pal_add3(at, at, h->shift);
+    pal_sub3(out, body->d + 3 * i, at);
+}
+
+/* on the places at rest; the loops tell the compiler that force, place and rest are apart */
+static void pull_to_rest(const hold *h, const pal_body *body)
+{
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        const double *restrict x = body->d + 3 * i, *restrict v = body->dv + 3 * i, *restrict at = body->x_rest + 3 * i;
+        double *restrict f = body->f + 3 * i, stiff = body->mass_kg[i] * h->k, damp = body->mass_kg[i] * h->c;
+        f[0] -= stiff * (x[0] - at[0]) + damp * v[0];
+        f[1] -= stiff * (x[1] - at[1]) + damp * v[1];
+        f[2] -= stiff * (x[2] - at[2]) + damp * v[2];
+    }
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    shape_spring *row = self;
+    pal_body *body = step->body;
+    const hold h = find_hold(row, body, &row->frame);
+    if (row->world) {
+        pull_to_rest(&h, body);
+        return PAL_ERR_OK;
+    }
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        const double *x = body->d + 3 * i, *v = body->dv + 3 * i, m = body->mass_kg[i];
+        double u[3], turn[3], *f = body->f + 3 * i;
+        strain(&h, body, i, u);
+        pal_cross3(turn, h.Omega, x);
+        for (int c = 0; c < 3; c++) f[c] -= m * (h.k * u[c] + h.c * (v[c] - h.V[c] - turn[c]));
+    }
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    const shape_spring *row = self;
+    pal_shell_frame frame = row->frame;
+    const hold h = find_hold(row, body, &frame);
+    double sum = 0, u[3];
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        strain(&h, body, i, u);
+        sum += body->mass_kg[i] * pal_dot3(u, u);
+    }
+    return 0.5 * h.k * sum;
+}
+
+/* the frame only takes motion away from what is stretched or damped, so the anchors alone bound both */
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    double k = stiff_1_s2(self, body->shell);
+    for (int n = 0; n < body->n_active; n++) {
+        int i = pal_body_point(body, n);
+        bound_N_m[i] += k * body->mass_kg[i];
+    }
+}
+
+static void damping(void *self, const pal_body *body, double *bound_Ns_m)
+{
+    double c = damp_1_s(self, body->shell);
+    for (int n = 0; n < body->n_active; n++) {
+        int i = pal_body_point(body, n);
+        bound_Ns_m[i] += c * body->mass_kg[i];
+    }
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    shape_spring *row = self;
+    (void)body, (void)note;
+    if (row->per_young > 0) row->k_N_m = row->per_young * to->young_Pa;
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    turn_back(self);
+}
+
+const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
+                                            .stage = PAL_STAGE_FORCE,
+                                            .make = make,
+                                            .run = run,
+                                            .energy = energy,
+                                            .stiffness = stiffness,
+                                            .damping = damping,
+                                            .material = material,
+                                            .reset = reset};

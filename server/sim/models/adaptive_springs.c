@@ -1,0 +1,159 @@
+/* Model adaptive_springs: a triangle surface as mass points on springs whose level of detail follows what happens
+ * (paper C; shell.h has the masses, the stiffness laws and the active part).
+ *
+ * Keys: levels (2; 1 to 10), start_level (0, below levels), thickness_m (0.003), mass_kg (absent: density * thickness *
+ * area of the coarse triangles, the density of regions at their middles), k_spring_N_m (of a spring of level 0; absent:
+ * sqrt(3)/2 E thickness), c_spring_Ns_m (absent: 0.02 sqrt(k_0 m_0); 0: none), law ("membrane" | "paper"), mass
+ * ("faces" | "nodes"), place
+ * ("linear" | "butterfly"), k_shape_N_m (anchor of a node of level 0; absent: 0.3 k_0; 0: no such row), c_shape_Ns_m
+ * (absent: 0.6 sqrt(k'_0 m_0), a damping ratio of 0.3), frame ("body": anchors hang on the best-fit rigid frame,
+ * "world": on the rest place as in the paper; absent: world where something is held, else body), refine (true; false:
+ * no such row), memory_MB (512). m_0 is the mass of a node of level 0.
+ *
+ * Departure: the paper gives spring constants as numbers. A triangular lattice of springs k has Young's modulus 2 k /
+ * sqrt(3) in its plane (per length, Poisson ratio 1/3), so that a sheet of that thickness stretches as its material. */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/shell.h"
+
+#include <string.h>
+
+typedef struct keys {
+    pal_shell_options shell;
+    double thickness_m, k_spring_N_m, c_spring_Ns_m, k_shape_N_m, c_shape_Ns_m; /* below 0: not given */
+    const char *frame;                                                          /* NULL: not given */
+    bool refine;
+} keys;
+
+/* one of two words; *second tells which */
+static pal_err read_choice(pal_item *item, const char *key, const char *a, const char *b, bool *second, pal_note *note)
+{
+    const char *text = a;
+    PAL_TRY(pal_item_text(item, key, &text, note));
+    *second = !strcmp(text, b);
+    if (*second || !strcmp(text, a)) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s.%s: \"%s\", wanted \"%s\" or \"%s\"", item->path, key, text, a, b);
+}
+
+static pal_err read_keys(pal_item *item, keys *out, pal_note *note)
+{
+    bool paper, nodes, butterfly, world;
+    double memory_MB = 512;
+    *out = (keys){.shell = {.n_level = 2},
+                  .thickness_m = 0.003,
+                  .k_spring_N_m = -1,
+                  .c_spring_Ns_m = -1,
+                  .k_shape_N_m = -1,
+                  .c_shape_Ns_m = -1,
+                  .refine = true};
+    pal_shell_options *shell = &out->shell;
+    PAL_TRY(pal_item_count(item, "levels", 1, PAL_LEVELS_MOST, &shell->n_level, note));
+    PAL_TRY(pal_item_count(item, "start_level", 0, PAL_LEVELS_MOST, &shell->start_level, note));
+    if (shell->start_level >= shell->n_level)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s.start_level: %d, wanted 0 to %d as levels is %d", item->path,
+                            shell->start_level, shell->n_level - 1, shell->n_level);
+    PAL_TRY(pal_item_number(item, "thickness_m", 1e-9, 1e9, &out->thickness_m, note));
+    PAL_TRY(pal_item_number(item, "mass_kg", 1e-30, 1e30, &shell->mass_kg, note));
+    PAL_TRY(pal_item_number(item, "k_spring_N_m", 1e-30, 1e60, &out->k_spring_N_m, note));
+    PAL_TRY(pal_item_number(item, "c_spring_Ns_m", 0, 1e60, &out->c_spring_Ns_m, note));
+    PAL_TRY(read_choice(item, "law", "membrane", "paper", &paper, note));
+    PAL_TRY(read_choice(item, "mass", "faces", "nodes", &nodes, note));
+    PAL_TRY(read_choice(item, "place", "linear", "butterfly", &butterfly, note));
+    PAL_TRY(pal_item_number(item, "k_shape_N_m", 0, 1e60, &out->k_shape_N_m, note));
+    PAL_TRY(pal_item_number(item, "c_shape_Ns_m", 0, 1e60, &out->c_shape_Ns_m, note));
+    PAL_TRY(read_choice(item, "frame", "body", "world", &world, note));
+    bool given = pal_item_has(item, "frame");
+    PAL_TRY(pal_item_bool(item, "refine", &out->refine, note));
+    PAL_TRY(pal_item_number(item, "memory_MB", 1, 1e6, &memory_MB, note));
+    shell->law = paper ? PAL_SHELL_PAPER : PAL_SHELL_MEMBRANE;
+    shell->mass = nodes ? PAL_SHELL_BY_NODES : PAL_SHELL_BY_FACES;
+    shell->place = butterfly ? PAL_SHELL_BUTTERFLY : PAL_SHELL_LINEAR;
+    shell->budget_byte = (size_t)(memory_MB * 1048576);
+    out->frame = !given ? NULL : world ? "world" : "body";
+    return pal_item_done(item, note);
+}
+
+static double surface_mass(const pal_body_def *def, double thickness_m)
+{
+    const pal_surface *surface = &def->mesh->surface;
+    double sum = 0;
+    for (int t = 0; t < surface->n_tri; t++) {
+        const double *x[3];
+        double e[2][3], n[3], middle[3];
+        for (int c = 0; c < 3; c++) x[c] = surface->x + 3 * (size_t)surface->tri[3 * t + c];
+        for (int c = 0; c < 3; c++) middle[c] = (x[0][c] + x[1][c] + x[2][c]) / 3;
+        pal_sub3(e[0], x[1], x[0]);
+        pal_sub3(e[1], x[2], x[0]);
+        pal_cross3(n, e[0], e[1]);
+        pal_material at;
+        pal_material_at(def, middle, &at);
+        sum += at.density_kg_m3 * pal_norm3(n) / 2;
+    }
+    return thickness_m * sum;
+}
+
+/* corners are checked here because the mass is taken before the levels are made */
+static pal_err check_surface(const pal_body_def *def, const char *path, pal_note *note)
+{
+    const pal_surface *surface = &def->mesh->surface;
+    if (surface->n_tri < 1)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" %s: a mesh with %d surface triangles; \"adaptive_springs\" is made of them",
+                            def->name, path, surface->n_tri);
+    for (int i = 0; i < 3 * surface->n_tri; i++)
+        if (surface->tri[i] < 0 || surface->tri[i] >= surface->n_vertex)
+            return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" %s: triangle %d has corner %d of %d vertices",
+                                def->name, path, i / 3, surface->tri[i], surface->n_vertex);
+    return PAL_ERR_OK;
+}
+
+/* the levels' own sentence, and another way out where the surface is not one that can be split */
+static pal_err make_shell(const keys *k, const char *path, pal_build *build)
+{
+    const pal_surface *surface = &build->def->mesh->surface;
+    pal_shell *shell;
+    pal_note why = {{0}};
+    pal_surface_topology topology = {.manifold = true, .oriented = true};
+    pal_err err = pal_shell_make(surface, &k->shell, build->body, build->arena, &why, &shell);
+    if (!err || err == PAL_ERR_MEMORY) return err;
+    if (err == PAL_ERR_REFUSED) PAL_TRY(pal_surface_check(surface, &topology));
+    bool split = topology.manifold && topology.oriented;
+    return pal_note_set(build->note, err, "body \"%s\" %s: %s%s", build->body->name, path, why.text,
+                        split ? "" : " (model tet_springs takes any surface: it fills voxels)");
+}
+
+static void put(pal_item *row, const char *key, double number)
+{
+    if (number >= 0) pal_item_put_number(row, key, number, NULL);
+}
+
+static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    const pal_body_def *def = build->def;
+    keys k;
+    out->n_row = 0;
+    PAL_TRY(read_keys(item, &k, build->note));
+    PAL_TRY(check_surface(def, item->path, build->note));
+    if (k.shell.mass_kg == 0) k.shell.mass_kg = surface_mass(def, k.thickness_m);
+    PAL_TRY(make_shell(&k, item->path, build));
+
+    /* the rows derive what the scene does not give, so that it follows a live material edit */
+    pal_item *row = out->row;
+    pal_item_init(row, item->path, "edge_spring");
+    put(row, "k_N_m", k.k_spring_N_m);
+    put(row++, "c_Ns_m", k.c_spring_Ns_m);
+    if (k.k_shape_N_m != 0) {
+        pal_item_init(row, item->path, "shape_spring");
+        put(row, "k_N_m", k.k_shape_N_m);
+        put(row, "c_Ns_m", k.c_shape_Ns_m);
+        if (k.frame) PAL_TRY(pal_item_put_text(row, "frame", k.frame, build->note));
+        row++;
+    }
+    if (def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
+    if (k.refine && k.shell.n_level > 1) pal_item_init(row++, item->path, "refine");
+    pal_item_init(row++, item->path, "rk4");
+    out->n_row = (int)(row - out->row);
+    return PAL_ERR_OK;
+}
+
+const pal_model pal_model_adaptive_springs = {.name = "adaptive_springs", .build = build};

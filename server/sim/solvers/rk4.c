@@ -1,0 +1,531 @@
+/* Solver rk4: the classical fourth-order Runge-Kutta method over the body's active nodes (C, equations of motion).
+ * Loads of CONTACT rows are constant within a sub-step.
+ *
+ * The sub-step is `safety` (key, 0.9) of 2.7 / max(omega, c) over the free nodes; c = C/m with the Gershgorin row sums
+ * C of explicit damping, omega^2 bounds the stiffness over mass. The method is stable where |lambda dt| <= 2.61 in the
+ * left half plane, and no eigenvalue is larger than max(omega, c). Row sums K/m put omega up to 1.4 times too high on a
+ * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE rows at the
+ * present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
+ * matrices, 2011), at most 2 % below the true one where it was measured, never above the row sums, to which those of
+ * CONTACT rows come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again when a
+ * node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12 sub-steps
+ * and only where it saves one, between with the row sums alone; common factors that change scale it.
+ *
+ * Departures. Drag of the rows (hook `drag`, rate r, v' = -r v) is taken exactly: the exponential Runge-Kutta method of
+ * Cox and Matthews (2002, eq. 26-29), which is the classical one for r = 0, of order 4 for every r, stable for all r
+ * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Held nodes stand, led ones
+ * (held 2) keep their velocity. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
+ * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. */
+#include "server/base/vec3.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/shell.h"
+
+#include <string.h>
+
+/* what a node keeps between the stages: place and velocity at the start, first acceleration, velocity of the second
+ * stage, sums of velocities and accelerations, inverse mass */
+typedef struct memory {
+    double x[3], v[3], a[3], v2[3], sum_v[3], sum_a[3], inverse_kg;
+} memory;
+
+/* of a sub-step dt with drag r, z = r dt: half and whole are exp(-z/2), exp(-z); grow is dt/2 phi1(z/2); weights of the
+ * accelerations of stages 1, 2 and 3, 4 */
+typedef struct rates {
+    double dt, half, whole, grow, weight[3];
+} rates;
+
+typedef struct rk4 {
+    double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
+    memory *memory;       /* by place among the active nodes   [n_dof] */
+    double safety, reach; /* of the stability limit; safety times the radius 2.7 */
+    double limit_s;
+    double way_m; /* no node has moved farther since the bounds were taken */
+    /* of the body when they were taken */
+    uint64_t revision;
+    double ramp[2];
+    bool known; /* limit_s holds */
+
+    /* Lanczos' bound on omega^2 of the FORCE rows, 1/s^2, at which common factors it was taken, and sub-steps since */
+    double sharp2, sharp_ramp[2];
+    int n_since;
+    bool sharp_known;
+    double step_s;              /* the last whole step; 0: none yet */
+    double over;                /* row sums put omega at most so many times too high */
+    double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
+} rk4;
+
+static const double most_way_h = 0.2, most_move_S = 0.2, radius = 2.7;
+/* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
+static const double most_over = 1.6, more = 1.05;
+/* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
+enum { PAUSE = 12, LANCZOS = 10 };
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    double safety = 0.9;
+    PAL_TRY(pal_item_number(item, "safety", 0.01, 0.96, &safety, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    const pal_body *body = build->body;
+    rk4 *row = PAL_NEW(build->arena, rk4, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->stiff = PAL_NEW(build->arena, double, body->n_dof);
+    row->damp = PAL_NEW(build->arena, double, body->n_dof);
+    row->memory = PAL_NEW(build->arena, memory, body->n_dof);
+    if (!row->stiff || !row->damp || !row->memory) return PAL_ERR_MEMORY;
+    if (body->shell) {
+        row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
+        row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
+        row->force = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
+        if (!row->at || !row->still || !row->force) return PAL_ERR_MEMORY;
+    }
+    row->n_since = PAUSE;
+    row->over = most_over;
+    row->safety = safety;
+    row->reach = safety * radius;
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+/* ---- the limit ---- */
+
+static void add_bounds(rk4 *row, const pal_row *rows, int n, const pal_body *body)
+{
+    for (int i = 0; i < n; i++) {
+        const pal_effect *effect = rows[i].effect;
+        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
+        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
+    }
+}
+
+/* contact comes and goes between steps without any node moving */
+static bool has_bounds(const pal_row *rows, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
+    return false;
+}
+
+/* does the bound taken last still hold? */
+static bool still_known(const rk4 *row, const pal_step *step)
+{
+    const pal_body *body = step->body;
+    const pal_shell *shell = body->shell;
+    /* not finite is not known */
+    if (!row->known || row->revision != body->revision || !(row->way_m <= most_way_h * body->h_m)) return false;
+    if (shell && (row->ramp[0] != shell->spring_ramp || row->ramp[1] != shell->shape_ramp)) return false;
+    if (shell && !row->sharp_known && row->n_since >= PAUSE) return false;
+    return step->sub != 0 || !has_bounds(step->contact, step->n_contact);
+}
+
+/* row sums of stiffness over mass at free nodes, the most of them */
+static double most_stiff(const rk4 *row, const pal_body *body)
+{
+    double most = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        double omega2 = row->stiff[i] / body->mass_kg[i];
+        if (!body->held[i] && omega2 > most) most = omega2;
+    }
+    return most;
+}
+
+/* 1 for a state and row sums that are finite, else NaN */
+static double one_if_finite(const rk4 *row, const pal_body *body)
+{
+    double sum = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        const double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i;
+        sum += 0 * row->stiff[i] + 0 * row->damp[i];
+        for (int q = 0; q < 3; q++) sum += 0 * x[q] + 0 * v[q];
+    }
+    return 1 + sum;
+}
+
+/* ---- Lanczos' iteration; vectors are sqrt(m) times moves: q in v, the one before in v2, A q in a; forces at the state
+ * itself in sum_v, places in x ---- */
+
+/* the first one: any signs, nodes weighted by their row sums over mass, as the stiffest are where fast modes live */
+static void begin_lanczos(rk4 *row, const pal_body *body)
+{
+    double norm2 = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        memory *m = &row->memory[k];
+        double weight = row->stiff[i] / body->mass_kg[i];
+        uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
+        m->inverse_kg = body->held[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
+        for (int c = 0; c < 3; c++) {
+            bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u;
+            m->v[c] = body->held[i] ? 0 : weight * ((double)(bits >> 11) * 0x1p-52 - 1);
+            m->x[c] = body->x[3 * (size_t)i + (size_t)c];
+            m->sum_v[c] = row->force[3 * (size_t)i + (size_t)c];
+            m->v2[c] = 0;
+            norm2 += m->v[c] * m->v[c];
+        }
+    }
+    double scale = norm2 > 0 ? 1 / sqrt(norm2) : 0;
+    for (int k = 0; k < body->n_active; k++) pal_scale3(row->memory[k].v, scale, row->memory[k].v);
+}
+
+/* A q by the difference of forces over a move of 1e-6 of an element; returns q A q */
+static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
+{
+    pal_body *body = step->body;
+    double most2 = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        const memory *m = &row->memory[k];
+        most2 = fmax(most2, m->inverse_kg * m->inverse_kg * pal_dot3(m->v, m->v));
+    }
+    double small = most2 > 0 ? 1e-6 * body->h_m / sqrt(most2) : 0, per = most2 > 0 ? 1 / small : 0;
+    for (int k = 0; k < body->n_active; k++) {
+        const memory *m = &row->memory[k];
+        double *at = row->at + 3 * (size_t)pal_body_point(body, k);
+        pal_copy3(at, m->x);
+        pal_axpy3(at, small * m->inverse_kg, m->v);
+    }
+    PAL_TRY(pal_gather(step));
+    *along = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        memory *m = &row->memory[k];
+        pal_sub3(m->a, m->sum_v, row->force + 3 * (size_t)pal_body_point(body, k));
+        pal_scale3(m->a, per * m->inverse_kg, m->a);
+        *along += pal_dot3(m->a, m->v);
+    }
+    return PAL_ERR_OK;
+}
+
+/* the next vector from A q - alpha q - beta q'; returns its length before it was made 1 */
+static double next_lanczos(rk4 *row, int n, double alpha, double beta)
+{
+    double norm2 = 0;
+    for (int k = 0; k < n; k++) {
+        memory *m = &row->memory[k];
+        for (int c = 0; c < 3; c++) {
+            m->a[c] -= alpha * m->v[c] + beta * m->v2[c];
+            m->v2[c] = m->v[c];
+            norm2 += m->a[c] * m->a[c];
+        }
+    }
+    double norm = sqrt(norm2), scale = norm > 0 ? 1 / norm : 0;
+    for (int k = 0; k < n; k++) pal_scale3(row->memory[k].v, scale, row->memory[k].a);
+    return norm;
+}
+
+/* largest eigenvalue of the tridiagonal matrix with diagonal a and b beside it, plus the residual that b[n - 1] leaves
+ * in the whole one. Bisection below `most`, which is above it, by the signs of leading minors */
+static double largest_of(const double *a, const double *b, int n, double most)
+{
+    double low = a[0], high = most;
+    for (int turn = 0; turn < 30 && low < high; turn++) {
+        double middle = 0.5 * (low + high), d = middle - a[0];
+        bool above = d > 0;
+        for (int i = 1; i < n && above; i++) {
+            d = middle - a[i] - b[i - 1] * b[i - 1] / d;
+            above = d > 0;
+        }
+        *(above ? &high : &low) = middle;
+    }
+    /* its eigenvector, from the first entry on */
+    double last = 0, s = 1, sum = 1;
+    for (int i = 0; i + 1 < n; i++) {
+        double next = ((high - a[i]) * s - (i > 0 ? b[i - 1] * last : 0)) / b[i];
+        last = s, s = next, sum += s * s;
+    }
+    return high + fabs(b[n - 1] * s) / sqrt(sum);
+}
+
+/* Lanczos' bound on omega^2 of the FORCE rows; above `most`: it knows nothing better */
+static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
+{
+    double a[LANCZOS], b[LANCZOS];
+    int n = 0;
+    PAL_TRY(pal_gather(step));
+    begin_lanczos(row, step->body);
+    while (n < LANCZOS) {
+        PAL_TRY(apply_stiffness(row, step, &a[n]));
+        b[n] = next_lanczos(row, step->body->n_active, a[n], n > 0 ? b[n - 1] : 0);
+        if (!(b[n++] > 1e-6 * most)) break;
+    }
+    *out = largest_of(a, b, n, 1.01 * most);
+    return PAL_ERR_OK;
+}
+
+/* the same on a body that stands still, all of whose arrays stay as they are */
+static void find_sharp(rk4 *row, pal_step *step, double most)
+{
+    pal_body *body = step->body;
+    const pal_body kept = *body;
+    const bool apart = step->drag_apart;
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        pal_copy3(row->at + i, body->x + i);
+    }
+    body->x = body->d = row->at;
+    body->v = body->dv = row->still;
+    body->f = body->g = row->force;
+    step->drag_apart = true;
+    double sharp2 = NAN;
+    row->sharp_known = !run_lanczos(row, step, most, &sharp2) && sharp2 == sharp2;
+    row->sharp2 = sharp2;
+    row->over = more * fmax(1, sqrt(most / row->sharp2));
+    step->drag_apart = apart;
+    body->x = kept.x, body->d = kept.d, body->v = kept.v, body->dv = kept.dv, body->f = kept.f, body->g = kept.g;
+    row->sharp_ramp[0] = body->shell->spring_ramp, row->sharp_ramp[1] = body->shell->shape_ramp;
+    row->n_since = 0;
+}
+
+/* would a longer limit save a sub-step? */
+static bool would_help(const rk4 *row, double most)
+{
+    double n = row->step_s * sqrt(most) / row->reach;
+    return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
+}
+
+/* omega^2 of the FORCE rows: `most` of the row sums or less. Stiffness that the common factors have not grown for is
+ * less than the same with all of it grown */
+static double bound_force(rk4 *row, pal_step *step, double most)
+{
+    const pal_body *body = step->body;
+    const pal_shell *shell = body->shell;
+    /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
+    if (!shell || body->x == body->x_rest) return most;
+    bool moved = row->revision != body->revision || !(row->way_m <= most_way_h * body->h_m);
+    row->sharp_known &= !moved;
+    if (!row->sharp_known && row->n_since >= PAUSE) {
+        if (would_help(row, most))
+            find_sharp(row, step, most);
+        else
+            row->n_since = 0;
+    }
+    if (!row->sharp_known) return most;
+    double grown = fmax(1, fmax(shell->spring_ramp / row->sharp_ramp[0], shell->shape_ramp / row->sharp_ramp[1]));
+    return fmin(most, grown * row->sharp2);
+}
+
+static double limit(void *self, pal_step *step)
+{
+    rk4 *row = self;
+    const pal_body *body = step->body;
+    if (still_known(row, step)) return row->limit_s;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        row->stiff[i] = row->damp[i] = 0;
+    }
+    add_bounds(row, step->contact, step->n_contact, body);
+    double contact2 = most_stiff(row, body);
+    add_bounds(row, step->force, step->n_force, body);
+    /* the largest of omega^2 and c */
+    double most2 = most_stiff(row, body), most = 0;
+    row->limit_s = one_if_finite(row, body);
+    if (row->limit_s == 1) most2 = fmin(most2, bound_force(row, step, most2) + contact2);
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        double c = row->damp[i] / body->mass_kg[i];
+        if (!body->held[i] && c > most) most = c;
+    }
+    most = fmax(sqrt(most2), most);
+    row->limit_s *= most > 0 ? row->reach / most : INFINITY;
+    if (!row->sharp_known || row->n_since == 0) row->way_m = 0;
+    row->revision = body->revision;
+    if (body->shell) row->ramp[0] = body->shell->spring_ramp, row->ramp[1] = body->shell->shape_ramp;
+    row->known = true;
+    return row->limit_s;
+}
+
+/* ---- a sub-step ---- */
+
+static double drag_rate(const pal_step *step)
+{
+    double rate = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
+    return rate;
+}
+
+/* phi_1, phi_2, phi_3 of -z, z >= 0: phi_k = sum over n of (-z)^n / (n + k)!. Series and doubling instead of exp, for
+ * the same bits with every library */
+static void find_phi(double z, double phi[4])
+{
+    int n_double = 0;
+    while (z > 0.5 && n_double < 60) z *= 0.5, n_double++;
+    for (int k = 0; k < 4; k++) {
+        double term = 1, sum = 0;
+        for (int n = 1; n <= k; n++) term /= n;
+        for (int n = 1; n < 16; n++) sum += term, term *= -z / (n + k);
+        phi[k] = sum;
+    }
+    for (int d = 0; d < n_double; d++) {
+        phi[0] *= phi[0];
+        z *= 2;
+        phi[1] = (1 - phi[0]) / z;
+        phi[2] = (1 - phi[1]) / z;
+        phi[3] = (0.5 - phi[2]) / z;
+    }
+}
+
+static rates find_rates(double dt_s, double rate)
+{
+    rates r = {dt_s, 1, 1, 0.5 * dt_s, {dt_s / 6, dt_s / 3, dt_s / 6}};
+    double phi[4], z = rate * dt_s;
+    if (!(z > 0)) return r;
+    find_phi(z / 2, phi);
+    r.half = phi[0];
+    r.grow = 0.5 * dt_s * phi[1];
+    find_phi(z, phi);
+    r.whole = phi[0];
+    r.weight[0] = dt_s * (phi[1] - 3 * phi[2] + 4 * phi[3]);
+    r.weight[1] = dt_s * (2 * phi[2] - 4 * phi[3]);
+    r.weight[2] = dt_s * (4 * phi[3] - phi[2]);
+    return r;
+}
+
+/* the state at the start, and the second stage's */
+static void stage_first(rk4 *row, pal_body *body, const rates *r, bool heavy)
+{
+    double t = r->dt / row->reach;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        memory *m = &row->memory[k];
+        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, mass = body->mass_kg[i];
+        const double *g = body->g + 3 * (size_t)i;
+        if (heavy) mass = fmax(mass, fmax(t * t * row->stiff[i], t * row->damp[i]));
+        /* held nodes have no acceleration, and standing ones no velocity */
+        m->inverse_kg = body->held[i] ? 0 : 1 / mass;
+        bool led = body->held[i] == 2, stands = body->held[i] && !led;
+        double half = led ? 1 : r->half;
+        for (int c = 0; c < 3; c++) {
+            m->x[c] = x[c];
+            m->v[c] = stands ? 0 : v[c];
+            m->a[c] = g[c] * m->inverse_kg;
+            m->v2[c] = half * m->v[c] + r->grow * m->a[c];
+            m->sum_v[c] = m->v[c] + 2 * m->v2[c];
+            m->sum_a[c] = r->weight[0] * m->a[c];
+            x[c] = m->x[c] + 0.5 * r->dt * m->v[c];
+            v[c] = m->v2[c];
+        }
+    }
+}
+
+/* from the second stage's forces the third stage's state */
+static void stage_second(rk4 *row, pal_body *body, const rates *r)
+{
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        memory *m = &row->memory[k];
+        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, half = body->held[i] == 2 ? 1 : r->half;
+        const double *g = body->g + 3 * (size_t)i;
+        for (int c = 0; c < 3; c++) {
+            double a = g[c] * m->inverse_kg;
+            m->sum_a[c] += r->weight[1] * a;
+            x[c] = m->x[c] + 0.5 * r->dt * m->v2[c];
+            v[c] = half * m->v[c] + r->grow * a;
+            m->sum_v[c] += 2 * v[c];
+        }
+    }
+}
+
+/* from the third stage's forces the fourth stage's state */
+static void stage_third(rk4 *row, pal_body *body, const rates *r)
+{
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        memory *m = &row->memory[k];
+        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, half = body->held[i] == 2 ? 1 : r->half;
+        const double *g = body->g + 3 * (size_t)i;
+        for (int c = 0; c < 3; c++) {
+            double a = g[c] * m->inverse_kg;
+            m->sum_a[c] += r->weight[1] * a;
+            x[c] = m->x[c] + r->dt * v[c];
+            v[c] = half * m->v2[c] + r->grow * (2 * a - m->a[c]);
+            m->sum_v[c] += v[c];
+        }
+    }
+}
+
+/* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
+static double stage_last(rk4 *row, pal_body *body, const rates *r)
+{
+    double most2 = 0, poison = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        memory *m = &row->memory[k];
+        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, whole = body->held[i] == 2 ? 1 : r->whole;
+        const double *g = body->g + 3 * (size_t)i;
+        double way2 = 0, v2 = 0;
+        for (int c = 0; c < 3; c++) {
+            double move = r->dt / 6 * m->sum_v[c];
+            x[c] = m->x[c] + move;
+            v[c] = whole * m->v[c] + m->sum_a[c] + r->weight[2] * g[c] * m->inverse_kg;
+            way2 += move * move, v2 += v[c] * v[c];
+        }
+        v2 *= r->dt * r->dt;
+        way2 = v2 > way2 ? v2 : way2;
+        most2 = way2 > most2 ? way2 : most2;
+        poison += 0 * way2 + 0 * v2;
+    }
+    return most2 + poison;
+}
+
+/* shortens moves, and velocities that would make such, longer than most_m */
+static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double most_m)
+{
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, move[3];
+        pal_sub3(move, x, row->memory[k].x);
+        double way = pal_norm3(move), speed = pal_norm3(v) * dt_s;
+        if (way > most_m) {
+            pal_copy3(x, row->memory[k].x);
+            pal_axpy3(x, most_m / way, move);
+        }
+        if (speed > most_m) pal_scale3(v, most_m / speed, v);
+        body->n_clamped += way > most_m || speed > most_m;
+    }
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    rk4 *row = self;
+    pal_body *body = step->body;
+    const rates r = find_rates(step->dt_s, drag_rate(step));
+    step->drag_apart = true;
+    PAL_TRY(pal_gather(step));
+    stage_first(row, body, &r, step->heavy);
+    PAL_TRY(pal_gather(step));
+    stage_second(row, body, &r);
+    PAL_TRY(pal_gather(step));
+    stage_third(row, body, &r);
+    PAL_TRY(pal_gather(step));
+    double way = sqrt(stage_last(row, body, &r)), most = most_move_S * body->size_m;
+    if (way > most) clamp_moves(row, body, step->dt_s, most);
+    row->way_m += way > most ? most : way;
+    row->n_since += row->n_since < PAUSE;
+    if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    rk4 *row = self;
+    (void)body;
+    row->known = row->sharp_known = false;
+    row->n_since = PAUSE;
+    row->step_s = 0;
+    row->over = most_over;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    (void)to, (void)note;
+    reset(self, body);
+    return PAL_ERR_OK;
+}
+
+const pal_effect pal_effect_rk4 = {.name = "rk4",
+                                   .stage = PAL_STAGE_SOLVE,
+                                   .make = make,
+                                   .run = run,
+                                   .limit = limit,
+                                   .material = material,
+                                   .reset = reset};
