@@ -39,9 +39,34 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     body->f = body->g = f;
     body->load = load;
     body->x_rest = rest;
-    body->mass_kg = mass;
+    body->mass_kg = body->node_mass_kg = mass;
+    body->node_rest = rest;
     body->held = held;
     return PAL_ERR_OK;
+}
+
+pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows)
+{
+    size_t n3 = 3 * (size_t)rows->n_row;
+    PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
+    body->d = PAL_NEW(arena, double, n3);
+    body->dv = PAL_NEW(arena, double, n3);
+    body->f = PAL_NEW(arena, double, n3);
+    body->load = PAL_NEW(arena, double, n3);
+    body->node_rest = PAL_NEW(arena, double, n3);
+    body->node_mass_kg = PAL_NEW(arena, double, rows->n_row);
+    if (!body->d || !body->dv || !body->f || !body->load || !body->node_rest || !body->node_mass_kg)
+        return PAL_ERR_MEMORY;
+    body->n_node = rows->n_row;
+    body->embed = rows;
+    return PAL_ERR_OK;
+}
+
+void pal_body_place(pal_body *body)
+{
+    if (!body->embed) return;
+    pal_point_rows_place(body->embed, body->x, body->d);
+    pal_point_rows_place(body->embed, body->v, body->dv);
 }
 
 double pal_body_kinetic_J(const pal_body *body)

@@ -3,6 +3,7 @@
 #define PAL_SIM_BODY_H
 #include "server/base/arena.h"
 #include "server/mesh/hexes.h"
+#include "server/mesh/point_rows.h"
 #include "server/mesh/skin.h"
 #include "server/mesh/surface.h"
 #include "server/mesh/tets.h"
@@ -50,14 +51,20 @@ typedef struct pal_body {
     double *f;       /* node force N                                            [n_node][3]   */
     double *g;       /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
     double *mass_kg; /* lumped                                                  [n_dof]       */
-    uint8_t *held;   /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
-    double *x_rest;  /* rest position m                                         [n_dof][3]    */
+    /* nodes as weighted sums of the points the solver moves, d = embed x (A eq. 1); NULL: they are the same. With it,
+     * load, outer, f, d, dv are of nodes and x, v, g, mass_kg, held, x_rest of points */
+    const pal_point_rows *embed;
+    double *node_mass_kg; /* lumped at nodes; aliases mass_kg without embed      [n_node]      */
+    double *node_rest;    /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
+    uint8_t *held;        /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
+    double *x_rest;       /* rest position m                                         [n_dof][3]    */
     /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (shell.h) has arrays for its
      * finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over all is right and
      * one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
     const int32_t *active; /* [n_active] */
     int n_active;
     struct pal_shell *shell; /* NULL: the body does not adapt */
+    struct pal_solid *solid; /* model subdivision_fem (solid.h); heap, freed with the world; NULL: another model */
     bool frozen;             /* set by finite_guard or the solver: the body no longer moves           */
     double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */
     double h_m;              /* typical element edge                                                  */
@@ -102,6 +109,11 @@ static inline int pal_body_point(const pal_body *body, int k)
 
 /* arrays for n points without embed, all active, zeroed, f = g, d = x, dv = v; MEMORY. [load] */
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node);
+/* the same for n_dof points that carry rows->n_row nodes: d, dv, g, node masses and rest of their own; embed = rows,
+ * which is borrowed. active stays NULL, n_active n_dof; MEMORY. [load] */
+pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows);
+/* d = embed x and dv = embed v, after x and v were set; nothing without embed. [sim] */
+void pal_body_place(pal_body *body);
 /* sums over the body [sim] */
 double pal_body_kinetic_J(const pal_body *body);
 void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3]);

@@ -3,6 +3,7 @@
  * world made from it. Thread: [load]. */
 #ifndef PAL_SIM_DEF_H
 #define PAL_SIM_DEF_H
+#include "server/mesh/maccracken_joy.h"
 #include "server/mesh/prepared.h"
 #include "server/sim/item.h"
 #include "server/sim/tools.h"
@@ -49,9 +50,23 @@ typedef struct pal_support {
     double low_m[3], high_m[3];
 } pal_support;
 
+/* A stroke of a soft brush over the material at rest (A 4.1, painting; model subdivision_fem). Within radius_m of at_m
+ * Young's modulus and density are multiplied by factor^w, w 1 up to (1 - soft) radius_m and from there falling smoothly
+ * to 0 at radius_m. Strokes add up in their order. Ranges: factors 1e-6..1e6, soft 0..1, radius_m > 0 */
+typedef struct pal_stroke {
+    double at_m[3], radius_m, soft; /* body frame, rest shape */
+    double young_factor, density_factor;
+} pal_stroke;
+enum { PAL_STROKE_MAX = 4096 };
+
 typedef struct pal_body_def {
     char name[PAL_NAME];
     const pal_prepared *mesh; /* borrowed                                                        */
+    /* model subdivision_fem: control cells, body frame, borrowed; NULL for other models. mesh then has the triangles of
+     * the control cells' boundary alone (surface), for size, origin and messages */
+    const pal_cells *cells;
+    int n_stroke;
+    const pal_stroke *stroke; /* painted so far, borrowed [n_stroke] */
     pal_material material;
     int n_region;
     pal_region region[PAL_REGION_MAX];
@@ -100,6 +115,12 @@ pal_err pal_material_check(pal_material *material, pal_note *note);
 void pal_material_at(const pal_body_def *def, const double x[3], pal_material *out);
 /* the same over another material than the body's; NaN in `base` stays where no region gives the number */
 void pal_material_over(const pal_body_def *def, const pal_material *base, const double x[3], pal_material *out);
+/* weight of a stroke at x, 0..1 */
+double pal_stroke_weight(const pal_stroke *stroke, const double x[3]);
+/* the material at x (body frame) with regions and strokes */
+void pal_material_painted(const pal_body_def *def, const double x[3], pal_material *out);
+/* REFUSED names the number out of range */
+pal_err pal_stroke_check(const pal_stroke *stroke, pal_note *note);
 /* REFUSED names body, regions[index], key and number: a box or grid that is none, numbers out of range or not given.
  * Poisson ratios above 0.4999 and below 0.5 are taken as 0.4999 */
 pal_err pal_region_check(const pal_body_def *def, int index, pal_note *note);

@@ -12,6 +12,7 @@ pal_err pal_gather(pal_step *step)
         size_t i = 3 * (size_t)body->active[k];
         for (size_t c = 0; c < 3; c++) body->f[i + c] = body->load[i + c];
     }
+    pal_body_place(body);
     if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
@@ -21,6 +22,10 @@ pal_err pal_gather(pal_step *step)
         uint64_t now = pal_clock_ns();
         row->spent_ns += now - before;
         before = now;
+    }
+    if (body->embed) {
+        memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_point_rows_pull(body->embed, body->f, body->g);
     }
     return PAL_ERR_OK;
 }

@@ -128,7 +128,7 @@ struct pal_row {
     size_t n_byte;     /* memory it took at load                                                              */
 };
 
-/* f = load, then every FORCE row adds (those with drag only when drag_apart is false), then g = f; held nodes have
- * forces too: what the support bears. Counts each row's spent_ns. [sim] */
+/* d = embed x; f = load, then every FORCE row adds (those with drag only when drag_apart is false), then g = embed' f;
+ * held nodes have forces too: what the support bears. Counts each row's spent_ns. [sim] */
 pal_err pal_gather(pal_step *step);
 #endif

@@ -1,4 +1,5 @@
-/* Materials of regions. */
+/* Materials of regions and strokes of the brush. */
+#include "server/base/vec3.h"
 #include "server/num/trilinear.h"
 #include "server/sim/def.h"
 
@@ -54,6 +55,45 @@ void pal_material_at(const pal_body_def *def, const double x[3], pal_material *o
 {
     pal_material_over(def, &def->material, x, out);
 }
+
+/* ---- strokes ---- */
+
+double pal_stroke_weight(const pal_stroke *stroke, const double x[3])
+{
+    double r = pal_dist3(x, stroke->at_m) / stroke->radius_m, core = 1 - stroke->soft;
+    if (!(r < 1)) return 0;
+    if (r <= core) return 1;
+    double t = (1 - r) / stroke->soft;
+    return t * t * (3 - 2 * t);
+}
+
+void pal_material_painted(const pal_body_def *def, const double x[3], pal_material *out)
+{
+    pal_material_at(def, x, out);
+    for (int i = 0; i < def->n_stroke; i++) {
+        double w = pal_stroke_weight(&def->stroke[i], x);
+        if (w == 0) continue;
+        out->young_Pa *= pow(def->stroke[i].young_factor, w);
+        out->density_kg_m3 *= pow(def->stroke[i].density_factor, w);
+    }
+}
+
+pal_err pal_stroke_check(const pal_stroke *s, pal_note *note)
+{
+    for (int c = 0; c < 3; c++)
+        if (!(fabs(s->at_m[c]) <= 1e9))
+            return pal_note_set(note, PAL_ERR_REFUSED, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
+    if (!(s->radius_m > 0 && s->radius_m <= 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "radius_m: %g, wanted more than 0", s->radius_m);
+    if (!(s->soft >= 0 && s->soft <= 1)) return pal_note_set(note, PAL_ERR_REFUSED, "soft: %g, wanted 0 to 1", s->soft);
+    if (!(s->young_factor >= 1e-6 && s->young_factor <= 1e6))
+        return pal_note_set(note, PAL_ERR_REFUSED, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
+    if (!(s->density_factor >= 1e-6 && s->density_factor <= 1e6))
+        return pal_note_set(note, PAL_ERR_REFUSED, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
+    return PAL_ERR_OK;
+}
+
+/* ---- checks ---- */
 
 static pal_err refuse(const pal_body_def *def, int index, pal_note *note, const char *key, double value,
                       const char *wanted)

@@ -6,6 +6,7 @@
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
 #include "server/sim/shell.h"
+#include "server/sim/solid.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -214,6 +215,7 @@ pal_err pal_world_create(const pal_scene *scene, pal_note *note, pal_world **out
 void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
+    for (int b = 0; world->plan.body && b < world->plan.n_body; b++) pal_solid_free(world->plan.body[b].solid);
     pal_plan_free(&world->plan);
     pal_field_free(&world->fields);
     pal_arena_destroy(world->scratch);

@@ -1,0 +1,2 @@
+/* Mass matrices of subdivided solids. */
+#include "server/sim/solid_mass.h"
