@@ -54,6 +54,8 @@ typedef struct pal_body {
     /* nodes as weighted sums of the points the solver moves, d = embed x (A eq. 1); NULL: they are the same. With it,
      * load, outer, f, d, dv are of nodes and x, v, g, mass_kg, held, x_rest of points */
     const pal_point_rows *embed;
+    /* masses between points (solid_mass.h), which mass_kg sums up row by row; set by the model, NULL: mass_kg is all */
+    const struct pal_solid_mass *solid_mass;
     double *node_mass_kg; /* lumped at nodes; aliases mass_kg without embed      [n_node]      */
     double *node_rest;    /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
     uint8_t *held;        /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
