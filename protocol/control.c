@@ -57,6 +57,7 @@ static const field part_fields[] = {
     {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
      PAL_WIRE_FIELDS_MAX, NULL},
     {"adapts", BOOL, false, AT(pal_wire_part_info, adapts), 0, 0, 0, NULL},
+    {"sculpts", BOOL, false, AT(pal_wire_part_info, sculpts), 0, 0, 0, NULL},
     END};
 static const field tool_fields[] = {{"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
                                     {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
@@ -145,6 +146,11 @@ static const field leave_fields[] = {END};
 static const field view_fields[] = {{"part", U32, true, AT(pal_wire_view, part), 0, 0, 0, NULL},
                                     {"field", TEXT, true, AT(pal_wire_view, field), PAL_WIRE_FIELD_BYTES, 0, 0, NULL},
                                     END};
+static const field answer_fields[] = {
+    {"verb", TEXT, true, AT(pal_wire_answer, verb), LEN(pal_wire_answer, verb), 0, 0, NULL},
+    {"text", TEXT, true, AT(pal_wire_answer, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"args", ARGS, false, AT(pal_wire_answer, arg), 0, AT(pal_wire_answer, n_arg), PAL_WIRE_ARG_MAX, NULL},
+    END};
 static const field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
 
 static const struct {
@@ -164,6 +170,7 @@ static const struct {
 #define FIELDS_LEAVE               leave_fields
 #define FIELDS_PING                stamp_fields
 #define FIELDS_VIEW                view_fields
+#define FIELDS_ANSWER              answer_fields
 #define X(name, text, from_server) {text, from_server, FIELDS_##name},
     PAL_CONTROL_TABLE(X)
 #undef X

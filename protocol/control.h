@@ -21,7 +21,7 @@
 #define PAL_WIRE_ROW_MAX     64
 #define PAL_WIRE_MEMBER_MAX  256
 #define PAL_WIRE_MEMBER_NAME 32
-#define PAL_WIRE_ARG_MAX     8
+#define PAL_WIRE_ARG_MAX     16
 #define PAL_WIRE_FIELDS_MAX  8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES 24
 #define PAL_WIRE_TOOL_ANY    (-1)
@@ -35,6 +35,7 @@
     X(MEMBERS, "members", true)   /* on every change: who is here, who holds which tool              */                \
     X(ERROR, "error", true)       /* a request was refused, the connection stays                     */                \
     X(PONG, "pong", true)         /* answer to ping                                                  */                \
+    X(ANSWER, "answer", true)     /* a command of sculpting was done, or what was asked for          */                \
     X(JOIN, "join", false)        /* first message of a client                                       */                \
     X(COMMAND, "command", false)  /* pause, resume, step, reset, material ...                        */                \
     X(TAKE, "take", false)        /* take a tool                                                     */                \
@@ -66,7 +67,8 @@ typedef struct pal_wire_part_info {
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* what `view` may ask for; 0 also from servers that know no fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
-    bool adapts; /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
+    bool sculpts; /* its control cells and material can be changed by commands; false is not on the wire */
+    bool adapts;  /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
 } pal_wire_part_info; /* its place in the array is its part index   */
 typedef struct pal_wire_topology {
     uint32_t n_part;
@@ -163,6 +165,14 @@ typedef struct pal_wire_order {       /* an order to the session */
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
 } pal_wire_order;
 
+/* to the one who gave the order: what was done, in a sentence, and its numbers (README.md, "Sculpting") */
+typedef struct pal_wire_answer {
+    char verb[32];
+    char text[PAL_WIRE_TEXT_BYTES];
+    uint32_t n_arg;
+    pal_wire_arg arg[PAL_WIRE_ARG_MAX];
+} pal_wire_answer;
+
 typedef struct pal_wire_view {
     uint32_t part;
     char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
@@ -181,6 +191,7 @@ typedef struct pal_control {
         int tool;             /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
         double stamp_ms;      /* ping, pong: the pinger's own clock         */
         pal_wire_view view;
+        pal_wire_answer answer;
     };
 } pal_control;
 

@@ -173,10 +173,11 @@ static inline pal_patch_head golden_patch(void)
 }
 
 /* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
-enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 4 };
+enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 5 };
 static inline pal_control_type golden_line_type(int line)
 {
-    static const pal_control_type more[] = {PAL_CONTROL_HELLO, PAL_CONTROL_HELLO, PAL_CONTROL_STATUS, PAL_CONTROL_JOIN};
+    static const pal_control_type more[] = {PAL_CONTROL_HELLO, PAL_CONTROL_HELLO, PAL_CONTROL_STATUS, PAL_CONTROL_JOIN,
+                                            PAL_CONTROL_HELLO};
     return line < PAL_CONTROL_COUNT ? (pal_control_type)line : more[line - PAL_CONTROL_COUNT];
 }
 
@@ -226,6 +227,9 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     case PAL_CONTROL_COMMAND:
         c->order = (pal_wire_order){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
         break;
+    case PAL_CONTROL_ANSWER:
+        c->answer = (pal_wire_answer){"extrude", "28 cells", 2, {{"cells", 28}, {"can_undo", 1}}};
+        break;
     case PAL_CONTROL_TAKE:
         c->tool = 2;
         break;
@@ -252,5 +256,6 @@ static inline void golden_line(int line, pal_control *c)
         c->status.active[1] = (pal_wire_active){3, 188, 558, 746, 2232};
     }
     if (line == PAL_CONTROL_COUNT + 3) c->join.patches = true;
+    if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].sculpts = true;
 }
 #endif

@@ -84,7 +84,7 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":[1]}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":\"b\"}}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":1,\"b\":1,\"c\":1,\"d\":1,\"e\":1,\"f\":1,\"g\":1,"
-         "\"h\":1,\"i\":1}}",
+         "\"h\":1,\"i\":1,\"j\":1,\"k\":1,\"l\":1,\"m\":1,\"n\":1,\"o\":1,\"p\":1,\"q\":1}}",
          PAL_REFUSAL_COUNT}};
     c.type = PAL_CONTROL_COUNT;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

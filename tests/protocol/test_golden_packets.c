@@ -251,6 +251,7 @@ static void control_lines_are_read_and_written_as_committed(void)
         CHECK_INT(c.type, kind);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.accuracy[0] != 0, at == PAL_CONTROL_COUNT);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].adapts, at == PAL_CONTROL_COUNT + 1);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].sculpts, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
         if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.patches, at == PAL_CONTROL_COUNT + 3);
         /* what was read writes the same text, and so does the content itself */
