@@ -55,11 +55,14 @@ typedef struct pal_body {
      * load, outer, f, d, dv are of nodes and x, v, g, mass_kg, held, x_rest of points */
     const pal_point_rows *embed;
     /* masses between points (solid_mass.h), which mass_kg sums up row by row; set by the model, NULL: mass_kg is all */
-    const struct pal_solid_mass *solid_mass;
+    struct pal_solid_mass *solid_mass;
     double *node_mass_kg; /* lumped at nodes; aliases mass_kg without embed      [n_node]      */
-    double *node_rest;    /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
-    uint8_t *held;        /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
-    double *x_rest;       /* rest position m                                         [n_dof][3]    */
+    /* m/s that a shown node gets from an impulse of 1 Ns on it alone, 1/kg, which bounds explicit contact; NULL without
+     * embed, where it is 1 / mass [n_node] */
+    double *node_ease_1_kg;
+    double *node_rest; /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
+    uint8_t *held;     /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
+    double *x_rest;    /* rest position m                                         [n_dof][3]    */
     /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (shell.h) has arrays for its
      * finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over all is right and
      * one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
@@ -107,6 +110,18 @@ typedef struct pal_body {
 static inline int pal_body_point(const pal_body *body, int k)
 {
     return body->active ? body->active[k] : k;
+}
+
+/* nodes in use, as points: for (k < pal_body_nodes(body)) i = pal_body_point(body, k) */
+static inline int pal_body_nodes(const pal_body *body)
+{
+    return body->embed ? body->n_node : body->n_active;
+}
+/* how easily a node moves, 1/kg; 0: it is held */
+static inline double pal_body_ease(const pal_body *body, int node)
+{
+    if (body->node_ease_1_kg) return body->node_ease_1_kg[node];
+    return body->held[node] ? 0 : 1 / body->mass_kg[node];
 }
 
 /* arrays for n points without embed, all active, zeroed, f = g, d = x, dv = v; MEMORY. [load] */

@@ -36,6 +36,14 @@ void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *
     }
 }
 
+void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prepared *mesh, const pal_cells *cells)
+{
+    pal_body_default(body, name, mesh);
+    body->cells = cells;
+    pal_item_init(&body->model, "model", "subdivision_fem");
+    pal_item_init(&body->output, "output", "surface_out");
+}
+
 void pal_tools_default(pal_scene *scene, int n_tool)
 {
     if (n_tool > PAL_TOOL_MAX) n_tool = PAL_TOOL_MAX;
@@ -121,6 +129,32 @@ pal_err pal_spring_grid_check(const pal_body_def *def, pal_note *note)
     return PAL_ERR_OK;
 }
 
+/* control cells and strokes: of model subdivision_fem alone */
+static pal_err check_cells(const pal_body_def *body, pal_note *note)
+{
+    bool solid = !strcmp(body->model.name, "subdivision_fem");
+    pal_note why = {{0}};
+    if (solid && (!body->cells || body->cells->n_cell < 1))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model: \"subdivision_fem\" works on control cells, and the body has none",
+                            body->name);
+    if (!solid && body->cells)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" model: \"%s\" does not take control cells; \"subdivision_fem\" does",
+                            body->name, body->model.name);
+    if (body->n_stroke < 0 || body->n_stroke > PAL_STROKE_MAX)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": %d strokes, at most %d", body->name, body->n_stroke,
+                            PAL_STROKE_MAX);
+    if (!solid && body->n_stroke > 0)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\" strokes: model \"%s\" cannot be painted; \"subdivision_fem\" can", body->name,
+                            body->model.name);
+    for (int i = 0; i < body->n_stroke; i++)
+        if (pal_stroke_check(&body->stroke[i], &why))
+            return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" strokes[%d].%s", body->name, i, why.text);
+    return PAL_ERR_OK;
+}
+
 static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
 {
     const pal_body_def *body = &scene->body[index];
@@ -135,7 +169,8 @@ static pal_err check_body(const pal_scene *scene, int index, pal_note *note)
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "body \"%s\" model: \"adaptive_springs\" works on the surface, and the mesh has none",
                             body->name);
-    if (!shell && body->mesh->tets.n_node < 1)
+    PAL_TRY(check_cells(body, note));
+    if (!shell && !body->cells && body->mesh->tets.n_node < 1)
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "body \"%s\" model: \"%s\" works on tetrahedra, and the mesh is a surface alone (made for "
                             "\"adaptive_springs\")",

@@ -67,6 +67,9 @@ typedef struct pal_body_def {
     const pal_cells *cells;
     int n_stroke;
     const pal_stroke *stroke; /* painted so far, borrowed [n_stroke] */
+    /* cut away: cells whose middle at rest x has cut_normal . x > cut_m are not shown, what they hid is */
+    bool cut;
+    double cut_normal[3], cut_m; /* unit; body frame */
     pal_material material;
     int n_region;
     pal_region region[PAL_REGION_MAX];
@@ -106,6 +109,8 @@ typedef struct pal_scene {
  * 5 % held, effects gravity, tool_push, tool_grab, finite_guard */
 void pal_scene_default(pal_scene *scene);
 void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh);
+/* the same with control cells: model subdivision_fem, output surface_out; mesh: the triangles of their boundary */
+void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prepared *mesh, const pal_cells *cells);
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
 /* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 and below 0.5 is taken as 0.4999 and

@@ -31,7 +31,7 @@
     X(skin_out)                                                                                                        \
     X(field_out)
 
-#define PAL_MODEL_LIST(X) X(tet_springs) X(fem) X(adaptive_springs)
+#define PAL_MODEL_LIST(X) X(tet_springs) X(fem) X(adaptive_springs) X(subdivision_fem)
 
 #define X(name) extern const pal_effect pal_effect_##name;
 PAL_EFFECT_LIST(X)

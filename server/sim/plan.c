@@ -4,6 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/shell.h"
+#include "server/sim/solid_body.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -110,10 +111,10 @@ static double box_diagonal(const pal_body *body)
 {
     double low[3], high[3];
     for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
-    for (int i = 0; i < body->n_dof; i++)
+    for (int i = 0; i < body->n_node; i++)
         for (int c = 0; c < 3; c++) {
-            low[c] = fmin(low[c], body->x_rest[3 * i + c]);
-            high[c] = fmax(high[c], body->x_rest[3 * i + c]);
+            low[c] = fmin(low[c], body->node_rest[3 * i + c]);
+            high[c] = fmax(high[c], body->node_rest[3 * i + c]);
         }
     return pal_dist3(low, high);
 }
@@ -123,10 +124,12 @@ static const double *mesh_origin(const pal_prepared *mesh)
     return mesh->tets.n_node > 0 ? mesh->tets.origin_m : mesh->surface.origin_m;
 }
 
-/* a body that adapts is its own surface: what skin_out, the default, would put between them is not there */
+/* a body that adapts is its own surface, a solid shows its boundary: what skin_out, the default, would put between them
+ * is not there */
 static void choose_output(const pal_body *body, pal_item *output)
 {
-    if (body->shell && !strcmp(output->name, "skin_out")) snprintf(output->name, sizeof output->name, "surface_out");
+    if ((body->shell || body->solid) && !strcmp(output->name, "skin_out"))
+        snprintf(output->name, sizeof output->name, "surface_out");
 }
 
 /* arrays, supports and the ordered wishes of one body */
@@ -146,6 +149,7 @@ static pal_err build_body(build_state *s, const pal_scene *scene)
     *own = def->model;
     PAL_TRY(model->build(own, &s->build, &s->recipe));
     PAL_TRY(hold(body, def, scene->up, s->build.note));
+    if (body->solid) pal_solid_weigh(body);
     body->size_m = box_diagonal(body);
     body->load_cap_N = 10 * def->material.young_Pa * body->h_m * body->h_m;
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
@@ -237,6 +241,15 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *not
     return PAL_ERR_OK;
 }
 
+/* what bodies own beside the arena */
+static void free_solids(pal_plan *plan)
+{
+    for (int b = 0; b < plan->n_body && plan->body; b++) {
+        pal_solid_free(plan->body[b].solid);
+        plan->body[b].solid = NULL;
+    }
+}
+
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note, pal_plan *out)
 {
     build_state *s = calloc(1, sizeof *s);
@@ -247,7 +260,10 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note,
     /* rows that were made before something was refused */
     for (int i = 0; err && i < out->n_row; i++)
         if (made[i].self && made[i].effect->destroy) made[i].effect->destroy(made[i].self);
-    if (err) *out = (pal_plan){0};
+    if (err) {
+        free_solids(out);
+        *out = (pal_plan){0};
+    }
     free(s);
     return err;
 }
@@ -259,6 +275,7 @@ void pal_plan_free(pal_plan *plan)
     plan->n_row = 0;
     if (plan->row != plan->load_row) free(plan->row);
     plan->row = plan->load_row = NULL;
+    free_solids(plan);
 }
 
 /* of heap tables: the rows, then their bodies */
@@ -322,7 +339,10 @@ void pal_plan_remove(pal_plan *plan, const void *self)
 
 size_t pal_plan_bytes(const pal_plan *plan)
 {
-    return plan->row == plan->load_row ? 0 : table_bytes(plan->n_row);
+    size_t n_byte = plan->row == plan->load_row ? 0 : table_bytes(plan->n_row);
+    for (int b = 0; b < plan->n_body; b++)
+        if (plan->body[b].solid) n_byte += plan->body[b].solid->n_byte;
+    return n_byte;
 }
 
 size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte)

@@ -68,6 +68,7 @@ static bool take_sample(void *user, pal_cell_kind kind, int element, int p, cons
 void pal_solid_sample(pal_solid *solid, const pal_body_def *def)
 {
     sampler s = {solid, def};
+    if (def != &solid->def) solid->def = *def;
     each_point(solid, take_sample, &s);
     solid->sampled++;
 }
@@ -118,7 +119,7 @@ double pal_solid_mass_kg(const pal_solid *solid)
 
 static pal_err allocate(pal_solid *s)
 {
-    s->n_byte = s->subdivision.n_byte + pal_point_rows_bytes(&s->rows);
+    s->n_byte = sizeof *s + s->subdivision.n_byte + pal_point_rows_bytes(&s->rows);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         size_t n = (size_t)s->elements.n[kind] * PAL_CELL_POINTS;
         float **to[4] = {&s->samples[kind].young_Pa, &s->samples[kind].poisson, &s->samples[kind].density_kg_m3,

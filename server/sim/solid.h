@@ -25,6 +25,7 @@ typedef struct pal_solid {
     double *node_rest;   /* rows times the control cells' x           [rows.n_row][3] */
     pal_solid_samples samples[PAL_CELL_KINDS];
     uint64_t sampled; /* grows with every pal_solid_sample, from 1 */
+    pal_body_def def; /* of the last pal_solid_sample; what it borrows stays borrowed */
     size_t n_byte;    /* memory of all arrays, about */
 } pal_solid;
 

@@ -28,6 +28,13 @@ static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
     return PAL_ERR_OK;
 }
 
+pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build)
+{
+    if (build->body->tets && build->body->tets->n_tet > 0) return PAL_ERR_OK;
+    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", entry->path,
+                        entry->name);
+}
+
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
                             double least, pal_spring_row *out)
 {

@@ -24,6 +24,8 @@ typedef struct pal_spring_row {
     double *w, *q; /* by lane; 0: no constraint  [strips.n_lane]    */
 } pal_spring_row;
 
+/* REFUSED: the body is not made of tetrahedra */
+pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build);
 /* reads the row's keys (pal_spring_read), takes what is useful of item [n_item][corners of the kind] (kept: measure >
  * least; its corners reordered), with w = 1 / measure */
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,

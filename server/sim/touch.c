@@ -448,8 +448,23 @@ static double point_motion(const pal_touch *touch, const pal_body *body, const p
     return sum;
 }
 
+/* the same where points carry the nodes: the sum of the eigenvalues is no less than the largest, and what a point
+ * between nodes moves is no more than their mean */
+static double sum_of_rates(const pal_touch *touch, const pal_body *body, const pal_contact *contact, int n)
+{
+    int32_t vertex[3];
+    double share[3], rate = 0;
+    for (int i = 0; i < n; i++) {
+        int m = corners(touch, contact[i].point, vertex, share);
+        for (int c = 0; c < m; c++)
+            rate += contact[i].k_N_m * share[c] * pal_body_ease(body, body->shown_node[vertex[c]]);
+    }
+    return rate;
+}
+
 double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_contact *contact, int n)
 {
+    if (body->embed) return sum_of_rates(touch, body, contact, n);
     enum { PASSES = 2, MOST = 256 };
     /* a patch of very many points is judged by a part of them, each standing for several */
     int stride = (n + MOST - 1) / MOST, m = 0;

@@ -90,7 +90,8 @@ bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const doubl
 
 /* Explicit stability in a sub-step (numerics.md part 3): the largest eigenvalue of M^-1 sum k J' J over the contacts,
  * J being a point's motion along `away` with the free nodes, 1/s^2. Two power iterations from a uniform push, which is
- * nearly the vector looked for, since all points are pushed the same way. */
+ * nearly the vector looked for, since all points are pushed the same way. Where points carry the nodes
+ * (pal_body.embed), a bound of it: the sum of k times the ease of each point. */
 double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_contact *contact, int n);
 /* true when two lists of contacts press on some common slot */
 bool pal_touch_share(pal_touch *touch, const pal_body *body, const pal_contact *a, int n_a, const pal_contact *b,

@@ -6,7 +6,7 @@
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
 #include "server/sim/shell.h"
-#include "server/sim/solid.h"
+#include "server/sim/solid_body.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -91,11 +91,14 @@ static double find_rest_limit(pal_world *w)
         const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         if (!solve->effect->limit) continue;
         double *x = body->x, *d = body->d;
-        body->x = body->d = body->x_rest;
+        body->x = body->x_rest;
+        if (!body->embed) body->d = body->x_rest;
+        pal_body_place(body);
         pal_step step = step_of(w, b);
         step.n_contact = 0;
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
+        pal_body_place(body);
         /* refinement may bring the finest level, each level about half the step (C eq. 9) */
         if (refines(w, b)) limit = ldexp(limit, body->shell->finest + 1 - body->shell->levels.n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
@@ -138,7 +141,7 @@ static pal_err make_part(pal_world *w, int b)
 {
     const pal_body *body = &w->plan.body[b];
     part *p = &w->part[b];
-    const double *x = body->skin ? body->surface->x : body->x_rest;
+    const double *x = body->skin ? body->surface->x : body->node_rest;
     if (body->n_shown == 0) return PAL_ERR_OK;
     const int32_t *tri = body->shell ? body->shell->slot : body->surface->tri;
     p->n_vertex = body->n_shown;
@@ -215,7 +218,6 @@ pal_err pal_world_create(const pal_scene *scene, pal_note *note, pal_world **out
 void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
-    for (int b = 0; world->plan.body && b < world->plan.n_body; b++) pal_solid_free(world->plan.body[b].solid);
     pal_plan_free(&world->plan);
     pal_field_free(&world->fields);
     pal_arena_destroy(world->scratch);
@@ -252,12 +254,14 @@ void pal_world_reset(pal_world *world)
 {
     for (int b = 0; b < world->plan.n_body; b++) {
         pal_body *body = &world->plan.body[b];
-        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof, n_load = 3 * sizeof(double) * (size_t)body->n_node;
         memcpy(body->x, body->x_rest, n_byte);
         memset(body->v, 0, n_byte);
-        memset(body->f, 0, n_byte);
-        memset(body->load, 0, n_byte);
-        if (body->outer) memset(body->outer, 0, n_byte);
+        memset(body->g, 0, n_byte);
+        memset(body->f, 0, n_load);
+        memset(body->load, 0, n_load);
+        if (body->outer) memset(body->outer, 0, n_load);
+        pal_body_place(body);
         body->frozen = false;
         body->n_capped = body->n_clamped = body->n_heavy = 0;
     }
@@ -276,16 +280,40 @@ void pal_world_reset(pal_world *world)
     run_output(world);
 }
 
+void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v)
+{
+    pal_world *w = world;
+    w->time_s = before->time_s, w->tick = before->tick, w->end_ns = before->end_ns;
+    w->tools = before->tools;
+    memcpy(w->asked, before->asked, sizeof w->asked);
+    memcpy(w->has_asked, before->has_asked, sizeof w->has_asked);
+    memcpy(w->pose_ns, before->pose_ns, sizeof w->pose_ns);
+    for (int b = 0; b < w->plan.n_body && b < before->plan.n_body; b++) {
+        pal_body *body = &w->plan.body[b];
+        const pal_body *from = &before->plan.body[b];
+        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+        const double *to_x = b == edited ? x : from->x, *to_v = b == edited ? v : from->v;
+        bool known = b == edited || (body->n_dof == from->n_dof && !body->shell);
+        if (known && to_x) memcpy(body->x, to_x, n_byte);
+        if (known && to_v) memcpy(body->v, to_v, n_byte);
+        pal_body_place(body);
+        body->frozen = from->frozen;
+        pal_world_moved(w, b);
+    }
+    run_output(w);
+}
+
 static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_note *note)
 {
     pal_body *body = &w->plan.body[b];
+    if (body->solid) pal_solid_material(body, to);
     for (int i = 0; i < w->plan.n_row; i++) {
         const pal_row *row = &w->plan.row[i];
         if (w->plan.row_body[i] != b || !row->effect->material) continue;
         PAL_TRY(row->effect->material(row->self, body, to, note));
     }
     double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
-    for (int i = 0; i < body->n_dof; i++) body->mass_kg[i] *= ratio;
+    for (int i = 0; i < body->n_dof && !body->solid; i++) body->mass_kg[i] *= ratio;
     if (body->shell) {
         body->shell->options.mass_kg *= ratio;
         for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
@@ -346,7 +374,7 @@ static void begin_loads(pal_body *body)
 static void cap_loads(pal_body *body)
 {
     double cap2 = body->load_cap_N * body->load_cap_N;
-    for (int k = 0; k < body->n_active; k++) {
+    for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 <= cap2) continue;
@@ -392,6 +420,8 @@ static pal_err run_substep(pal_world *w, pal_step *shared)
         pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
         PAL_TRY(solve->effect->run(solve->self, &step));
+        /* nodes follow their points, for contact and for what comes after the step */
+        if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_place(step.body);
         solve->spent_ns += pal_clock_ns() - before - (force_ns(&step) - forces);
         pal_arena_reset(w->scratch);
     }
@@ -510,6 +540,7 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     const double *o = body->offset_m;
     to->revision = body->revision;
     to->frozen = body->frozen;
+    if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
         copy_slots(body->shell, to);
         for (int k = 0; k < body->n_active; k++) {
@@ -666,6 +697,7 @@ pal_body *pal_world_body(pal_world *world, int body)
 void pal_world_moved(pal_world *world, int body)
 {
     const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    pal_body_place(&world->plan.body[body]);
     if (solve->effect->reset) solve->effect->reset(solve->self, &world->plan.body[body]);
     find_limit(world, 0);
 }

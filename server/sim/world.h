@@ -63,6 +63,11 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note);
 bool pal_world_gives(const pal_world *world, int body, pal_field field); /* would it be refused? */
 
+/* A world made from an edited scene goes on where another is: its time, tools and poses, and x and v of all bodies that
+ * have as many points (bodies that adapt begin at rest). x, v [n_dof][3] are the state of body `edited` in their place
+ * (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more. Both stand still. [sim] */
+void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
+
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
 /* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
  * MEMORY: that field is left out. Between steps, by the thread that fills the frame */

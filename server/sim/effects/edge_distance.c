@@ -22,6 +22,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     edge_distance *e = PAL_NEW(build->arena, edge_distance, 1);
     int32_t *edge;
     int n_edge;
+    PAL_TRY(pal_spring_row_check(item, build));
     if (!e) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_edges(build->body->tets, &edge, &n_edge));
     pal_err err =

@@ -16,6 +16,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     pal_spring_row *row = PAL_NEW(build->arena, pal_spring_row, 1);
     int32_t *face;
     int n_face;
+    PAL_TRY(pal_spring_row_check(item, build));
     if (!row) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_faces(build->body->tets, &face, &n_face));
     double size = build->body->size_m;

@@ -3,6 +3,8 @@
  * Diverged means: a position or velocity is not finite, a node is farther than `reach` box diagonals from its rest
  * place, or the root mean square speed is beyond `speed_m_s`. The last good positions (a copy of every step) come back,
  * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it).
+ * Of a body whose points carry nodes (pal_body.embed) the points are looked at and put back, the speed is that of the
+ * nodes.
  * Of a body that adapts (sim/shell.h) the active points are looked at and copied. Which are active is not taken back:
  * one that came into use since the last good state is put between the ends of its edge. */
 #include "server/base/vec3.h"
@@ -67,6 +69,7 @@ static void put_back(finite_guard *guard, pal_body *body)
     if (guard->kept) return;
     memcpy(body->x, guard->x, n_byte);
     memset(body->v, 0, n_byte);
+    pal_body_place(body);
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
@@ -94,7 +97,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     guard->gravity_m_s2 = fabs(build->scene->gravity_m_s2);
     guard->asked_speed_m_s = guard->speed_m_s = speed;
     if (speed == 0) guard->speed_m_s = auto_speed(guard, &build->def->material);
-    for (int i = 0; i < body->n_dof; i++) guard->mass_kg += body->mass_kg[i];
+    for (int i = 0; i < body->n_node; i++) guard->mass_kg += body->node_mass_kg[i];
     keep(guard, body);
     *self = guard;
     return PAL_ERR_OK;
@@ -110,7 +113,11 @@ static bool sound(const finite_guard *guard, const pal_body *body)
         size_t i = (size_t)(active ? active[k] : k);
         const double *x = body->x + 3 * i, *r = body->x_rest + 3 * i, *v = body->v + 3 * i;
         near &= fabs(x[0] - r[0]) <= limit && fabs(x[1] - r[1]) <= limit && fabs(x[2] - r[2]) <= limit;
-        energy += body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        energy += body->embed ? 0 * (v[0] + v[1] + v[2]) : body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
+    for (int i = 0; i < body->n_node && body->embed; i++) {
+        const double *v = body->dv + 3 * (size_t)i;
+        energy += body->node_mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
     return near && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }

@@ -21,10 +21,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 static pal_err run(void *self, pal_step *step)
 {
     const gravity *row = self;
-    const double *m = step->body->mass_kg, gx = row->g[0], gy = row->g[1], gz = row->g[2];
+    const double *m = step->body->node_mass_kg, gx = row->g[0], gy = row->g[1], gz = row->g[2];
     double *f = step->body->f;
     const int32_t *active = step->body->active;
-    for (int k = 0; k < step->body->n_active; k++) {
+    const int n = pal_body_nodes(step->body);
+    for (int k = 0; k < n; k++) {
         int i = active ? active[k] : k;
         f[3 * i] += m[i] * gx;
         f[3 * i + 1] += m[i] * gy;
@@ -37,9 +38,9 @@ static double energy(void *self, const pal_body *body)
 {
     const gravity *row = self;
     double sum = 0;
-    for (int k = 0; k < body->n_active; k++) {
+    for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
-        sum -= body->mass_kg[i] * pal_dot3(row->g, body->d + 3 * i);
+        sum -= body->node_mass_kg[i] * pal_dot3(row->g, body->d + 3 * i);
     }
     return sum;
 }

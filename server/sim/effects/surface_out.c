@@ -2,7 +2,8 @@
  * shown.
  *
  * A body that adapts (sim/shell.h) shows all its points, those out of use where they are at rest, and the triangles of
- * its present leaves; a step costs what its active points do. */
+ * its present leaves; a step costs what its active points do. Of a solid (sim/solid.h) the model has said what is its
+ * boundary and which node each vertex is. */
 #include "server/sim/effect.h"
 #include "server/sim/shell.h"
 
@@ -67,11 +68,27 @@ static pal_err make_adaptive(pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
+/* surface and shown_node are there already */
+static pal_err make_solid(pal_build *build, void **self)
+{
+    pal_body *body = build->body;
+    surface_out *out = PAL_NEW(build->arena, surface_out, 1);
+    float *shown = PAL_NEW(build->arena, float, 3 * (size_t)body->surface->n_vertex);
+    if (!out || !shown) return PAL_ERR_MEMORY;
+    out->body = body;
+    body->n_shown = body->surface->n_vertex;
+    body->shown = shown;
+    evaluate(body);
+    *self = out;
+    return PAL_ERR_OK;
+}
+
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
     PAL_TRY(pal_item_done(item, build->note));
     pal_body *body = build->body;
     if (body->shell) return make_adaptive(build, self);
+    if (body->solid) return make_solid(build, self);
     const pal_tets *tets = body->tets;
     if (!tets || tets->n_face == 0 || tets->n_node > body->n_node)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body has no boundary faces to show", item->path);

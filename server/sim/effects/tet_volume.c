@@ -12,6 +12,7 @@
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
+    PAL_TRY(pal_spring_row_check(item, build));
     const pal_tets *tets = build->body->tets;
     pal_spring_row *row = PAL_NEW(build->arena, pal_spring_row, 1);
     int32_t *tet = malloc(4 * sizeof *tet * ((size_t)tets->n_tet + 1));

@@ -5,9 +5,10 @@
  * patch's place y = sum W_i x_i. With o = y - tool at that moment (turned with the tool's quaternion afterwards),
  *     F = k (tool + o - y) - c v_rel,   node i gets W_i F, the tool gets -F,
  * so nothing jumps when the grab begins, and force and torque balance about y. k and c are kept below the explicit
- * limits alpha m_i / dt^2 and beta m_i / dt of every free node, m_i being shared by the tools that hold it. F is
- * shortened to what the tool's cap and the nodes' load_cap_N leave. The patch is let go when the button goes up or the
- * tool's ramp has fallen to 0.
+ * limits alpha m_i / dt^2 and beta m_i / dt of every free node, m_i being shared by the tools that hold it; where
+ * points carry the nodes (pal_body.embed), alpha and beta times what the patch weighs at least. F is shortened to what
+ * the tool's cap and the nodes' load_cap_N leave. The patch is let go when the button goes up or the tool's ramp has
+ * fallen to 0.
  *
  * With an implicit solver (pal_body.implicit) nothing limits k, c is 0 (the step itself damps), the solver takes the
  * spring implicitly and the forces are those of the end of the sub-step. The spring stretches by at most 0.02 S more
@@ -240,7 +241,7 @@ static void take_gathered(tool_grab *grab, grip *g, const pal_body *body)
 {
     double sum = 0;
     g->n_node = 0;
-    for (int k = 0; k < body->n_active; k++) {
+    for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         if (grab->gather[i] == 0) continue;
         g->node[g->n_node] = i;
@@ -347,10 +348,20 @@ static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal
     if (pressed && !g->held) take_hold(grab, g, tool, body);
 }
 
+/* what the patch weighs at least, where points carry its nodes: W' C W <= sum W_i C_ii; shared by the tools that hold
+ * some of it */
+static double patch_mass(const tool_grab *grab, const grip *g, const pal_body *body)
+{
+    double ease_1_kg = 0;
+    for (int i = 0; i < g->n_node; i++) ease_1_kg += grab->sum_weight[g->node[i]] * pal_body_ease(body, g->node[i]);
+    return ease_1_kg > 0 ? 1 / ease_1_kg : INFINITY;
+}
+
 static void find_limits(const tool_grab *grab, grip *g, const pal_body *body, double dt_s)
 {
     double least = INFINITY;
-    for (int i = 0; i < g->n_node; i++)
+    if (body->embed) least = patch_mass(grab, g, body);
+    for (int i = 0; i < g->n_node && !body->embed; i++)
         if (!body->held[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grab->sum_weight[g->node[i]]);
     g->k_most_N_m = ALPHA * least / (dt_s * dt_s);
     g->c_most_Ns_m = BETA * least / dt_s;

@@ -22,6 +22,9 @@
  * once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force does not rise
  * in that moment, and grows again in EASE_S.
  *
+ * Where points carry the nodes (pal_body.embed) central_cg steps up to 0.9 of its limit, a <= 3.3, so that contact
+ * keeps to alpha 0.3; its bound is above the eigenvalue, as it sums over the points that are touched.
+ *
  * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
@@ -43,6 +46,7 @@
 #define GAMMA         0.5
 #define ALPHA_HELD    0.5
 #define GAMMA_HELD    1.0
+#define ALPHA_CARRIED 0.3
 #define EASE_S        (1.0 / 6)
 #define SAFETY        1.3
 #define SHARE_RISE    1.01
@@ -190,12 +194,12 @@ static pal_err make_implicit(tool_push *push, pal_build *build)
         if (!push->holder[t].firm) return PAL_ERR_MEMORY;
         PAL_TRY(pal_press_make(build->arena, &push->holder[t].firm->press));
     }
-    if (def->n_region > 0) {
+    if (def->n_region > 0 || def->n_stroke > 0) {
         push->point_Pa = PAL_NEW(build->arena, float, push->touch.n_vertex);
         if (!push->point_Pa) return PAL_ERR_MEMORY;
         for (int i = 0; i < push->touch.n_vertex; i++) {
             pal_material at;
-            pal_material_at(def, body->surface->x + 3 * (size_t)i, &at);
+            pal_material_painted(def, body->surface->x + 3 * (size_t)i, &at);
             if (at.young_Pa != def->material.young_Pa) push->point_Pa[i] = (float)at.young_Pa;
         }
     }
@@ -412,7 +416,10 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
             pal_touch_share(&push->touch, step->body, h->contact, h->n_contact, other->contact, other->n_contact);
     }
     double rate = SAFETY * n_share * pal_touch_stiffest(&push->touch, step->body, h->contact, h->n_contact);
-    double most = (step->body->shell ? ALPHA_HELD : ALPHA) / (step->dt_s * step->dt_s),
+    double most = (step->body->shell   ? ALPHA_HELD
+                   : step->body->embed ? ALPHA_CARRIED
+                                       : ALPHA) /
+                  (step->dt_s * step->dt_s),
            share = rate > most ? most / rate : 1;
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
 }

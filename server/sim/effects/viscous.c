@@ -27,9 +27,10 @@ static pal_err run(void *self, pal_step *step)
     const viscous *row = self;
     const pal_body *body = step->body;
     const int32_t *active = body->active;
-    for (int k = 0; k < body->n_active; k++) {
+    const int n = pal_body_nodes(body);
+    for (int k = 0; k < n; k++) {
         int i = active ? active[k] : k;
-        for (int c = 0; c < 3; c++) body->f[3 * i + c] -= row->rate_1_s * body->mass_kg[i] * body->dv[3 * i + c];
+        for (int c = 0; c < 3; c++) body->f[3 * i + c] -= row->rate_1_s * body->node_mass_kg[i] * body->dv[3 * i + c];
     }
     return PAL_ERR_OK;
 }

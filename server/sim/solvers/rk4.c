@@ -65,6 +65,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     double safety = 0.9;
     PAL_TRY(pal_item_number(item, "safety", 0.01, 0.96, &safety, build->note));
     PAL_TRY(pal_item_done(item, build->note));
+    if (build->body->embed)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
+                            "\"central_cg\" or \"implicit_euler\"",
+                            item->path);
     const pal_body *body = build->body;
     rk4 *row = PAL_NEW(build->arena, rk4, 1);
     if (!row) return PAL_ERR_MEMORY;

@@ -27,6 +27,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     double safety = 0.5;
     PAL_TRY(pal_item_number(item, "safety", 0.01, 0.9, &safety, build->note));
     PAL_TRY(pal_item_done(item, build->note));
+    if (build->body->embed)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "%s: \"verlet\" moves nodes, those of this body are carried by control points; take "
+                            "\"central_cg\" or \"implicit_euler\"",
+                            item->path);
     verlet *row = PAL_NEW(build->arena, verlet, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->stiff = PAL_NEW(build->arena, double, build->body->n_dof);
