@@ -12,7 +12,7 @@ static const double alike = 0.5;
 
 static size_t bytes3(const pal_body *body)
 {
-    return 3 * sizeof(double) * (size_t)body->n_node;
+    return 3 * sizeof(double) * (size_t)body->n_dof;
 }
 
 static void multiply(void *user, const double *p, double *out)
@@ -46,20 +46,17 @@ static pal_known_answer *find_known(pal_answer *answer, double size2, double *sh
     return best ? best : oldest;
 }
 
-static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)
+/* force and move are of points; body->f and g are overwritten */
+static bool solve_points(pal_answer *answer, const pal_body *body, double *move_m)
 {
-    pal_answer *answer = self;
-    pal_body *own = answer->system->body;
     int n = answer->cg.n;
     double *r = answer->cg.r, share;
-    memcpy(r, force_N, bytes3(body));
     for (int i = 0; i < n; i++)
         if (body->held[i / 3]) r[i] = 0;
     memset(move_m, 0, bytes3(body));
     double size2 = pal_sum_products(n, r, r);
     if (!(size2 > 0)) return size2 == 0;
-    memcpy(answer->x, own->x, bytes3(body));
-    memcpy(answer->f, own->f, bytes3(body));
+    memcpy(answer->x, body->x, bytes3(body));
     pal_known_answer *known = find_known(answer, size2, &share);
     memcpy(known->force, r, bytes3(body));
     known->size2 = size2;
@@ -72,8 +69,25 @@ static bool solve(void *self, const pal_body *body, const double *force_N, doubl
     (void)pal_conjugate_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MOST);
     memcpy(known->move, move_m, bytes3(body));
     if (!isfinite(answer->cg.residual)) known->size2 = 0;
-    memcpy(own->f, answer->f, bytes3(body));
     return isfinite(answer->cg.residual);
+}
+
+static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)
+{
+    pal_answer *answer = self;
+    pal_body *own = answer->system->body;
+    size_t node_bytes = 3 * sizeof(double) * (size_t)body->n_node;
+    memcpy(answer->f, own->f, node_bytes);
+    if (body->embed) {
+        memset(answer->cg.r, 0, bytes3(body));
+        pal_point_rows_pull(body->embed, force_N, answer->cg.r);
+    } else {
+        memcpy(answer->cg.r, force_N, node_bytes);
+    }
+    bool done = solve_points(answer, body, body->embed ? answer->move : move_m);
+    if (body->embed) pal_point_rows_place(body->embed, answer->move, move_m);
+    memcpy(own->f, answer->f, node_bytes);
+    return done;
 }
 
 void pal_answer_forget(pal_answer *answer)
@@ -83,13 +97,15 @@ void pal_answer_forget(pal_answer *answer)
 
 static pal_err make_arrays(pal_answer *answer, pal_arena *arena)
 {
-    size_t n3 = 3 * (size_t)answer->system->body->n_node;
-    double **const array[] = {&answer->x,    &answer->f,    &answer->low, &answer->cg.r,
+    const pal_body *body = answer->system->body;
+    size_t n3 = 3 * (size_t)body->n_dof;
+    double **const array[] = {&answer->x,    &answer->move, &answer->low, &answer->cg.r,
                               &answer->cg.z, &answer->cg.p, &answer->cg.q};
     for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
         *array[i] = PAL_NEW(arena, double, n3);
         if (!*array[i]) return PAL_ERR_MEMORY;
     }
+    if (!(answer->f = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
     for (int k = 0; k < PAL_ANSWERS; k++) {
         answer->known[k].force = PAL_NEW(arena, double, n3);
         answer->known[k].move = PAL_NEW(arena, double, n3);

@@ -13,7 +13,7 @@
 /* forces whose answers are remembered: a patch or an axis of a grip each */
 enum { PAL_ANSWERS = 4 };
 typedef struct pal_known_answer {
-    double *force, *move; /* N, m                        [n_node][3] */
+    double *force, *move; /* of points, N, m             [n_dof][3] */
     double size2;         /* of force; 0: nothing known              */
     uint64_t used;        /* number of the call that used it last    */
 } pal_known_answer;
@@ -23,7 +23,8 @@ typedef struct pal_answer {
     pal_warp warp;
     pal_system *system;
     pal_conjugate cg;
-    double *x, *f, *low; /* kept while forces are asked [n_node][3] */
+    double *x, *f, *low; /* kept while forces are asked: of points, of nodes, of points */
+    double *move;        /* of points, where nodes are carried by them     [n_dof][3] */
     pal_known_answer known[PAL_ANSWERS];
     uint64_t n_call;
 } pal_answer;

@@ -3,7 +3,9 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/solid_mass.h"
 
+#include <limits.h>
 #include <string.h>
 
 static const double most_move_S = 0.2;
@@ -11,10 +13,12 @@ static const double most_move_S = 0.2;
 static const double floor_share = 1e-7;
 /* most iterations of a step that began with one and gained energy */
 enum { rescue_newton = 8 };
+/* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
+enum { PROBES_A_STEP = 4 };
 
 static size_t bytes3(const pal_implicit *core)
 {
-    return 3 * sizeof(double) * (size_t)core->system.body->n_node;
+    return 3 * sizeof(double) * (size_t)core->system.body->n_dof;
 }
 
 /* ---- load ---- */
@@ -47,13 +51,16 @@ static void precondition(void *user, const double *r, double *z)
 
 static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
 {
-    size_t n3 = 3 * (size_t)core->system.body->n_node;
+    const pal_body *body = core->system.body;
+    size_t n3 = 3 * (size_t)body->n_dof;
     double **const array[] = {&core->x0,    &core->v0,   &core->xs,   &core->vs,   &core->start, &core->work,
                               &core->moved, &core->cg.r, &core->cg.z, &core->cg.p, &core->cg.q};
     for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
         *array[i] = PAL_NEW(arena, double, n3);
         if (!*array[i]) return PAL_ERR_MEMORY;
     }
+    core->node_moved = core->moved;
+    if (body->embed && !(core->node_moved = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
     core->cg.n = (int)n3;
     core->cg.multiply = multiply;
     core->cg.precondition = precondition;
@@ -76,14 +83,28 @@ static pal_err factor_all(pal_implicit *core)
     return PAL_ERR_OK;
 }
 
+/* the matrices of an embedded body at rest, in one go */
+static void probe_all(pal_implicit *core)
+{
+    const pal_body *body = core->system.body;
+    double before = pal_clock_s();
+    if (!core->system.embedded) return;
+    core->sampled = body->solid ? body->solid->sampled : 0;
+    core->probing = false;
+    pal_embedded_renew(core->system.embedded);
+    (void)pal_system_probe(&core->system, INT_MAX);
+    core->report.assemble_s += pal_clock_s() - before;
+}
+
 /* at rest, wherever the body is now */
 static pal_err factor_at_rest(pal_implicit *core)
 {
     pal_body *body = core->system.body;
     double *x = body->x, *d = body->d;
-    body->x = body->d = body->x_rest;
+    body->x = body->x_rest, body->d = body->node_rest;
     pal_turns_reset(&core->turns);
     pal_system_linearise(&core->system);
+    probe_all(core);
     pal_err err = factor_all(core);
     body->x = x, body->d = d;
     return err;
@@ -127,7 +148,7 @@ void pal_implicit_destroy(void *self)
 
 static void clear_held(const pal_body *body, double *r)
 {
-    for (int i = 0; i < body->n_node; i++)
+    for (int i = 0; i < body->n_dof; i++)
         if (body->held[i]) pal_set3(r + 3 * i, 0, 0, 0);
 }
 
@@ -154,11 +175,15 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
 {
     const pal_body *body = core->system.body;
     double keep = core->system.mass, *b = core->work;
-    for (int i = 0; i < body->n_node; i++) {
+    if (body->solid_mass) {
+        pal_system_inertia(&core->system, 1, 0, core->vs, b);
+        pal_system_inertia(&core->system, keep, core->system.damp, velocity, r);
+    }
+    for (int i = 0; i < body->n_dof; i++) {
         double m = body->mass_kg[i];
         for (int c = 3 * i; c < 3 * i + 3; c++) {
-            b[c] = m * core->vs[c] + tau * body->f[c];
-            r[c] = b[c] - m * keep * velocity[c];
+            b[c] = (body->solid_mass ? b[c] : m * core->vs[c]) + tau * body->g[c];
+            r[c] = b[c] - (body->solid_mass ? r[c] : m * keep * velocity[c]);
         }
     }
     if (core->system.has_contact) add_contact(core, tau, velocity, r);
@@ -167,12 +192,26 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
     return norm(core, b);
 }
 
+/* of an embedded body: what is neither of rows nor of contact. Held points count too, with what they have in common at
+ * any V of the same stage */
+static double embedded_potential(pal_implicit *core, const double *velocity)
+{
+    const pal_system *system = &core->system;
+    double *p = core->cg.z;
+    for (int i = 0; i < core->cg.n; i++) p[i] = velocity[i] - core->vs[i];
+    double sum =
+        pal_system_square(system, 1, 0, p) + pal_system_square(system, system->mass - 1, system->damp, velocity);
+    for (int i = 0; i < core->cg.n; i++) p[i] = system->body->x[i] - core->x0[i];
+    return 0.5 * sum - pal_system_work(system, p);
+}
+
 /* the incremental potential at V where the body is now: kinetic + drag + rows - loads + contact, J */
 static double potential(pal_implicit *core, double tau, const double *velocity)
 {
     const pal_body *body = core->system.body;
     double sum = pal_system_energy(&core->system), keep = core->system.mass - 1;
-    for (int i = 0; i < body->n_node; i++) {
+    if (body->embed) sum += embedded_potential(core, velocity);
+    for (int i = 0; i < body->n_dof && !body->embed; i++) {
         double m = 0.5 * body->mass_kg[i];
         if (body->held[i]) continue;
         for (int c = 3 * i; c < 3 * i + 3; c++) {
@@ -198,7 +237,7 @@ static void solve_linear(pal_implicit *core, double target)
     double *v = body->v, *r = core->cg.r, *q = core->cg.q, *p = core->cg.p;
     bool led = false;
     for (int i = 0; i < core->cg.n; i++) p[i] = v[i] - core->start[i];
-    for (int i = 0; i < body->n_node; i++) led = led || (body->held[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
+    for (int i = 0; i < body->n_dof; i++) led = led || (body->held[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
     double before = norm(core, r);
     pal_system_multiply(&core->system, p, q);
     for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
@@ -212,18 +251,30 @@ static void solve_linear(pal_implicit *core, double target)
     if (n > core->most_cg) core->most_cg = n;
 }
 
-/* A of a uniform velocity V is (1 + tau c) M V where nothing holds the body: V takes up the mean of the residual */
+/* of the masses and damping between points: the sum of all their entries in A, kg */
+static double solid_inertia(const pal_implicit *core)
+{
+    const pal_solid_mass *m = core->system.body->solid_mass;
+    double mass = 0, damping = 0;
+    for (int k = 0; k < m->n_entry; k++) mass += m->mass_kg[k];
+    for (int k = 0; k < m->n_entry && m->damping_kg_s; k++) damping += m->damping_kg_s[k];
+    return core->system.mass * mass + core->system.damp * damping;
+}
+
+/* A of a uniform velocity V is (1 + tau c) M V (and tau D V) where nothing holds the body: V takes up the mean of the
+ * residual */
 static void keep_momentum(pal_implicit *core)
 {
     const pal_body *body = core->system.body;
     double sum[3] = {0, 0, 0}, mass = 0;
-    if (core->system.n_free < body->n_node || core->system.has_contact) return;
-    for (int i = 0; i < body->n_node; i++) {
+    if (core->system.n_free < body->n_dof || core->system.has_contact) return;
+    for (int i = 0; i < body->n_dof; i++) {
         pal_add3(sum, sum, core->cg.r + 3 * i);
         mass += body->mass_kg[i];
     }
-    pal_scale3(sum, 1 / (mass * core->system.mass), sum);
-    for (int i = 0; i < body->n_node; i++) pal_add3(body->v + 3 * i, body->v + 3 * i, sum);
+    double all = body->solid_mass ? solid_inertia(core) : mass * core->system.mass;
+    pal_scale3(sum, 1 / all, sum);
+    for (int i = 0; i < body->n_dof; i++) pal_add3(body->v + 3 * i, body->v + 3 * i, sum);
 }
 
 /* an iteration moves no node farther than 0.2 S: the whole way from `start` is shortened, because a body of which some
@@ -232,13 +283,13 @@ static void clamp_moves(pal_implicit *core, double tau)
 {
     pal_body *body = core->system.body;
     double most = most_move_S * body->size_m / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
-    for (int i = 0; i < body->n_node && core->system.n_free == body->n_node; i++) {
+    for (int i = 0; i < body->n_dof && core->system.n_free == body->n_dof; i++) {
         pal_axpy3(mean, body->mass_kg[i], core->vs + 3 * i);
         pal_axpy3(mean, -body->mass_kg[i], core->start + 3 * i);
         mass += body->mass_kg[i];
     }
     if (mass > 0) pal_scale3(mean, 1 / mass, mean);
-    for (int i = 0; i < body->n_node; i++) {
+    for (int i = 0; i < body->n_dof; i++) {
         double way[3];
         pal_sub3(way, body->v + 3 * i, core->start + 3 * i);
         double far = pal_norm3(way), own = fmin(far, pal_dist3(way, mean));
@@ -254,10 +305,12 @@ static void clamp_moves(pal_implicit *core, double tau)
     }
 }
 
-static void go(pal_implicit *core, double tau)
+/* the body to where velocities lead from x* */
+static void go(pal_implicit *core, double tau, const double *velocity)
 {
     pal_body *body = core->system.body;
-    for (int i = 0; i < core->cg.n; i++) body->x[i] = core->xs[i] + tau * body->v[i];
+    for (int i = 0; i < core->cg.n; i++) body->x[i] = core->xs[i] + tau * velocity[i];
+    pal_system_place(&core->system);
 }
 
 /* halves the way from `start` to body->v until the potential falls by a little of what its slope there promises;
@@ -266,18 +319,18 @@ static void search(pal_implicit *core, double tau)
 {
     const pal_body *body = core->system.body;
     double *v = body->v, *way = core->work, slope = 0, step = 1;
-    for (int i = 0; i < body->n_node; i++) {
+    for (int i = 0; i < body->n_dof; i++) {
         pal_sub3(way + 3 * i, v + 3 * i, core->start + 3 * i);
         slope -= pal_dot3(core->moved + 3 * i, way + 3 * i);
         /* where led nodes move on, the potential before and after are not of one problem */
         if (body->held[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
     }
     if (!(slope < 0)) return;
-    for (int i = 0; i < core->cg.n; i++) body->x[i] = core->xs[i] + tau * core->start[i];
+    go(core, tau, core->start);
     double at_start = potential(core, tau, core->start), noise = 1e-13 * fabs(at_start);
     for (;; step *= 0.5) {
         for (int i = 0; i < core->cg.n; i++) v[i] = core->start[i] + step * way[i];
-        go(core, tau);
+        go(core, tau, v);
         if (step < 1e-3 || potential(core, tau, v) <= at_start + 1e-4 * step * slope + noise) break;
     }
     core->report.step_size = step;
@@ -293,7 +346,7 @@ static void iterate(pal_implicit *core, double tau, double target)
     solve_linear(core, target);
     keep_momentum(core);
     clamp_moves(core, tau);
-    go(core, tau);
+    go(core, tau, core->system.body->v);
     core->report.n_newton++;
     core->report.step_size = 1;
 }
@@ -305,8 +358,9 @@ static double total_energy(pal_implicit *core, const double *velocity, double *s
     const pal_body *body = core->system.body;
     double kinetic = 0, rows = pal_system_energy(&core->system), work = 0, *p = core->cg.z, *q = core->cg.q;
     for (int i = 0; i < core->cg.n; i++) p[i] = body->x[i] - core->x0[i];
-    work = pal_sum_products(core->cg.n, body->load, p);
-    for (int i = 0; i < body->n_node; i++)
+    work = pal_system_work(&core->system, p);
+    if (body->solid_mass) kinetic = 0.5 * pal_system_square(&core->system, 1, 0, velocity);
+    for (int i = 0; i < body->n_dof && !body->solid_mass; i++)
         kinetic += 0.5 * body->mass_kg[i] * pal_dot3(velocity + 3 * i, velocity + 3 * i);
     if (core->system.has_contact) {
         memset(q, 0, bytes3(core));
@@ -320,7 +374,7 @@ static double total_energy(pal_implicit *core, const double *velocity, double *s
 /* led nodes put in work that nobody counts */
 static bool is_led(const pal_body *body)
 {
-    for (int i = 0; i < body->n_node; i++)
+    for (int i = 0; i < body->n_dof; i++)
         if (body->held[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0) return true;
     return false;
 }
@@ -330,6 +384,17 @@ static bool rises(pal_implicit *core)
 {
     double slack;
     return core->guarded && total_energy(core, core->system.body->v, &slack) > core->energy0_J + slack;
+}
+
+/* of all loads on points, Euclidean, N */
+static double load_size(pal_implicit *core)
+{
+    const pal_body *body = core->system.body;
+    double *at = core->work;
+    if (!body->embed) return sqrt(pal_sum_products(core->cg.n, body->load, body->load));
+    memset(at, 0, bytes3(core));
+    pal_point_rows_pull(body->embed, body->load, at);
+    return norm(core, at);
 }
 
 static void open_stage(pal_implicit *core, double tau)
@@ -352,8 +417,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         PAL_TRY(pal_gather(step));
         double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
         if (k == 0) {
-            double loads = tau * sqrt(pal_sum_products(core->cg.n, body->load, body->load));
-            core->reference = fmax(size, floor_share * fmax(loads, left));
+            core->reference = fmax(size, floor_share * fmax(tau * load_size(core), left));
         }
         double best = core->wish.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
@@ -389,8 +453,10 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     }
     if (core->system.n_free == 0) {
         for (int i = 0; i < core->cg.n; i++) body->x[i] += step->dt_s * body->v[i];
+        pal_body_place(body);
         return false;
     }
+    pal_system_place(&core->system);
     memcpy(core->x0, body->x, bytes3(core));
     memcpy(core->v0, body->v, bytes3(core));
     core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
@@ -407,12 +473,39 @@ bool pal_implicit_settle(pal_implicit *core, pal_step *step)
     const pal_body *body = core->system.body;
     bool again = false;
     for (int i = 0; i < core->cg.n; i++) core->moved[i] = body->x[i] - core->x0[i];
+    if (body->embed) pal_point_rows_place(body->embed, core->moved, core->node_moved);
     for (int i = 0; i < step->n_contact; i++) {
         const pal_row *row = &step->contact[i];
         if (row->effect->tangent && row->effect->tangent->settle)
-            again |= row->effect->tangent->settle(row->self, step, core->moved);
+            again |= row->effect->tangent->settle(row->self, step, core->node_moved);
     }
     return again && core->round++ < 2;
+}
+
+/* an embedded body has other samples since its matrices were found: they are found again a few columns a step, then
+ * factors of them are made on a spare thread. The old ones serve until then, badly */
+static void keep_probed(pal_implicit *core, pal_step *step)
+{
+    pal_system *system = &core->system;
+    const pal_body *body = system->body;
+    uint64_t sampled = body->solid ? body->solid->sampled : core->sampled;
+    if (sampled != core->sampled) {
+        core->sampled = sampled;
+        core->probing = true;
+        pal_embedded_renew(system->embedded);
+    }
+    if (!core->probing || !pal_system_probe(system, PROBES_A_STEP)) return;
+    if (core->warp.wait + core->warp.pause + core->answer.warp.wait + core->answer.warp.pause > 0) return;
+    double tau = core->tau_rest_s;
+    system->mass = 1 + tau * pal_system_drag(system), system->stiff = tau * tau, system->damp = tau;
+    pal_system_assemble(system, &core->blocks);
+    core->probing = !pal_warp_refresh(&core->warp, &core->blocks, true, step->dt_s);
+    if (core->probing) return;
+    pal_answer_forget(&core->answer);
+    if (!core->answer.door.solve) return;
+    system->mass = 0, system->stiff = 1, system->damp = 0;
+    pal_system_assemble(system, &core->blocks);
+    (void)pal_warp_refresh(&core->answer.warp, &core->blocks, true, step->dt_s);
 }
 
 void pal_implicit_end(pal_implicit *core, pal_step *step)
@@ -421,15 +514,22 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
     if (!sound(body)) {
         memcpy(body->x, core->x0, bytes3(core));
         memset(body->v, 0, bytes3(core));
+        pal_body_place(body);
         body->frozen = true;
         return;
     }
+    pal_body_place(body);
     pal_warp_tick(&core->warp);
+    pal_warp_tick(&core->answer.warp);
     if (core->answer.door.solve) pal_warp_turn(&core->answer.warp, &core->turns);
+    if (core->system.embedded) {
+        keep_probed(core, step);
+        return;
+    }
     if (!core->wish.refresh || core->most_cg <= core->wish.refresh_iterations) return;
     if (core->warp.wait > 0 || core->warp.pause > 0) return;
     pal_system_assemble(&core->system, &core->blocks);
-    (void)pal_warp_refresh(&core->warp, &core->blocks, step->dt_s);
+    (void)pal_warp_refresh(&core->warp, &core->blocks, false, step->dt_s);
 }
 
 /* ---- hooks ---- */
@@ -444,6 +544,13 @@ pal_err pal_implicit_material(void *self, const pal_body *body, const pal_materi
 {
     pal_implicit *core = self;
     if (core->system.n_free == 0) return PAL_ERR_OK;
+    if (core->system.embedded) {
+        /* no pause of half a second: as after painting */
+        core->probing = true;
+        pal_embedded_renew(core->system.embedded);
+        core->density = material->density_kg_m3;
+        return PAL_ERR_OK;
+    }
     /* the world scales the masses after its rows have heard of the edit */
     double ratio = material->density_kg_m3 / core->density;
     for (int i = 0; i < body->n_node; i++) body->mass_kg[i] *= ratio;
@@ -466,7 +573,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
     pal_turns_reset(&core->turns);
     pal_answer_forget(&core->answer);
     /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */
-    if (core->warp.refreshed || core->warp.wait > 0) (void)factor_at_rest(core);
+    if (core->warp.refreshed || core->warp.wait > 0 || core->probing) (void)factor_at_rest(core);
 }
 
 void pal_implicit_report(const void *self, pal_solve_report *out)

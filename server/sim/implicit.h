@@ -13,7 +13,11 @@
  * Contact gave its loads at the sub-step's begin; its stiffness and damping act on what has moved since, and `settle`
  * then brings the forces on tools to the end of the sub-step. Held nodes move with body->v (0 unless a row leads them).
  * A free body's momentum is kept to rounding whatever the tolerance: the mean of what the iterations leave over is
- * taken out. No node moves more than 0.2 S in an iteration (numerics.md part 3). Thread: [load] to make, then [sim]. */
+ * taken out. No node moves more than 0.2 S in an iteration (numerics.md part 3).
+ *
+ * Of a body whose nodes are carried by control points (embed) the unknowns are the points' velocities. Its factor is
+ * that of the matrix at rest as found by embedded.h; after an edit of its material that is found anew over some steps,
+ * while refresh and refresh_iterations do nothing. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_H
 #define PAL_SIM_IMPLICIT_H
 #include "server/num/conjugate.h"
@@ -38,17 +42,19 @@ typedef struct pal_implicit {
     pal_warp warp;
     pal_answer answer; /* static compliance; answer.door.solve NULL: none wanted or none there is */
     pal_conjugate cg;
-    double *x0, *v0; /* at the sub-step's begin                  [n_node][3] */
-    double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_node][3] */
-    double *start;   /* V that would leave the body where it was linearised [n_node][3] */
+    double *x0, *v0; /* at the sub-step's begin                  [n_dof][3] */
+    double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
+    double *start;   /* V that would leave the body where it was linearised [n_dof][3] */
     double *work, *moved;
+    double *node_moved; /* the way of nodes for `settle`; moved without embed  [n_node][3] */
     double tau_rest_s;  /* tau of the factor at rest           */
     double density;     /* of the material, kg/m^3             */
     double reference;   /* of the tolerance, N s               */
     double energy0_J;   /* at the sub-step's begin             */
     bool guarded;       /* energy is watched: see above        */
     int most_cg, round; /* in one solve of this sub-step; rounds of settle */
-    int n_factored;     /* nodes in the factor, 0: all are held */
+    uint64_t sampled;   /* of body->solid, at the factor       */
+    bool probing;       /* an embedded body's matrices are being found anew */
     pal_solve_report report;
 } pal_implicit;
 

@@ -12,8 +12,8 @@ static const double slow_flops = 1e9; /* operations a second that every machine 
 
 pal_err pal_turns_make(const pal_system *system, pal_arena *arena, pal_turns *out)
 {
-    int n = system->body->n_node;
-    *out = (pal_turns){.n_node = n, .any = system->has_turn};
+    int n = system->body->n_dof;
+    *out = (pal_turns){.n_dof = n, .any = system->has_turn};
     out->quat = PAL_NEW(arena, double, 4 * (size_t)n);
     out->sum = PAL_NEW(arena, double, system->has_turn ? 9 * (size_t)n : 0);
     if (!out->quat || !out->sum) return PAL_ERR_MEMORY;
@@ -23,22 +23,22 @@ pal_err pal_turns_make(const pal_system *system, pal_arena *arena, pal_turns *ou
 
 void pal_turns_reset(pal_turns *turns)
 {
-    memset(turns->quat, 0, 4 * sizeof(double) * (size_t)turns->n_node);
-    for (int i = 0; i < turns->n_node; i++) turns->quat[4 * i] = 1;
+    memset(turns->quat, 0, 4 * sizeof(double) * (size_t)turns->n_dof);
+    for (int i = 0; i < turns->n_dof; i++) turns->quat[4 * i] = 1;
 }
 
 void pal_turns_take(pal_turns *turns, const pal_system *system)
 {
     if (!turns->any) return;
     pal_system_rotate(system, turns->sum);
-    for (int i = 0; i < turns->n_node; i++) pal_polar_turn(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MOST);
+    for (int i = 0; i < turns->n_dof; i++) pal_polar_turn(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MOST);
 }
 
 pal_err pal_warp_make(const pal_blocks *pattern, const pal_body *body, const pal_turns *turns, bool single,
                       pal_arena *arena, pal_warp *out)
 {
-    size_t n = (size_t)body->n_node;
-    *out = (pal_warp){.n_node = body->n_node, .single = single, .quat = turns->quat};
+    size_t n = (size_t)body->n_dof;
+    *out = (pal_warp){.n_dof = body->n_dof, .single = single, .quat = turns->quat};
     out->base = PAL_NEW(arena, double, 4 * n);
     out->next = PAL_NEW(arena, double, 4 * n);
     out->w = PAL_NEW(arena, double, 9 * n);
@@ -58,7 +58,7 @@ void pal_warp_destroy(pal_warp *warp)
 
 static void copy_turns(const pal_warp *warp, double *to)
 {
-    memcpy(to, warp->quat, 4 * sizeof(double) * (size_t)warp->n_node);
+    memcpy(to, warp->quat, 4 * sizeof(double) * (size_t)warp->n_dof);
 }
 
 pal_err pal_warp_factor(pal_warp *warp, const pal_blocks *a)
@@ -76,10 +76,21 @@ pal_err pal_warp_factor(pal_warp *warp, const pal_blocks *a)
     return PAL_ERR_OK;
 }
 
-bool pal_warp_refresh(pal_warp *warp, const pal_blocks *a, double step_s)
+static void set_rest(double *quat, int n_dof)
+{
+    for (int i = 0; i < 4 * n_dof; i++) quat[i] = i % 4 == 0;
+}
+
+void pal_warp_rest(pal_warp *warp)
+{
+    set_rest(warp->base, warp->n_dof);
+}
+
+bool pal_warp_refresh(pal_warp *warp, const pal_blocks *a, bool at_rest, double step_s)
 {
     if (warp->wait > 0 || warp->pause > 0 || pal_cholesky_refresh(warp->factor, a)) return false;
     copy_turns(warp, warp->next);
+    if (at_rest) set_rest(warp->next, warp->n_dof);
     double steps = ceil(pal_cholesky_flops(warp->factor) / (slow_flops * step_s));
     warp->wait = steps < 1 ? 1 : steps > 1000 ? 1000 : (int)steps;
     return true;
@@ -91,7 +102,7 @@ void pal_warp_tick(pal_warp *warp)
     if (warp->wait == 0 || --warp->wait > 0) return;
     warp->pause = PAUSE_STEPS;
     if (pal_cholesky_adopt(warp->factor, true)) return;
-    memcpy(warp->base, warp->next, 4 * sizeof(double) * (size_t)warp->n_node);
+    memcpy(warp->base, warp->next, 4 * sizeof(double) * (size_t)warp->n_dof);
     warp->n_factor++;
     warp->refreshed = true;
 }
@@ -99,7 +110,7 @@ void pal_warp_tick(pal_warp *warp)
 void pal_warp_turn(pal_warp *warp, const pal_turns *turns)
 {
     warp->turned = turns->any;
-    for (int i = 0; i < warp->n_node && turns->any; i++) {
+    for (int i = 0; i < warp->n_dof && turns->any; i++) {
         /* quat times the conjugate of base */
         const double *a = turns->quat + 4 * i, *b = warp->base + 4 * i;
         const double q[4] = {a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3],
@@ -116,7 +127,7 @@ void pal_warp_solve(pal_warp *warp, const double *r, double *z)
         (void)pal_cholesky_solve(warp->factor, r, z);
         return;
     }
-    for (int i = 0; i < warp->n_node; i++) pal_tmul33(warp->work + 3 * i, warp->w + 9 * i, r + 3 * i);
+    for (int i = 0; i < warp->n_dof; i++) pal_tmul33(warp->work + 3 * i, warp->w + 9 * i, r + 3 * i);
     (void)pal_cholesky_solve(warp->factor, warp->work, warp->work);
-    for (int i = 0; i < warp->n_node; i++) pal_mul33(z + 3 * i, warp->w + 9 * i, warp->work + 3 * i);
+    for (int i = 0; i < warp->n_dof; i++) pal_mul33(z + 3 * i, warp->w + 9 * i, warp->work + 3 * i);
 }

@@ -22,7 +22,7 @@ static pal_err run(void *self, pal_step *step)
 {
     pal_implicit *core = self;
     pal_body *body = step->body;
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
     memcpy(core->xs, core->x0, n_byte);
     memcpy(core->vs, core->v0, n_byte);

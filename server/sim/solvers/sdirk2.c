@@ -28,7 +28,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 static void open_second(pal_implicit *core, const pal_body *body, double dt)
 {
     const double g = gamma_share, *v1 = body->v;
-    for (int i = 0; i < 3 * body->n_node; i++) {
+    for (int i = 0; i < 3 * body->n_dof; i++) {
         core->xs[i] = core->x0[i] + (1 - g) * dt * v1[i];
         core->vs[i] = core->v0[i] + (1 - g) / g * (v1[i] - core->v0[i]);
     }
@@ -38,7 +38,7 @@ static pal_err run(void *self, pal_step *step)
 {
     pal_implicit *core = self;
     pal_body *body = step->body;
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
     do {
         memcpy(body->x, core->x0, n_byte);

@@ -25,6 +25,9 @@
  * solved by inertia relief (free "inertia_relief"): relief.h balances the loads, K + eps M is what is solved, rigid
  * motion is taken out of every d.
  *
+ * A body whose nodes are carried by control points (body.h, embed) is solved for the points by pcg, its factor being of
+ * the matrix at rest as embedded.h finds it; `direct` and inertia relief are refused.
+ *
  * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3: residual
  * of conjugate gradients over that of the iteration, for laws that are not linear), iterations (500, of one solve).
  * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
@@ -34,7 +37,9 @@
 #include "server/sim/compliance.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/relief.h"
+#include "server/sim/solid.h"
 
+#include <limits.h>
 #include <string.h>
 
 typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG } linear_kind;
@@ -51,10 +56,12 @@ typedef struct static_newton {
     pal_answer answer;
     pal_conjugate cg;
     pal_relief relief;
-    double *x0, *outer;     /* at the step's begin; loads that do not come from within [n_node][3] */
-    double *force, *move;   /* residual and d of the iteration                       [n_node][3] */
-    double *now, *low;      /* work space of the true stiffness [n_node][3] */
-    double *inertia;        /* what balances the loads; NULL: no relief              [n_node][3] */
+    double *x0, *outer;     /* at the step's begin; loads that do not come from within [n_dof][3] */
+    double *force, *move;   /* residual and d of the iteration                       [n_dof][3] */
+    double *now, *low;      /* work space of the true stiffness [n_dof][3] */
+    double *inertia;        /* what balances the loads; NULL: no relief              [n_dof][3] */
+    double *node_moved;     /* the way of nodes carried by points; NULL: none        [n_node][3] */
+    uint64_t sampled;       /* of body->solid, at the factor                 */
     double shift_1_s2;      /* eps                                           */
     bool has_factor, stale; /* a factor is there; it is not worth its while  */
     bool eager;             /* nor was it in the iteration after its own: one is made in every iteration */
@@ -79,7 +86,7 @@ enum { CALM = 4 };
 
 static size_t bytes3(const static_newton *row)
 {
-    return 3 * sizeof(double) * (size_t)row->system.body->n_node;
+    return 3 * sizeof(double) * (size_t)row->system.body->n_dof;
 }
 
 /* ---- load ---- */
@@ -144,13 +151,15 @@ static void precondition(void *user, const double *r, double *z)
 
 static pal_err make_arrays(static_newton *row, pal_arena *arena)
 {
-    size_t n3 = 3 * (size_t)row->system.body->n_node;
+    const pal_body *body = row->system.body;
+    size_t n3 = 3 * (size_t)body->n_dof;
     double **const array[] = {&row->x0,  &row->outer, &row->force, &row->move, &row->now,
                               &row->low, &row->cg.r,  &row->cg.z,  &row->cg.p, &row->cg.q};
     for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
         *array[i] = PAL_NEW(arena, double, n3);
         if (!*array[i]) return PAL_ERR_MEMORY;
     }
+    if (body->embed && !(row->node_moved = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
     if (row->relieved && !(row->inertia = PAL_NEW(arena, double, n3))) return PAL_ERR_MEMORY;
     row->cg.n = (int)n3;
     row->cg.multiply = multiply;
@@ -167,10 +176,24 @@ static void assemble(static_newton *row)
     row->report.assemble_s += pal_clock_s() - before;
 }
 
+/* of an embedded body: at rest, after a change of its samples found anew; the present linearisation is taken again */
+static void probe(static_newton *row)
+{
+    const pal_body *body = row->system.body;
+    double before = pal_clock_s();
+    row->sampled = body->solid ? body->solid->sampled : 0;
+    pal_embedded_renew(row->system.embedded);
+    (void)pal_system_probe(&row->system, INT_MAX);
+    pal_system_linearise(&row->system);
+    row->report.assemble_s += pal_clock_s() - before;
+}
+
 static pal_err factor(static_newton *row)
 {
+    if (row->system.embedded) probe(row);
     assemble(row);
     PAL_TRY(pal_warp_factor(&row->warp, &row->blocks));
+    if (row->system.embedded) pal_warp_rest(&row->warp);
     row->has_factor = true;
     row->stale = false;
     row->age = 0;
@@ -183,7 +206,7 @@ static void choose_shift(static_newton *row)
     const pal_body *body = row->system.body;
     double stiff = 0, mass = 0;
     assemble(row);
-    for (int i = 0; i < body->n_node; i++) {
+    for (int i = 0; i < body->n_dof; i++) {
         const double *block = row->blocks.value + 9 * (size_t)row->blocks.start[i];
         stiff += (block[0] + block[4] + block[8]) / 3;
         mass += body->mass_kg[i];
@@ -209,6 +232,10 @@ static pal_err check_supports(static_newton *row, const pal_build *build)
             "off a line, so it has no state of rest; give supports, or free \"inertia_relief\" to "
             "static_newton",
             body->name, s.n_loose, s.n_part, x[0], x[1], x[2]);
+    if (body->embed)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "body \"%s\": inertia_relief is for bodies of nodes, this one has control points",
+                            body->name);
     if (s.n_part > 1 || row->system.n_free < body->n_node)
         return pal_note_set(
             build->note, PAL_ERR_REFUSED,
@@ -221,6 +248,12 @@ static pal_err check_supports(static_newton *row, const pal_build *build)
 static pal_err make_factors(static_newton *row, pal_build *build)
 {
     pal_body *body = build->body;
+    if (body->embed && row->linear == LINEAR_DIRECT)
+        return pal_note_set(build->note, PAL_ERR_REFUSED,
+                            "body \"%s\": static_newton with linear \"direct\" is for bodies of nodes, this one has "
+                            "control points; take \"pcg\"",
+                            body->name);
+    if (body->embed) row->linear = LINEAR_PCG;
     PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
     PAL_TRY(pal_turns_make(&row->system, build->arena, &row->turns));
     PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
@@ -275,9 +308,14 @@ static pal_err run_rows(pal_step *step, bool internal)
 static pal_err find_outer(static_newton *row, pal_step *step)
 {
     pal_body *body = row->system.body;
-    memcpy(body->f, body->load, bytes3(row));
+    memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
     PAL_TRY(run_rows(step, false));
-    memcpy(row->outer, body->f, bytes3(row));
+    if (!body->embed) {
+        memcpy(row->outer, body->f, bytes3(row));
+        return PAL_ERR_OK;
+    }
+    memset(row->outer, 0, bytes3(row));
+    pal_point_rows_pull(body->embed, body->f, row->outer);
     return PAL_ERR_OK;
 }
 
@@ -286,19 +324,22 @@ static double share(const static_newton *row)
     return (double)row->part / row->load_steps;
 }
 
-/* body->f = all forces at body->x; cg.r = those at free nodes; returns |r|. The tolerance's scale too */
+/* body->g = all forces at body->x; cg.r = those at free nodes; returns |r|. The tolerance's scale too */
 static pal_err find_residual(static_newton *row, pal_step *step, double *size)
 {
     pal_body *body = row->system.body;
     double part = share(row), loads = 0, reactions = 0, *r = row->cg.r, *p = row->cg.p;
-    for (int i = 0; i < row->cg.n; i++) body->f[i] = part * row->outer[i];
+    pal_system_place(&row->system);
+    if (body->embed) memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    for (int i = 0; i < row->cg.n; i++) body->g[i] = part * row->outer[i];
     PAL_TRY(run_rows(step, true));
-    memcpy(r, body->f, bytes3(row));
+    if (body->embed) pal_point_rows_pull(body->embed, body->f, body->g);
+    memcpy(r, body->g, bytes3(row));
     if (row->system.has_contact) {
         for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
         pal_system_contact(&row->system, -1, 0, p, r);
     }
-    for (int i = 0; i < body->n_node; i++) {
+    for (int i = 0; i < body->n_dof; i++) {
         loads += pal_norm3(row->outer + 3 * i);
         if (!body->held[i]) continue;
         reactions += pal_norm3(r + 3 * i);
@@ -331,6 +372,7 @@ static energy potential(static_newton *row)
     const pal_body *body = row->system.body;
     energy all = {0};
     double *p = row->cg.p, *q = row->cg.q;
+    pal_system_place(&row->system);
     for (int i = 0; i < row->system.n_force; i++) {
         const pal_row *force = &row->system.force[i];
         if (force->effect->internal && force->effect->energy)
@@ -454,7 +496,7 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     pal_turns_take(&row->turns, &row->system);
     PAL_TRY(solve_linear(row, size));
     from.slope_J = pal_sum_products(row->cg.n, row->force, row->move);
-    for (int i = 0; i < body->n_node; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
+    for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
     /* where the true stiffness nearly vanishes, the way is long and means little */
     double most = most_move_S * body->size_m;
@@ -498,12 +540,14 @@ static pal_err find_rest(static_newton *row, pal_step *step)
 static void settle(static_newton *row, pal_step *step)
 {
     const pal_body *body = row->system.body;
+    double *moved = body->embed ? row->node_moved : row->move;
     for (int i = 0; i < row->cg.n; i++) row->move[i] = body->x[i] - row->x0[i];
+    if (body->embed) pal_point_rows_place(body->embed, row->move, moved);
     for (int i = 0; i < step->n_contact; i++) {
         const pal_row *contact = &step->contact[i];
         /* what it asks for beyond that comes with the next world step */
         if (contact->effect->tangent && contact->effect->tangent->settle)
-            (void)contact->effect->tangent->settle(contact->self, step, row->move);
+            (void)contact->effect->tangent->settle(contact->self, step, moved);
     }
 }
 
@@ -516,7 +560,7 @@ static pal_err run(void *self, pal_step *step)
         return PAL_ERR_OK;
     }
     memcpy(row->x0, body->x, bytes3(row));
-    for (int i = 0; i < body->n_node; i++) {
+    for (int i = 0; i < body->n_dof; i++) {
         if (body->held[i])
             pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
         else
@@ -525,17 +569,21 @@ static pal_err run(void *self, pal_step *step)
     pal_system_touch(&row->system, step);
     PAL_TRY(find_outer(row, step));
     if (row->system.n_free == 0) {
+        pal_body_place(body);
         row->report.converged = true;
         return PAL_ERR_OK;
     }
+    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
     if (row->part == 0) row->part = 1;
     PAL_TRY(find_rest(row, step));
     if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
     if (!pal_body_finite(body)) {
         memcpy(body->x, row->x0, bytes3(row));
+        pal_body_place(body);
         body->frozen = true;
         return PAL_ERR_OK;
     }
+    pal_body_place(body);
     settle(row, step);
     return PAL_ERR_OK;
 }
@@ -567,7 +615,8 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     row->has_factor = false;
     if (!row->answer.door.solve) return PAL_ERR_OK;
     double *x = own->x, *d = own->d;
-    own->x = own->d = own->x_rest;
+    own->x = own->x_rest, own->d = own->node_rest;
+    if (own->embed) probe(row);
     pal_turns_reset(&row->turns);
     pal_system_linearise(&row->system);
     pal_err err = pal_answer_factor(&row->answer, &row->system, &row->blocks);
