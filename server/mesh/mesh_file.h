@@ -37,6 +37,12 @@ double pal_mesh_unit_named(const char *word);
 
 /* binary little-endian PLY, float32 metres (positions + origin), int32 lists; whole file written or none; IO */
 pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_note *note);
+/* text OBJ, metres with all digits of a double; whole file written or none; IO */
+pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_note *note);
+/* binary STL, float32 metres; whole file written or none; IO */
+pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_note *note);
+/* one of the three by the end of the path, .ply, .obj or .stl; REFUSED (another ending), IO */
+pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_note *note);
 
 /* TetGen files STEM.node, STEM.ele, STEM.face: 1-based, positions in m with origin added, boundary marker 1 on surface
  * nodes and faces; IO */

@@ -1,4 +1,4 @@
-/* Files out: surfaces as binary PLY, tetrahedra as TetGen .node, .ele and .face. */
+/* Files out: surfaces as binary PLY and STL and text OBJ, tetrahedra as TetGen .node, .ele and .face. */
 #include "server/base/vec3.h"
 #include "server/mesh/file_bytes.h"
 #include "server/mesh/mesh_file.h"
@@ -90,6 +90,66 @@ static void write_corners(FILE *file, const int32_t *corner, int n_row, size_t n
         for (size_t k = 0; k < n_corner; k++) p = put_int(p, corner[n_corner * i + k] + 1);
         end_row(file, row, marked ? put_int(p, 1) : p);
     }
+}
+
+pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_note *note)
+{
+    pal_file_out out;
+    char row[160];
+    PAL_TRY(pal_file_begin(&out, path, note));
+    fprintf(out.file, "# metres\n");
+    for (size_t i = 0; i < (size_t)surface->n_vertex; i++) {
+        char *p = row + 2;
+        row[0] = 'v', row[1] = ' ';
+        for (size_t a = 0; a < 3; a++) p = put_metres(p, surface->x[3 * i + a] + surface->origin_m[a], false);
+        end_row(out.file, row, p);
+    }
+    for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
+        char *p = row + 2;
+        row[0] = 'f', row[1] = ' ';
+        for (size_t k = 0; k < 3; k++) p = put_int(p, (int64_t)surface->tri[3 * t + k] + 1);
+        end_row(out.file, row, p);
+    }
+    return pal_file_end(&out, PAL_ERR_OK, note);
+}
+
+pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_note *note)
+{
+    pal_file_out out;
+    PAL_TRY(pal_file_begin(&out, path, note));
+    char head[80] = "binary, metres";
+    uint32_t n_tri = (uint32_t)surface->n_tri;
+    fwrite(head, sizeof head, 1, out.file);
+    fwrite(&n_tri, sizeof n_tri, 1, out.file);
+    for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
+        double side[2][3], normal[3];
+        float row[12];
+        const double *corner[3];
+        for (size_t k = 0; k < 3; k++) corner[k] = surface->x + 3 * (size_t)surface->tri[3 * t + k];
+        for (size_t k = 0; k < 2; k++) pal_sub3(side[k], corner[k + 1], corner[0]);
+        pal_cross3(normal, side[0], side[1]);
+        if (!pal_unit3(normal, normal, 0)) pal_set3(normal, 0, 0, 0);
+        for (size_t a = 0; a < 3; a++) {
+            row[a] = (float)normal[a];
+            for (size_t k = 0; k < 3; k++) row[3 + 3 * k + a] = (float)(corner[k][a] + surface->origin_m[a]);
+        }
+        uint8_t packed[50] = {0};
+        memcpy(packed, row, sizeof row);
+        fwrite(packed, sizeof packed, 1, out.file);
+    }
+    return pal_file_end(&out, PAL_ERR_OK, note);
+}
+
+pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_note *note)
+{
+    size_t n = strlen(path);
+    const char *end = n > 4 ? path + n - 4 : "";
+    char shown[128];
+    if (!strcmp(end, ".ply")) return pal_mesh_file_write_ply(path, surface, note);
+    if (!strcmp(end, ".obj")) return pal_mesh_file_write_obj(path, surface, note);
+    if (!strcmp(end, ".stl")) return pal_mesh_file_write_stl(path, surface, note);
+    pal_file_show_name(shown, path);
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
 }
 
 pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_note *note)
