@@ -215,6 +215,22 @@ static void sort_rows(pal_plan *plan, const pal_row *made, const int *made_body)
         }
 }
 
+/* what a body that adapts takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
+ * of triangles, parents) and lasting loads, and the world's own */
+static pal_err check_memory(const build_state *s, size_t arena_byte)
+{
+    enum { WORLD_BYTE = 1 << 17 };
+    const pal_body *body = s->build.body;
+    pal_note why = {{0}};
+    if (!body->shell) return PAL_ERR_OK;
+    size_t n = (size_t)body->n_node,
+           shown = n * (3 * sizeof(float) + 2 * sizeof(int32_t)) + (size_t)body->shell->n_slot * 3 * sizeof(int32_t);
+    size_t n_byte = arena_byte + s->build.scratch_byte + shown + 3 * n * sizeof(double) + WORLD_BYTE;
+    pal_err err = pal_shell_check_bytes(body->shell, n_byte, &why);
+    if (err) pal_note_set(s->build.note, err, "body \"%s\" model: %s", body->name, why.text);
+    return err;
+}
+
 static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, build_state *s, pal_row *made,
                          pal_plan *out)
 {
@@ -226,8 +242,10 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *not
         s->build =
             (pal_build){.scene = scene, .def = &scene->body[b], .body = &out->body[b], .arena = arena, .note = note};
         int before = out->n_row;
+        size_t before_byte = pal_arena_used(arena);
         PAL_TRY(build_body(s, scene));
         PAL_TRY(make_rows(s, made, &out->n_row));
+        PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte));
         for (int i = before; i < out->n_row; i++) made_body[i] = b;
         if (s->build.scratch_byte > out->scratch_byte) out->scratch_byte = s->build.scratch_byte;
     }

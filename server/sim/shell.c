@@ -6,7 +6,8 @@
  *
  * Departures: the paper places new vertices by the stencil on current positions (PAL_SHELL_BUTTERFLY); that jumps where
  * the stencil reaches beyond a fold, so the default keeps the middle of the edge and its offset at rest. An edge whose
- * ends both stand at rest gives the rest position to the bit, and so a midpoint that is held while its edge is not. */
+ * ends both stand at rest gives the rest position to the bit; a midpoint that is held while its edge is not stands as
+ * far from rest as the end that is held. */
 #include "server/sim/shell.h"
 
 #include "server/base/vec3.h"
@@ -14,8 +15,10 @@
 #include <math.h>
 #include <string.h>
 
-#define BUDGET    ((size_t)512 << 20)
-#define MEBI      1048576.0
+#define BUDGET ((size_t)512 << 20)
+#define MEBI   1048576.0
+/* a finest vertex of the leanest body takes more than this in rows (edge_spring, rk4) and in what is shown of it */
+#define ROW_BYTE  400
 #define LOG_LEAST 1024
 #define LOG_MOST  65536
 /* a face of level l asks for two of level l - 1 at most, and level 0 for none */
@@ -122,6 +125,14 @@ static pal_err make_body(pal_shell *s, pal_body *body, pal_arena *arena)
     return PAL_ERR_OK;
 }
 
+static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t budget, pal_note *note)
+{
+    return pal_note_set(note, PAL_ERR_BUDGET,
+                        "shell: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
+                        "surface",
+                        n_level, what, (double)n_byte / MEBI, (double)budget / MEBI);
+}
+
 pal_err pal_shell_make(const pal_surface *surface, const pal_shell_options *options, pal_body *body, pal_arena *arena,
                        pal_note *note, pal_shell **out)
 {
@@ -131,19 +142,17 @@ pal_err pal_shell_make(const pal_surface *surface, const pal_shell_options *opti
     PAL_TRY(pal_levels_make(surface, &(pal_levels_options){.n_level = options->n_level, .budget_byte = budget}, &levels,
                             note));
     room r = room_of(&levels);
-    size_t n_byte = levels.n_byte + state_bytes(&r);
-    if (n_byte > budget) {
+    size_t n_byte = levels.n_byte + state_bytes(&r), least = n_byte + ROW_BYTE * r.vertex;
+    if (least > budget) {
         pal_levels_free(&levels);
-        return pal_note_set(note, PAL_ERR_BUDGET,
-                            "shell: %d levels need %.4g MiB with their state, the budget is %.4g MiB: ask for fewer "
-                            "levels or a coarser surface",
-                            options->n_level, (double)n_byte / MEBI, (double)budget / MEBI);
+        return refuse_bytes(options->n_level, "at least ", least, budget, note);
     }
     pal_shell *s = PAL_NEW(arena, pal_shell, 1);
     bool ok = s && move_levels(&levels, arena, &s->levels) && get_state(s, arena);
     pal_levels_free(&levels);
     if (!ok) return PAL_ERR_MEMORY;
     s->options = *options;
+    s->options.budget_byte = budget;
     s->n_byte = n_byte;
     for (int k = 0; k < s->levels.n_level; k++) s->level_mass_kg[k] = options->mass_kg / s->levels.n_vertex[k];
     PAL_TRY(make_body(s, body, arena));
@@ -158,6 +167,13 @@ size_t pal_shell_bytes(const pal_shell *shell)
 {
     size_t n = (size_t)shell->levels.n_vertex[shell->levels.n_level - 1];
     return (shell->n_byte + n - 1) / n;
+}
+
+pal_err pal_shell_check_bytes(const pal_shell *shell, size_t n_byte, pal_note *note)
+{
+    const pal_shell_options *o = &shell->options;
+    if (n_byte <= o->budget_byte) return PAL_ERR_OK;
+    return refuse_bytes(o->n_level, "with rows, tools and what is shown ", n_byte, o->budget_byte, note);
 }
 
 /* ---- splitting ---- */
@@ -284,10 +300,15 @@ static void place(const pal_shell *s, pal_body *body, int32_t e)
     const double *ra = body->x_rest + 3 * (size_t)end[0], *rb = body->x_rest + 3 * (size_t)end[1];
     const double *va = body->v + 3 * (size_t)end[0], *vb = body->v + 3 * (size_t)end[1];
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
-    bool stands = body->held[v] == 1;
+    bool stands = body->held[v] == 1, firm[2] = {body->held[end[0]] > 0, body->held[end[1]] > 0};
     for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
-    /* an edge at rest keeps every bit; a held midpoint goes with its edge only when that is held too */
-    if (stands) stands = !(body->held[end[0]] && body->held[end[1]]);
+    /* an edge at rest keeps every bit; a held midpoint goes with its edge only when that is held too, else with the end
+     * that is: at rest, or where that was when it was taken hold of */
+    if (stands && firm[0] != firm[1]) {
+        for (int c = 0; c < 3; c++) x[c] = rest[c] + (firm[0] ? xa[c] - ra[c] : xb[c] - rb[c]);
+        return;
+    }
+    if (stands) stands = !firm[0];
     if (!memcmp(xa, ra, 3 * sizeof *xa) && !memcmp(xb, rb, 3 * sizeof *xb)) stands = true;
     if (stands) {
         pal_copy3(x, rest);

@@ -41,7 +41,7 @@ typedef struct pal_shell_options {
     int n_level;        /* 1..PAL_LEVELS_MOST */
     int start_level;    /* 0..n_level-1: all leaves have it at load and after reset */
     double mass_kg;     /* M > 0, of the whole surface */
-    size_t budget_byte; /* of levels and state; 0: 512 MiB */
+    size_t budget_byte; /* of all that the body takes while it runs, rows and what is shown of it with it; 0: 512 MiB */
     pal_shell_law law;
     pal_shell_place place;
     pal_shell_mass mass;
@@ -96,12 +96,14 @@ pal_err pal_shell_make(const pal_surface *surface, const pal_shell_options *opti
                        pal_note *note, pal_shell **out);
 /* most memory that a node of the finest level takes in shell and body, for messages and plan */
 size_t pal_shell_bytes(const pal_shell *shell);
+/* does a body that takes n_byte with its rows and all keep to the budget? BUDGET with both numbers. [load] */
+pal_err pal_shell_check_bytes(const pal_shell *shell, size_t n_byte, pal_note *note);
 
 /* Splits a leaf; coarser neighbours first where 2:1 asks for it. Returns how many faces were split: 0 when it is no
  * leaf or of the finest level, or when there would be more than most_node nodes (0: no limit). New nodes get place, and
  * velocity as the mean of the ends of their edge; an edge whose ends stand at rest gives the midpoint's rest position
- * to the bit. A midpoint that is held (1) while an end of its edge is not stands at rest, v 0. Mass comes with the
- * update */
+ * to the bit. A midpoint that is held (1) while an end of its edge is not has v 0 and stands as far from rest as the
+ * end that is held, at rest when none is. Mass comes with the update */
 int pal_shell_split(pal_shell *shell, pal_body *body, int32_t face, int most_node);
 /* may the face be joined? it is split, its children are leaves, and no half of its edges is split */
 bool pal_shell_can_join(const pal_shell *shell, int32_t face);

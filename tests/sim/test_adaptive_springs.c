@@ -255,8 +255,56 @@ static void surfaces_that_cannot_be_split_are_refused_with_another_way(void)
     shell_plan_close(&p);
 }
 
+/* a ball of that many levels, bare or with all that tools need, within that memory */
+static pal_err make_within(shell_scene *s, int levels, bool tools, double memory_MB)
+{
+    pal_surface surface;
+    if (pal_sphere_make(0.05, &surface)) return PAL_ERR_MEMORY;
+    shell_scene_take(s, &surface);
+    shell_scene_number(s, "levels", levels);
+    shell_scene_number(s, "memory_MB", memory_MB);
+    if (tools) {
+        shell_scene_effect(s, "tool_push");
+        shell_scene_effect(s, "tool_grab");
+        shell_scene_effect(s, "finite_guard");
+        pal_tools_default(s->scene, 4);
+    }
+    return pal_world_create(s->scene, &s->note, &s->world);
+}
+
+/* memory_MB is of the whole body as it runs: what the world tells of itself, lasting loads among it, keeps to it */
+static void memory_of_the_world_keeps_to_its_bound(void)
+{
+    static const double MiB = 1048576, push[3] = {0, 0, -1e-3};
+    for (int levels = 3; levels <= 4; levels++)
+        for (int tools = 0; tools < 2; tools++) {
+            shell_scene s;
+            REQUIRE(!make_within(&s, levels, tools, 1000));
+            REQUIRE(!pal_world_load(s.world, 0, 3, push));
+            const double whole = (double)pal_world_bytes(s.world) / MiB;
+            const int n_node = pal_world_body(s.world, 0)->n_node;
+            shell_scene_close(&s);
+            /* what fits with an eighth of a MiB to spare, the world's own, keeps to it */
+            REQUIRE(!make_within(&s, levels, tools, whole + 0.125));
+            REQUIRE(!pal_world_load(s.world, 0, 3, push));
+            CHECK_LE((double)pal_world_bytes(s.world), (whole + 0.125) * MiB);
+            shell_scene_close(&s);
+            /* a hundredth less than it takes is refused, with what it takes and what it may */
+            CHECK_INT(make_within(&s, levels, tools, 0.99 * whole), PAL_ERR_BUDGET);
+            double needs = 0, may = 0;
+            const char *text = strstr(s.note.text, "what is shown ");
+            CHECK(text && sscanf(text, "what is shown %lf MiB, the budget is %lf MiB", &needs, &may) == 2);
+            CHECK_NEAR(needs, whole + 0.0625, 0.0625 + 1e-3 * whole);
+            CHECK_NEAR(may, 0.99 * whole, 1e-3 * whole);
+            CHECK(!strncmp(s.note.text, "body \"shell\" model: ", 20) && !s.world);
+            printf("  %d nodes: %.0f bytes each\n", n_node, whole * MiB / n_node);
+            shell_scene_close(&s);
+        }
+}
+
 int main(void)
 {
+    RUN(memory_of_the_world_keeps_to_its_bound);
     RUN(rows_are_those_that_the_keys_ask_for);
     RUN(constants_follow_from_material_and_thickness);
     RUN(entry_of_that_name_takes_the_place_of_the_models_row);
