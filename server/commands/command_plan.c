@@ -1,5 +1,6 @@
 /* `palpate plan`: the rows of a scene, their memory, and what they cost on this machine: the median over up to 60 steps
- * at rest, or as many as fit into two seconds. Of a body that adapts all its levels, and what of them is active now. */
+ * at rest, or as many as fit into two seconds. Of a body that adapts all its levels, and what of them is active now; of
+ * a subdivided solid its elements as in Table 1 of paper A. */
 #include "server/base/clock.h"
 #include "server/commands/commands.h"
 #include "server/commands/median.h"
@@ -7,6 +8,7 @@
 #include "server/commands/scene_arg.h"
 #include "server/sim/effect.h"
 #include "server/sim/shell.h"
+#include "server/sim/solid.h"
 #include "server/sim/world.h"
 
 #include <math.h>
@@ -53,6 +55,21 @@ static void add_levels(cJSON *body, const pal_shell *shell)
     }
 }
 
+/* elements of each kind, what moves them and what that takes */
+static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
+{
+    const pal_solid *solid = b->solid;
+    static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "hex_percent", "pyramid_percent"};
+    cJSON_AddNumberToObject(body, "control_cells", def->cells->n_cell);
+    cJSON_AddNumberToObject(body, "control_points", b->n_dof);
+    cJSON_AddNumberToObject(body, "levels", solid->subdivision.n_level);
+    cJSON_AddNumberToObject(body, "elements", pal_cell_elements_count(&solid->elements));
+    for (int k = 0; k < PAL_CELL_KINDS; k++)
+        cJSON_AddNumberToObject(body, kind[k], pal_cell_elements_percent(&solid->elements, (pal_cell_kind)k));
+    cJSON_AddNumberToObject(body, "nodes", b->n_node);
+    cJSON_AddNumberToObject(body, "solid_bytes", (double)solid->n_byte);
+}
+
 static cJSON *as_json(const pal_scene *scene, pal_world *world, cost *c)
 {
     cJSON *o = cJSON_CreateObject();
@@ -71,14 +88,17 @@ static cJSON *as_json(const pal_scene *scene, pal_world *world, cost *c)
         cJSON *body = cJSON_CreateObject();
         cJSON_AddItemToArray(bodies, body);
         cJSON_AddStringToObject(body, "name", scene->body[b].name);
-        const pal_shell *shell = pal_world_body(world, b)->shell;
-        if (shell) {
-            add_levels(body, shell);
+        const pal_body *moving = pal_world_body(world, b);
+        if (moving->shell) {
+            add_levels(body, moving->shell);
+        } else if (moving->solid) {
+            add_solid(body, &scene->body[b], moving);
         } else {
             cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
             cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
         }
-        cJSON_AddNumberToObject(body, "triangles", scene->body[b].mesh->surface.n_tri);
+        cJSON_AddNumberToObject(body, "triangles",
+                                moving->solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
     }
     cJSON *rows = cJSON_AddArrayToObject(o, "rows");
     for (int r = 0; r < pal_world_rows(world); r++) {
@@ -103,12 +123,28 @@ static void print_shell(const char *name, const pal_shell *shell)
         printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
 }
 
+static void print_solid(const pal_body_def *def, const pal_body *b)
+{
+    const pal_cell_elements *e = &b->solid->elements;
+    printf("%s: %d control cells (#CC), after %d level%s %d elements (#FE): %.0f %% cubic, %.0f %% hexahedra, %.0f %% "
+           "pyramids\n",
+           def->name, def->cells->n_cell, b->solid->subdivision.n_level, b->solid->subdivision.n_level == 1 ? "" : "s",
+           pal_cell_elements_count(e), pal_cell_elements_percent(e, PAL_CELL_CUBIC),
+           pal_cell_elements_percent(e, PAL_CELL_HEX), pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
+    printf("  %d control points carry %d nodes, %d shown triangles; the solid has %.1f MB\n", b->n_dof, b->n_node,
+           b->surface->n_tri, 1e-6 * (double)b->solid->n_byte);
+}
+
 static void print(const pal_scene *scene, pal_world *world, cost *c)
 {
     for (int b = 0; b < scene->n_body; b++) {
         const pal_shell *shell = pal_world_body(world, b)->shell;
         if (shell) {
             print_shell(scene->body[b].name, shell);
+            continue;
+        }
+        if (pal_world_body(world, b)->solid) {
+            print_solid(&scene->body[b], pal_world_body(world, b));
             continue;
         }
         printf("%s: %d tetrahedra, %d nodes, %d shown triangles\n", scene->body[b].name,
@@ -134,7 +170,7 @@ int command_plan(int argc, char **argv)
     const pal_flag_table table = {.usage = "plan SCENE [flags]",
                                   .about = "Shows the rows that a scene calls for, in the order of a step, with their "
                                            "memory and their measured cost here.\nSCENE is a scene.json, its folder, "
-                                           "or any surface or scan.\n",
+                                           "control cells (.palcells), or any surface or scan.\n",
                                   .least_operand = 1,
                                   .most_operand = 1};
     pal_flag_common common;

@@ -1,4 +1,5 @@
-/* Told apart by the name: *.json and folders are scenes, all else is a surface or scan. */
+/* Told apart by the name: *.json and folders are scenes, *.palcells are control cells, all else is a surface or scan.
+ */
 #include "server/commands/scene_arg.h"
 
 #include <stdio.h>
@@ -14,7 +15,9 @@ pal_err pal_scene_arg(const char *word, const pal_surface_scene *options, pal_lo
     size_t n = strlen(word);
     bool folder = stat(word, &facts) == 0 && S_ISDIR(facts.st_mode);
     bool json = n > 5 && !strcmp(word + n - 5, ".json");
-    if (is_surface) *is_surface = !folder && !json;
+    bool cells = n > 9 && !strcmp(word + n - 9, ".palcells");
+    if (is_surface) *is_surface = !folder && !json && !cells;
+    if (!folder && cells) return pal_scene_from_cells(word, options ? options : &plain, out, note);
     if (!folder && !json) return pal_scene_from_surface(word, options ? options : &plain, out, report, note);
     int size = snprintf(path, sizeof path, folder ? "%s/scene.json" : "%s", word);
     if (size < 0 || (size_t)size >= sizeof path)

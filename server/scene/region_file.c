@@ -17,6 +17,12 @@
 enum { PATH = 1600 };
 static const double voxels_most = 512e6;
 
+/* of the frame of the body's file */
+static const double *origin_of(const pal_body_def *def)
+{
+    return def->cells ? def->mesh->surface.origin_m : def->mesh->tets.origin_m;
+}
+
 /* ---- reading ---- */
 
 static const char *const value_key[3] = {"young_Pa", "poisson", "density_kg_m3"};
@@ -253,10 +259,10 @@ pal_err pal_region_read(const pal_json *json, const cJSON *body, const char *pat
     pal_body_def *def = &scene->scene.body[index];
     PAL_TRY(pal_json_list(json, body, path, "regions", PAL_REGION_MAX, &list));
     pal_json_key(at, path, "regions");
-    if (list && list->child && strcmp(def->model.name, "fem") != 0)
+    if (list && list->child && strcmp(def->model.name, "fem") != 0 && strcmp(def->model.name, "subdivision_fem") != 0)
         return pal_json_bad(json, at, "model \"%s\" has one material; model \"fem\" takes regions", def->model.name);
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, def->n_region++)
-        PAL_TRY(read_region(json, child, pal_json_entry(entry, at, def->n_region), folder, def->mesh->tets.origin_m,
+        PAL_TRY(read_region(json, child, pal_json_entry(entry, at, def->n_region), folder, origin_of(def),
                             &def->region[def->n_region], &scene->region[index][def->n_region]));
     return PAL_ERR_OK;
 }
@@ -399,7 +405,7 @@ pal_err pal_region_write(const pal_body_def *body, int region, const char *path,
         put_short(file + 48 + 2 * c, 1);
         put_float(file + 80 + 4 * c, 1e3 * r->spacing_m[c]);
         put_float(file + 280 + 16 * c + 4 * c, 1e3 * r->spacing_m[c]);
-        put_float(file + 280 + 16 * c + 12, 1e3 * (r->low_m[c] + body->mesh->tets.origin_m[c]));
+        put_float(file + 280 + 16 * c + 12, 1e3 * (r->low_m[c] + origin_of(body)[c]));
     }
     memcpy(file + 344, "n+1", 4);
     for (size_t k = 0; k < count; k++) file[HEADER + k] = r->label[k] == r->is;

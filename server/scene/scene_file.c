@@ -6,6 +6,7 @@
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
+#include "server/scene/solid_file.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -126,7 +127,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
     bool has_mesh = cJSON_GetObjectItemCaseSensitive(body, "mesh") != NULL;
     bool has_surface = cJSON_GetObjectItemCaseSensitive(body, "surface") != NULL;
     const char *key = has_mesh ? "mesh" : "surface";
-    if (has_mesh == has_surface) return pal_json_bad(json, path, "needs either mesh or surface");
+    if (has_mesh == has_surface) return pal_json_bad(json, path, "needs either mesh or surface, or cells");
     PAL_TRY(pal_json_text(json, body, path, key, false, name, sizeof name));
     pal_json_key(at, path, key);
     PAL_TRY(place_of(json, at, folder, name, file, sizeof file));
@@ -180,23 +181,34 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
 static pal_err read_body(const pal_json *json, const cJSON *object, int index, const char *folder,
                          pal_loaded_scene *scene)
 {
-    static const char *const known[] = {"name",     "largest",   "mesh",     "surface", "units",  "resolution",
-                                        "label",    "triangles", "material", "model",   "solver", "output",
-                                        "supports", "effects",   "regions",  NULL};
+    static const char *const known[] = {"name",       "largest", "mesh",      "surface",  "units",
+                                        "resolution", "label",   "triangles", "material", "model",
+                                        "solver",     "output",  "supports",  "effects",  "regions",
+                                        "cells",      "strokes", "origin_m",  NULL};
     char path[PAL_JSON_PATH], name[PAL_NAME];
     pal_json_entry(path, "bodies", index);
     PAL_TRY(pal_json_object(json, object, path, known));
     snprintf(name, sizeof name, "body %d", index + 1);
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
     pal_body_def *body = &scene->scene.body[index];
-    pal_body_default(body, name, &scene->mesh[index]);
+    bool solid = cJSON_GetObjectItemCaseSensitive(object, "cells") != NULL;
+    if (solid)
+        pal_body_default_cells(body, name, &scene->mesh[index], NULL);
+    else
+        pal_body_default(body, name, &scene->mesh[index]);
+    if (!solid && cJSON_GetObjectItemCaseSensitive(object, "origin_m"))
+        return pal_json_bad(json, path, "origin_m only goes with cells");
     PAL_TRY(read_material(json, object, path, &body->material));
     PAL_TRY(read_model(json, object, path, scene, index));
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
-    PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
+    if (solid)
+        PAL_TRY(pal_solid_read(json, object, path, folder, scene, index));
+    else
+        PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
+    PAL_TRY(pal_strokes_read(json, object, path, scene, index));
     return pal_region_read(json, object, path, folder, scene, index);
 }
 
@@ -293,6 +305,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
     for (int k = 0; k < PAL_BODY_MAX; k++) {
         pal_region_free(loaded, k);
         pal_spring_grid_free(loaded, k);
+        pal_solid_unload(loaded, k);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

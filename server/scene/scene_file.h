@@ -11,8 +11,8 @@
  *                                                          "units": "mm", "resolution": 24, "label": 2,
  *                                                          "triangles": 50000, "largest": true, prepared at load)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
- *     "regions": [                                         other materials in parts of the body (model fem), at most
- * 32; what a region does not give is the body's; later ones win
+ *     "regions": [                                         other materials in parts of the body (models fem and
+ * subdivision_fem), at most 32; what a region does not give is the body's; later ones win
  *       {"box": {"low_m": [..], "high_m": [..]}, "young_Pa": 50000, "poisson": 0.3, "density_kg_m3": 1100},
  *       {"label": {"volume": "liver.nii.gz", "is": 2}, "young_Pa": 50000},    where that scan's voxels have the label;
  *                                                          the scan lies in the frame of the surface's file
@@ -25,8 +25,17 @@
  *                                                          constants of springs that vary over the body
  *               or {"name": "fem", "element": "hex8_bbar", "law": "corotational", "fill": true} (sim/models/fem.c)
  *               or {"name": "adaptive_springs", "levels": 2, ...} (sim/models/adaptive_springs.c): a hollow organ,
- * springs on the surface itself; a "surface" is taken as it is, without voxels "solver": {"name": "verlet"}, or
- * {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each) "output": {"name": "skin_out"},
+ *                                                          springs on the surface itself; a "surface" is taken as it
+ *                                                          is, without voxels
+ *               or {"name": "subdivision_fem", "levels": 2, ...} (sim/models/subdivision_fem.c), with "cells"
+ *     "cells": "chair.palcells"                            in place of mesh or surface: control cells, .palcells or
+ *                                                          .vtk, in "units" (m), moved so that the middle of their box
+ *                                                          is at 0; with "origin_m": [..] they are about it already
+ *     "strokes": [                                         painted on the rest shape of such a body, at most 4096; E
+ * and density times factor^w, w falling over the outer `soft` part
+ *       {"at_m": [..], "radius_m": 0.02, "soft": 0.5, "young_factor": 10, "density_factor": 1}],
+ *     "solver": {"name": "verlet"}, or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
+ *     "output": {"name": "skin_out"},
  *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}},
  *                  {"rim": true}],                         the open edges of the surface (model adaptive_springs)
  *     "effects": [{"name": "gravity"}, {"name": "tool_push", ...}, {"name": "tool_grab"}, {"name": "finite_guard"}]
@@ -34,8 +43,9 @@
  *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]
  * }
  * and "gravity_m_s2": 9.81, "most_substep": 2000 beside step_s.
- * Boxes and grids are in the body's frame: metres from origin_m of the prepared mesh, which is the middle of the
- * surface's box. Absent keys take the defaults of pal_scene_default and pal_body_default. */
+ * Boxes, grids and strokes are in the body's frame: metres from origin_m of the prepared mesh, which is the middle of
+ * the surface's box, or from the middle of the cells' box. Absent keys take the defaults of pal_scene_default and
+ * pal_body_default. */
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
 #include "server/mesh/levels.h"
@@ -52,6 +62,8 @@ typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
+    pal_cells cells[PAL_BODY_MAX];     /* control cells about the body's origin; of another model none   */
+    pal_stroke *stroke[PAL_BODY_MAX];  /* what a body's strokes borrow, from malloc; NULL: none          */
     double *spring_grid[PAL_BODY_MAX]; /* what a body's spring_grid borrows, from malloc; NULL: none */
     int n_mesh;
 } pal_loaded_scene;
@@ -111,14 +123,18 @@ typedef struct pal_surface_scene_report {
  * levels do not fit into 512 MiB. report may be NULL */
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                                pal_surface_scene_report *report, pal_note *note);
+/* a file of control cells -> default scene of model subdivision_fem; of options: unit_m (0: metres), material, up, hold
+ * and gravity. Errors as of pal_cell_file_load */
+pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
+                             pal_note *note);
 /* our own procedural organ as a scene, for when nothing else can be had; or the shapes of mesh/stomach.h: a stomach
  * held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m on anchors fixed in space, a sheet of 17 x 17
  * vertices and 0.2 m held at its border. REFUSED: there is no such shape */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_note *note);
-/* writes DIR/scene.json, DIR/NAME.palmesh for every body and NAME_regionK.nii for every label region, scene.json last;
- * makes DIR; numbers come back with the same bits. IO, REFUSED (scene.json longer than pal_scene_load takes), and then
- * nothing that this call wrote is left */
+/* writes DIR/scene.json, DIR/NAME.palmesh (NAME.palcells) for every body and NAME_regionK.nii for every label region,
+ * scene.json last; makes DIR; numbers come back with the same bits. IO, REFUSED (scene.json longer than pal_scene_load
+ * takes), and then nothing that this call wrote is left */
 pal_err pal_scene_save(const pal_loaded_scene *scene, const char *folder, pal_note *note);
 /* the same with the scene in a file of any name in a folder that is there, and the meshes beside it */
 pal_err pal_scene_save_file(const pal_loaded_scene *scene, const char *path, pal_note *note);

@@ -15,6 +15,7 @@
 #include "server/mesh/label_volume.h"
 #include "server/mesh/mesh_file.h"
 #include "server/mesh/organ.h"
+#include "server/scene/solid_file.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -37,8 +38,8 @@ static void say(const pal_surface_scene *options, const char *what, double fract
 
 void pal_scene_stem(const char *path, char *out, size_t n_byte)
 {
-    static const char *const endings[] = {".gz",  ".nii", ".inr", ".obj", ".stl", ".ply",
-                                          ".off", ".OBJ", ".STL", ".PLY", ".OFF", ".palmesh"};
+    static const char *const endings[] = {".gz",  ".nii", ".inr", ".obj", ".stl",     ".ply",     ".off",
+                                          ".OBJ", ".STL", ".PLY", ".OFF", ".palmesh", ".palcells"};
     const char *slash = strrchr(path, '/');
     snprintf(out, n_byte, "%s", slash ? slash + 1 : path);
     for (size_t k = 0; k < sizeof endings / sizeof endings[0]; k++) {
@@ -372,6 +373,53 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     else
         snprintf(scene->title, sizeof scene->title, "%s", shown);
     shown_text(slash ? slash + 1 : path, scene->source, sizeof scene->source);
+    *out = loaded;
+    return PAL_ERR_OK;
+}
+
+/* name, body and tools of control cells in cells[0] with their boundary in mesh[0] */
+static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
+{
+    pal_scene *scene = &loaded->scene;
+    pal_body_def *body = &scene->body[0];
+    char plain[PAL_NAME];
+    double low[3], high[3];
+    pal_scene_plain_name(name, plain);
+    loaded->n_mesh = 1;
+    pal_scene_default(scene);
+    scene->step_s = LIVE_STEP_S;
+    snprintf(scene->name, sizeof scene->name, "%s", plain);
+    pal_body_default_cells(body, plain, &loaded->mesh[0], &loaded->cells[0]);
+    if (!options->gravity) leave_gravity_out(body);
+    for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
+    if (options->material.young_Pa > 0) body->material = options->material;
+    if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
+    if (options->hold > 0) body->support[0].fraction = options->hold;
+    scene->n_body = 1;
+    pal_tools_default(scene, 3);
+    pal_surface_box(&loaded->mesh[0].surface, low, high);
+    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
+    return pal_scene_check(scene, note);
+}
+
+pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out, pal_note *note)
+{
+    pal_surface_scene_report unused;
+    char stem[256], shown[100];
+    const char *slash = strrchr(path, '/');
+    pal_note why = {""};
+    pal_loaded_scene *loaded = begin(&unused, path, note);
+    if (!loaded) return PAL_ERR_MEMORY;
+    pal_scene_stem(path, stem, sizeof stem);
+    pal_err err = pal_solid_load(path, options->unit_m > 0 ? options->unit_m : 1, NULL, loaded, 0, note);
+    if (!err && (err = dress_cells(loaded, stem, options, &why))) pal_note_set(note, err, "%s: %s", path, why.text);
+    if (err) {
+        pal_scene_free(loaded);
+        return err;
+    }
+    shown_text(stem, shown, sizeof shown);
+    snprintf(loaded->scene.title, sizeof loaded->scene.title, "%s", shown);
+    shown_text(slash ? slash + 1 : path, loaded->scene.source, sizeof loaded->scene.source);
     *out = loaded;
     return PAL_ERR_OK;
 }

@@ -1,10 +1,12 @@
-/* pal_scene -> DIR/scene.json and DIR/NAME.palmesh. The meshes go first and scene.json last, so that a folder with a
- * scene.json is whole; what was written is removed again when something fails. */
+/* pal_scene -> DIR/scene.json and DIR/NAME.palmesh or DIR/NAME.palcells. The meshes go first and scene.json last, so
+ * that a folder with a scene.json is whole; what was written is removed again when something fails. */
 #include "server/scene/scene_file.h"
 
+#include "server/mesh/cell_file.h"
 #include "server/mesh/mesh_file.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
+#include "server/scene/solid_file.h"
 
 #include <cjson/cJSON.h>
 #include <errno.h>
@@ -36,7 +38,7 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
 {
     stem_of(scene, body, out);
     size_t n = strlen(out);
-    snprintf(out + n, MESH_NAME - n, ".palmesh");
+    snprintf(out + n, MESH_NAME - n, scene->body[body].cells ? ".palcells" : ".palmesh");
 }
 
 static void add_number(cJSON *object, const char *key, double number)
@@ -98,7 +100,10 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     cJSON_AddItemToArray(list, object);
     mesh_name(scene, index, name);
     cJSON_AddStringToObject(object, "name", body->name);
-    cJSON_AddStringToObject(object, "mesh", name);
+    if (body->cells)
+        pal_solid_add(object, body, name);
+    else
+        cJSON_AddStringToObject(object, "mesh", name);
     cJSON *material = cJSON_AddObjectToObject(object, "material");
     add_number(material, "young_Pa", body->material.young_Pa);
     add_number(material, "poisson", body->material.poisson);
@@ -173,7 +178,10 @@ static pal_err save_body(const pal_scene *scene, int index, const char *folder, 
                             (double)n[0] * n[1] * n[2], PAL_GRID_MOST);
     mesh_name(scene, index, name);
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    PAL_TRY(pal_prepared_save(body->mesh, path, note));
+    if (body->cells)
+        PAL_TRY(pal_cell_file_save(body->cells, path, note));
+    else
+        PAL_TRY(pal_prepared_save(body->mesh, path, note));
     ++*n_file;
     stem_of(scene, index, name);
     for (int k = 0; k < body->n_region; k++) {

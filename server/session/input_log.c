@@ -117,6 +117,29 @@ static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
     return mix_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
 }
 
+/* control cells, their sharp features and what is painted on them */
+static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
+{
+    const pal_cells *c = def->cells;
+    if (!c) return h;
+    int count[4] = {c->n_vertex, c->n_cell, c->n_edge_use, def->n_stroke};
+    h = mix_bytes(h, count, sizeof count);
+    h = mix_bytes(h, c->x, (size_t)c->n_vertex * 3 * sizeof(double));
+    h = mix_bytes(h, c->vertex_sharp, (size_t)c->n_vertex * sizeof(float));
+    h = mix_bytes(h, c->cell_use, ((size_t)c->n_cell + 1) * sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_face_use; i++) h = mix_bytes(h, &c->face_use[i].first_use, sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_edge_use; i++) h = mix_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_edge; i++) h = mix_bytes(h, &c->edge[i].sharp, sizeof(float));
+    for (int32_t i = 0; i < c->n_face; i++) h = mix_bytes(h, &c->face[i].sharp, sizeof(float));
+    for (int i = 0; i < def->n_stroke; i++) {
+        const pal_stroke *s = &def->stroke[i];
+        double number[7] = {s->at_m[0], s->at_m[1],      s->at_m[2],       s->radius_m,
+                            s->soft,    s->young_factor, s->density_factor};
+        h = mix_bytes(h, number, sizeof number);
+    }
+    return h;
+}
+
 uint64_t pal_scene_fingerprint(const pal_scene *scene)
 {
     uint64_t h = 0xcbf29ce484222325u;
@@ -127,6 +150,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body_def *def = &scene->body[b];
         h = mix_mesh(h, def->mesh);
+        h = mix_cells(h, def);
         h = mix_material(h, &def->material);
         h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
         for (int k = 0; k < def->n_support; k++) {

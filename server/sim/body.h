@@ -101,6 +101,8 @@ typedef struct pal_body {
     double *skin_axes;                             /* current frames of skin, kept between calls  [n_frame][9]    */
     int n_shown;                                   /* shown vertices                                              */
     float *shown;                                  /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
+    const int32_t *shown_face;                     /* of solids: control face of each shown triangle, -1: an inner one
+                                                    * of a cut; NULL: another body              [surface->n_tri] */
     const int32_t *shown_node;                     /* node of each shown vertex when skin is NULL [n_shown]       */
     uint64_t revision;                             /* grows whenever the shown topology changes                   */
     const pal_shown_field *field[PAL_FIELD_COUNT]; /* NULL: nobody looks                               */

@@ -81,6 +81,15 @@ static bool refines(const pal_world *w, int b)
     return w->plan.body[b].shell && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
 }
 
+/* what FORCE rows have kept of the last forces (turns of elements), so that a new world is as one that was reset */
+static void forget_forces(pal_world *w, int b)
+{
+    for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
+        const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
+        if (row->effect->reset) row->effect->reset(row->self, &w->plan.body[b]);
+    }
+}
+
 /* the limit that holds at rest, whatever the bodies do now, and on the finest level that they may reach; leaves every
  * solver's knowledge of its limit empty */
 static double find_rest_limit(pal_world *w)
@@ -102,6 +111,7 @@ static double find_rest_limit(pal_world *w)
         /* refinement may bring the finest level, each level about half the step (C eq. 9) */
         if (refines(w, b)) limit = ldexp(limit, body->shell->finest + 1 - body->shell->levels.n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
+        if (body->solid) forget_forces(w, b);
         if (!(limit >= least)) least = limit;
     }
     w->limit_s = limit_s;
@@ -647,6 +657,7 @@ void pal_world_shown(const pal_world *world, int index, pal_shown *out)
                        .n_tri = p->n_tri,
                        .rest_m = p->rest_m,
                        .tri = p->tri,
+                       .face = body->shown_face,
                        .revision = body->revision};
     if (!body->shell || p->n_vertex == 0) return;
     const pal_levels *levels = &body->shell->levels;

@@ -8,6 +8,7 @@
  * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of the
  * row cell_elastic), memory_MB (512; of the solid).
  * Rows: cell_elastic, viscous where the material has damping, solver central_cg. */
+#include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/solid.h"
 #include "server/sim/solid_mass.h"
@@ -61,37 +62,108 @@ static pal_err make_solid(const keys *k, const pal_item *item, pal_build *build)
     return PAL_ERR_OK;
 }
 
-static pal_err keep_surface(const pal_surface *from, const int32_t *node, const double origin_m[3], pal_build *build)
+/* what is shown, as it is found: heap */
+typedef struct boundary {
+    pal_surface surface;
+    int32_t *node, *face; /* of the cells: vertex of each vertex [n_vertex], face of each triangle [n_tri] */
+} boundary;
+
+static pal_err keep_boundary(const boundary *from, pal_build *build)
 {
-    size_t n = (size_t)from->n_vertex, m = (size_t)from->n_tri;
+    const int32_t *origin = build->body->solid->subdivision.face_origin;
+    size_t n = (size_t)from->surface.n_vertex, m = (size_t)from->surface.n_tri;
     pal_surface *surface = PAL_NEW(build->arena, pal_surface, 1);
     double *x = PAL_NEW(build->arena, double, 3 * n);
-    int32_t *tri = PAL_NEW(build->arena, int32_t, 3 * m), *shown_node = PAL_NEW(build->arena, int32_t, n);
-    if (!surface || !x || !tri || !shown_node) return PAL_ERR_MEMORY;
-    memcpy(x, from->x, 3 * n * sizeof *x);
-    memcpy(tri, from->tri, 3 * m * sizeof *tri);
-    memcpy(shown_node, node, n * sizeof *node);
-    *surface = (pal_surface){.n_vertex = from->n_vertex, .n_tri = from->n_tri, .x = x, .tri = tri};
-    memcpy(surface->origin_m, origin_m, sizeof surface->origin_m);
+    int32_t *tri = PAL_NEW(build->arena, int32_t, 3 * m), *node = PAL_NEW(build->arena, int32_t, n),
+            *face = PAL_NEW(build->arena, int32_t, m);
+    if (!surface || !x || !tri || !node || !face) return PAL_ERR_MEMORY;
+    memcpy(x, from->surface.x, 3 * n * sizeof *x);
+    memcpy(tri, from->surface.tri, 3 * m * sizeof *tri);
+    memcpy(node, from->node, n * sizeof *node);
+    for (size_t t = 0; t < m; t++) face[t] = origin[from->face[t]];
+    *surface = (pal_surface){.n_vertex = from->surface.n_vertex, .n_tri = from->surface.n_tri, .x = x, .tri = tri};
+    memcpy(surface->origin_m, build->def->mesh->surface.origin_m, sizeof surface->origin_m);
     build->body->surface = surface;
-    build->body->shown_node = shown_node;
+    build->body->shown_node = node;
+    build->body->shown_face = face;
     return PAL_ERR_OK;
 }
 
-/* boundary of the cells: virtual nodes stand inside them and are never on it */
-static pal_err show_boundary(pal_build *build)
+static bool cut_away(const pal_body_def *def, const pal_cells *cells, int32_t cell)
 {
-    pal_surface surface = {0};
-    int32_t *node = NULL;
-    pal_err err = pal_cells_boundary(&build->body->solid->subdivision.cells, &surface, &node, NULL);
-    if (!err) err = keep_surface(&surface, node, build->def->mesh->surface.origin_m, build);
-    pal_surface_free(&surface);
-    free(node);
+    double middle[3];
+    pal_cells_cell_centre(cells, NULL, cell, middle);
+    return pal_dot3(def->cut_normal, middle) > def->cut_m;
+}
+
+/* triangles of a face as the cell of one use sees it, quads cut by their shorter diagonal, others as fans */
+static void add_face(const pal_cells *cells, int32_t use, boundary *b)
+{
+    const pal_edge_use *corner = cells->edge_use + cells->face_use[use].first_use;
+    int n = cells->face_use[use + 1].first_use - cells->face_use[use].first_use, from = 0;
+    const double *x = cells->x;
+    if (n == 4 && pal_dist3(x + 3 * (size_t)corner[1].vertex, x + 3 * (size_t)corner[3].vertex) <
+                      pal_dist3(x + 3 * (size_t)corner[0].vertex, x + 3 * (size_t)corner[2].vertex))
+        from = 1;
+    for (int k = 1; k + 1 < n; k++) {
+        int32_t *tri = b->surface.tri + 3 * (size_t)b->surface.n_tri;
+        for (int c = 0; c < 3; c++) tri[c] = corner[(from + (c == 0 ? 0 : k + c - 1)) % n].vertex;
+        b->face[b->surface.n_tri++] = cells->face_use[use].face;
+    }
+}
+
+/* vertices of the triangles alone, numbered in ascending order */
+static void number_vertices(const pal_cells *cells, int32_t *place, boundary *b)
+{
+    for (int i = 0; i < 3 * b->surface.n_tri; i++) place[b->surface.tri[i]] = 1;
+    for (int32_t i = 0; i < cells->n_vertex; i++) {
+        if (!place[i]) continue;
+        memcpy(b->surface.x + 3 * (size_t)b->surface.n_vertex, cells->x + 3 * (size_t)i, 3 * sizeof(double));
+        b->node[b->surface.n_vertex] = i;
+        place[i] = b->surface.n_vertex++;
+    }
+    for (int i = 0; i < 3 * b->surface.n_tri; i++) b->surface.tri[i] = place[b->surface.tri[i]];
+}
+
+/* boundary of the cells that are left: every face with one of them */
+static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundary *b)
+{
+    int32_t *place = calloc((size_t)cells->n_vertex + 1, sizeof *place);
+    bool *away = malloc((size_t)cells->n_cell);
+    b->surface.x = malloc(3 * sizeof(double) * (size_t)cells->n_vertex);
+    b->surface.tri = malloc(3 * sizeof(int32_t) * (size_t)cells->n_edge_use);
+    b->node = malloc(sizeof(int32_t) * (size_t)cells->n_vertex);
+    b->face = malloc(sizeof(int32_t) * (size_t)cells->n_edge_use);
+    bool made = place && away && b->surface.x && b->surface.tri && b->node && b->face;
+    for (int32_t c = 0; c < cells->n_cell && made; c++) away[c] = cut_away(def, cells, c);
+    for (int32_t f = 0; f < cells->n_face && made; f++) {
+        const int32_t *use = cells->face[f].use;
+        bool left[2] = {!away[cells->face_use[use[0]].cell], use[1] >= 0 && !away[cells->face_use[use[1]].cell]};
+        if (left[0] != left[1]) add_face(cells, use[left[1]], b);
+    }
+    if (made) number_vertices(cells, place, b);
+    free(place), free(away);
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* virtual nodes stand inside cells and are never shown */
+static pal_err show_boundary(const pal_item *item, pal_build *build)
+{
+    boundary b = {.node = NULL};
+    const pal_cells *cells = &build->body->solid->subdivision.cells;
+    pal_err err =
+        build->def->cut ? find_cut(cells, build->def, &b) : pal_cells_boundary(cells, &b.surface, &b.node, &b.face);
+    if (!err && b.surface.n_tri == 0)
+        err = pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\" %s: the cut leaves nothing of it",
+                           build->def->name, item->path);
+    if (!err) err = keep_boundary(&b, build);
+    pal_surface_free(&b.surface);
+    free(b.node), free(b.face);
     return err;
 }
 
 /* points as given, nodes carried by them; masses follow once what is held is known (solid_body.h) */
-static pal_err make_body(pal_build *build)
+static pal_err make_body(const pal_item *item, pal_build *build)
 {
     pal_body *body = build->body;
     const pal_solid *solid = body->solid;
@@ -106,7 +178,7 @@ static pal_err make_body(pal_build *build)
     memcpy(body->node_rest, solid->node_rest, 3 * sizeof(double) * (size_t)body->n_node);
     pal_body_place(body);
     body->h_m = cbrt(pal_solid_volume_m3(solid) / solid->subdivision.cells.n_cell);
-    return show_boundary(build);
+    return show_boundary(item, build);
 }
 
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
@@ -115,7 +187,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     out->n_row = 0;
     PAL_TRY(read_keys(item, &k, build->note));
     PAL_TRY(make_solid(&k, item, build));
-    PAL_TRY(make_body(build));
+    PAL_TRY(make_body(item, build));
     pal_item *row = out->row;
     pal_item_init(row, item->path, "cell_elastic");
     if (k.operator) PAL_TRY(pal_item_put_text(row, "operator", k.operator, build->note));
