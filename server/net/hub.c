@@ -357,6 +357,7 @@ static void hub_wake(void *user)
 {
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
+    pal_hub_sculpt_turn(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_hub_room *room = &hub->room[r];
         bool used[PAL_STREAM_TIER];
@@ -427,6 +428,8 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
     if (!hub) return PAL_ERR_MEMORY;
     hub->loop = loop;
     hub->site = options->site;
+    hub->session = session;
+    hub->error_m = options->error_m;
     hub->most_clients = options->most_clients > 0 ? options->most_clients : 200;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
     hub->client = calloc((size_t)hub->most_clients, sizeof *hub->client);
@@ -451,6 +454,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
 void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
+    pal_hub_sculpt_end(hub);
     for (int i = 0; i < hub->n_room; i++) pal_stream_close(hub->room[i].stream);
     free(hub->room);
     free(hub->client);

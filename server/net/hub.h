@@ -18,7 +18,9 @@ typedef struct pal_hub_options {
     pal_site *site; /* borrowed; NULL: no files */
 } pal_hub_options;
 
-/* builds the streams; borrows loop and sessions; listens to the loop. [load] */
+/* builds the streams; borrows loop, sessions and their array; listens to the loop. A session that a command of
+ * sculpting has replaced is closed, and its place in the array is NULL: the hub closes the new one when it is
+ * destroyed. [load] */
 pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
                        pal_note *note, pal_hub **out);
 void pal_hub_destroy(pal_hub *hub);                      /* after its roads; NULL is fine. [load] */

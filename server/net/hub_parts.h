@@ -1,4 +1,5 @@
-/* What hub.c, hub_input.c, hub_fields.c and hub_pages.c share: the hub's records. Private to these. Thread: [net]. */
+/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c and hub_pages.c share: the hub's records. Private to these.
+ * Thread: [net]. */
 #ifndef PAL_NET_HUB_PARTS_H
 #define PAL_NET_HUB_PARTS_H
 #include "server/net/credit.h"
@@ -41,6 +42,7 @@ typedef struct pal_client {
 /* one session as the hub sees it */
 typedef struct pal_hub_room {
     pal_session *session;
+    bool own; /* the hub made it: sculpting has replaced the one that was given */
     pal_stream *stream;
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
@@ -56,8 +58,13 @@ typedef struct pal_hub_count {
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;
 
+typedef struct pal_hub_sculpt pal_hub_sculpt;
+
 struct pal_hub {
     pal_loop *loop;
+    pal_session **session;  /* the caller's array [n_room] */
+    pal_hub_sculpt *sculpt; /* NULL until somebody sculpts */
+    double error_m;
     pal_site *site;
     int n_room, most_clients, n_client;
     bool leaving;
@@ -88,6 +95,11 @@ bool pal_hub_wants_field(const pal_client *client);
 pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *client); /* NULL: none to be sent now */
 /* encodes what is new; the result is when to come again, 0: nothing waits */
 uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
+/* hub_sculpt.c */
+/* an order that is one of sculpting is dealt with, now or when its turn comes; false: it is none */
+bool pal_hub_sculpt_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
+void pal_hub_sculpt_turn(pal_hub *hub); /* what the workshop has done, and the next order */
+void pal_hub_sculpt_end(pal_hub *hub);  /* closes the sessions that the hub made */
 /* hub_pages.c */
 void pal_hub_get(void *hub, const char *path, pal_reply *reply);
 #endif

@@ -67,6 +67,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.adapts = shown->adapts;
+        part->info.sculpts = shown->face != NULL;
         if (shown->adapts) err = pal_places_make(index, part->info.epoch, shown, note, &part->places);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_gives(s->session, index, (pal_field)k))
@@ -149,6 +150,23 @@ void pal_stream_close(pal_stream *stream)
     free(stream->coder);
     free(stream->part);
     free(stream);
+}
+
+void pal_stream_follow(pal_stream *stream, const pal_stream *before)
+{
+    struct pal_stream_coder *coder = stream->coder;
+    stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
+    stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
+    memcpy(stream->row_ms, before->row_ms, sizeof stream->row_ms);
+    stream->count = before->count;
+    coder->haptic_seq = before->coder->haptic_seq, coder->field_seq = before->coder->field_seq;
+    coder->rate_tick = before->coder->rate_tick, coder->rate_ns = before->coder->rate_ns;
+    for (int p = 0; p < stream->n_part && p < before->n_part; p++) {
+        pal_stream_part *part = &stream->part[p];
+        part->info.epoch = before->part[p].info.epoch + 1;
+        if (part->places) part->places->epoch = part->info.epoch;
+        coder->seq[p] = before->coder->seq[p];
+    }
 }
 
 double pal_stream_tier_error_m(const pal_stream *stream, int tier)

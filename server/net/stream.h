@@ -58,6 +58,10 @@ typedef struct pal_stream {
 pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pal_stream **out);
 void pal_stream_close(pal_stream *stream); /* NULL is fine. [load] */
 
+/* a stream that has sent nothing yet goes on where another of the same session's bodies is: cycles and numbers count
+ * on, epochs are one higher; the other only closes. [net] */
+void pal_stream_follow(pal_stream *stream, const pal_stream *before);
+
 /* what the hub knows of a tool and a step does not */
 typedef struct pal_stream_tool {
     int holder; /* member id, 0: nobody                                                       */

@@ -56,6 +56,7 @@ struct pal_session {
     bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
     int n_part;
     pthread_t thread;
+    bool running; /* there is a thread: of who opens, follows and closes */
 
     /* crossing points */
     tool_place tool[PAL_TOOL_MAX];
@@ -333,6 +334,24 @@ static pal_err prepare(pal_session *s, pal_note *note)
     return PAL_ERR_OK;
 }
 
+static pal_err start(pal_session *s, pal_note *note)
+{
+    /* signals belong to the thread that waits for them */
+    sigset_t all, old;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    s->running = !pthread_create(&s->thread, NULL, simulate, s);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    return s->running ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
+}
+
+static void stop(pal_session *s)
+{
+    atomic_store_explicit(&s->stop, true, memory_order_release);
+    if (s->running) pthread_join(s->thread, NULL);
+    s->running = false;
+}
+
 static void release(pal_session *s)
 {
     for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
@@ -357,17 +376,9 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->paused = s->options.start_paused;
     atomic_init(&s->beat_ns, pal_clock_ns());
     pal_err err = prepare(s, note);
-    if (!err) {
-        /* signals belong to the thread that waits for them */
-        sigset_t all, old;
-        sigfillset(&all);
-        pthread_sigmask(SIG_SETMASK, &all, &old);
-        if (pthread_create(&s->thread, NULL, simulate, s))
-            err = pal_note_set(note, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
-        pthread_sigmask(SIG_SETMASK, &old, NULL);
-        if (err && s->log) pal_input_log_close(s->log, 0, 0);
-    }
+    if (!err && !s->options.hold) err = start(s, note);
     if (err) {
+        if (s->log) pal_input_log_close(s->log, 0, 0);
         release(s);
         return err;
     }
@@ -375,11 +386,18 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     return PAL_ERR_OK;
 }
 
+pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out)
+{
+    pal_session_options options = before->options;
+    options.hold = true;
+    options.record_path = NULL;
+    return pal_session_open(scene, &options, note, out);
+}
+
 void pal_session_close(pal_session *s)
 {
     if (!s) return;
-    atomic_store_explicit(&s->stop, true, memory_order_release);
-    pthread_join(s->thread, NULL);
+    stop(s);
     if (s->log) {
         uint64_t n_dropped = pal_input_log_dropped(s->log);
         if (pal_input_log_close(s->log, s->step, pal_world_hash(s->world)))
@@ -389,6 +407,44 @@ void pal_session_close(pal_session *s)
                     s->options.record_path, (unsigned long long)n_dropped);
     }
     release(s);
+}
+
+/* what the thread of `from` knew and that of `to` goes on with; poses that had not been taken yet as well */
+static void hand_over(pal_session *to, pal_session *from)
+{
+    for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
+        tool_place *a = &to->tool[t], *b = &from->tool[t];
+        const pose_slot *slot = pal_trio_take(&b->trio);
+        if (slot) {
+            *(pose_slot *)pal_trio_slot(&a->trio) = *slot;
+            pal_trio_publish(&a->trio);
+        }
+        a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
+    }
+    to->paused = from->paused, to->single = from->single;
+    to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
+    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
+                          memory_order_relaxed);
+    memcpy(to->n_look, from->n_look, sizeof to->n_look);
+    for (int b = 0; b < to->scene->n_body; b++)
+        for (int k = 0; k < PAL_FIELD_COUNT; k++)
+            if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
+    /* orders that nobody has taken yet */
+    pal_command command;
+    for (int k = 0; k < N_COMMAND && pal_ring_get(from->command, &command); k++)
+        (void)pal_ring_put(to->command, &command);
+}
+
+pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
+{
+    stop(before);
+    hand_over(next, before);
+    carry(user, next->world, before->world);
+    pal_err err = start(next, note);
+    if (!err) return PAL_ERR_OK;
+    atomic_store_explicit(&before->stop, false, memory_order_release);
+    (void)start(before, NULL);
+    return err;
 }
 
 /* ---- any thread ---- */

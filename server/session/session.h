@@ -38,6 +38,7 @@ typedef struct pal_command {
 typedef struct pal_session_options {
     double lease_s; /* 0: 0.25                                                                   */
     bool start_paused;
+    bool hold;                /* the thread does not run yet: pal_session_follow starts it                 */
     bool unpaced;             /* step as fast as possible (tests, replay); frames are still newest-wins    */
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: nobody     */
     void *user;
@@ -46,6 +47,17 @@ typedef struct pal_session_options {
 
 /* builds the world and starts the thread; borrows the scene (and its meshes) until close. [load] */
 pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_note *note, pal_session **out);
+/* opens a session for another scene with the options of a running one, with hold and without a record. [any] while no
+ * other thread closes `before` */
+pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out);
+/* Lets `next`, opened with hold, go on where `before` is: stops the thread of before between two steps, hands its
+ * world's state over (carry; what it does not do is at rest), and pause, poses, counts and looked-at fields, and starts
+ * the thread of next. A tool's holder goes on sending poses, to next. before keeps its last frame and can only be
+ * closed; a record ends there. INTERNAL: the thread could not be started, then before has gone on. Not while another
+ * thread uses either. [net] */
+typedef void pal_session_carry(void *user, pal_world *next, const pal_world *before);
+pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user,
+                           pal_note *note);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
 
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */

@@ -18,6 +18,13 @@ static bool make_slots(pal_frame_part *part, const pal_shell *shell)
     return part->slot != NULL;
 }
 
+static bool make_points(pal_frame_part *part, const pal_body *body)
+{
+    part->n_point = body->n_dof;
+    part->point_m = calloc(3 * (size_t)part->n_point + 1, sizeof *part->point_m);
+    return part->point_m != NULL;
+}
+
 pal_frame *pal_frame_create(const pal_world *world)
 {
     pal_frame *frame = calloc(1, sizeof *frame);
@@ -30,7 +37,8 @@ pal_frame *pal_frame_create(const pal_world *world)
         part->n_vertex = shown.n_vertex;
         part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
         const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
-        bool made = part->position_m && (!shown.adapts || make_slots(part, body->shell));
+        bool made = part->position_m && (!shown.adapts || make_slots(part, body->shell)) &&
+                    (!body->embed || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);
             return NULL;
@@ -45,6 +53,7 @@ void pal_frame_destroy(pal_frame *frame)
     for (int i = 0; i < frame->n_part; i++) {
         free(frame->part[i].position_m);
         free(frame->part[i].slot);
+        free(frame->part[i].point_m);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) free(frame->part[i].field[k].value);
     }
     free(frame);

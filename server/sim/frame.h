@@ -29,6 +29,9 @@ typedef struct pal_frame_part {
     uint64_t slot_log;       /* changes taken in so far, of pal_shell.n_log      */
     int n_active, n_spring;  /* nodes and springs now                            */
     int n_all, n_all_spring; /* and if all of the body were of its finest level  */
+    /* bodies whose nodes are carried by control points (body.embed): those, body frame, for sculpting */
+    int n_point;     /* 0: another body */
+    double *point_m; /* [n_point][3]    */
 } pal_frame_part;
 
 typedef struct pal_frame_tool {

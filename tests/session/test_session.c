@@ -454,6 +454,47 @@ static void survives_poses_commands_and_frames_from_many_threads_and_a_close_in_
     pal_session_close(NULL);
 }
 
+static void carry_all(void *user, pal_world *next, const pal_world *before)
+{
+    *(uint64_t *)user = pal_world_hash(before);
+    pal_world_follow(next, before, -1, NULL, NULL);
+    CHECK(pal_world_hash(next) == *(uint64_t *)user);
+}
+
+/* the tool stays in its holder's hand, time and steps go on, and the session that was left only closes */
+static void another_session_goes_on_where_one_was(void)
+{
+    watch *w = make_watch();
+    uint64_t hash = 0;
+    pal_note note = {""};
+    pal_session *before = open_with((pal_session_options){.lease_s = 10}, w);
+    pal_session *next = open_with((pal_session_options){.lease_s = 10, .hold = true}, w);
+    REQUIRE(before && next);
+    pal_pose pose = pose_at(0, 0.2, 5);
+    CHECK_INT(pal_session_put_pose(before, 1, &pose), 0);
+    pose = pose_at(0, 0.3, 7);
+    CHECK_INT(pal_session_put_pose(before, 0, &pose), 0);
+    const pal_frame *f = frame_where(before, w, used_seq, 7);
+    REQUIRE(f != NULL);
+    uint64_t tick = f->tick;
+    CHECK(pal_session_take_frame(next) == NULL);
+    CHECK_INT(pal_session_follow(next, before, carry_all, &hash, &note), 0);
+    CHECK(hash != 0);
+    f = frame_where(next, w, used_seq, 7);
+    REQUIRE(f != NULL);
+    CHECK(f->tick >= tick);
+    CHECK_NEAR(f->time_s, (double)f->tick * scene.step_s, 1e-9);
+    CHECK(f->tool[1].present);
+    pose = pose_at(0, 0.25, 8);
+    CHECK_INT(pal_session_put_pose(next, 0, &pose), 0);
+    f = frame_where(next, w, used_seq, 8);
+    REQUIRE(f != NULL);
+    pal_session_close(before);
+    CHECK_INT(order(next, PAL_COMMAND_PAUSE), 0);
+    REQUIRE(frame_where(next, w, is_paused, 1));
+    pal_session_close(next);
+}
+
 static void a_scene_that_cannot_run_opens_no_session(void)
 {
     pal_scene bad = scene;
@@ -598,6 +639,7 @@ int main(void)
     RUN(a_slow_step_slows_simulated_time_and_says_by_how_much);
     RUN(no_heap_call_after_open);
     RUN(survives_poses_commands_and_frames_from_many_threads_and_a_close_in_the_middle);
+    RUN(another_session_goes_on_where_one_was);
     RUN(a_scene_that_cannot_run_opens_no_session);
     RUN(rows_and_parts_are_known_to_every_thread);
     RUN(a_field_is_there_while_anybody_looks);

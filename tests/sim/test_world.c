@@ -413,8 +413,38 @@ static void shows_two_bodies_in_the_frame_of_the_first(void)
     box_free(&two);
 }
 
+/* a world that follows another half way comes to the same bits as one that went on alone */
+static void goes_on_where_another_world_was(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(3, 3, 3, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    pal_world *alone, *before, *next;
+    REQUIRE(!pal_world_create(scene, &note, &alone));
+    REQUIRE(!pal_world_create(scene, &note, &before));
+    REQUIRE(!pal_world_create(scene, &note, &next));
+    for (int i = 0; i < 30; i++) CHECK_INT(pal_world_step(alone, scene->step_s), 0);
+    for (int i = 0; i < 12; i++) CHECK_INT(pal_world_step(before, scene->step_s), 0);
+    CHECK(pal_world_hash(before) != pal_world_hash(next));
+    pal_world_follow(next, before, -1, NULL, NULL);
+    CHECK(pal_world_hash(before) == pal_world_hash(next));
+    for (int i = 0; i < 18; i++) CHECK_INT(pal_world_step(next, scene->step_s), 0);
+    CHECK(pal_world_hash(alone) == pal_world_hash(next));
+    /* a body of another state: as given */
+    pal_body *body = pal_world_body(before, 0);
+    pal_world_follow(next, alone, 0, body->x, NULL);
+    pal_body *to = pal_world_body(next, 0);
+    CHECK(!memcmp(to->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof));
+    pal_world_destroy(alone);
+    pal_world_destroy(before);
+    pal_world_destroy(next);
+    free(scene);
+    box_free(&box);
+}
+
 int main(void)
 {
+    RUN(goes_on_where_another_world_was);
     RUN(touches_no_heap_in_a_step_with_tools_pressing);
     RUN(gives_the_same_hash_whatever_runs_beside_it);
     RUN(starts_again_after_a_reset_as_if_new);

@@ -1,0 +1,42 @@
+/* One thread beside the loop that makes what a command of sculpting leads to: scene, world and stream, slow and with
+ * memory, while the session runs on; and that frees what has been replaced. One piece of work at a time: the next one
+ * is given when the last has been taken. Thread: [net] unless said otherwise. */
+#ifndef PAL_NET_WORKSHOP_H
+#define PAL_NET_WORKSHOP_H
+#include "server/net/stream.h"
+#include "server/session/sculpt.h"
+
+typedef struct pal_workshop pal_workshop;
+
+/* what is to be made, and what has been. Borrowed until it is taken: sculptor and session, which nobody changes or
+ * closes meanwhile */
+typedef struct pal_work {
+    const pal_sculptor *sculptor;
+    const pal_session *session; /* that runs now */
+    pal_scene *scene;           /* its scene with live materials; heap, goes with the work */
+    pal_sculpt command;
+    double *point_m; /* what the command points to, heap, or NULL */
+    double error_m;
+    uint64_t asked_ns, made_ns;
+    /* made; when err is not 0 nothing is, and note says why */
+    pal_err err;
+    pal_note note;
+    pal_sculpt_turn *turn;
+    pal_session *next;
+    pal_stream *stream;
+} pal_work;
+
+/* wake is called on the thread when work is done. MEMORY. [load] */
+pal_err pal_workshop_open(void (*wake)(void *user), void *user, pal_workshop **out);
+/* waits for the work under way and frees it; NULL is fine */
+void pal_workshop_close(pal_workshop *workshop);
+bool pal_workshop_busy(const pal_workshop *workshop); /* has work that was not taken */
+/* takes the work over, heap parts included; only when it is not busy */
+void pal_workshop_give(pal_workshop *workshop, const pal_work *work);
+/* what is done, once; false: nothing yet. Heap parts are the caller's again */
+bool pal_workshop_take(pal_workshop *workshop, pal_work *out);
+/* closes and frees on the thread, in this order, each may be NULL; before the next give */
+void pal_workshop_clear(pal_workshop *workshop, pal_stream *stream, pal_session *session, pal_sculpt_turn *turn);
+/* frees what a work holds: scene, points, and what was made */
+void pal_work_free(pal_work *work);
+#endif

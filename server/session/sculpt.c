@@ -1,0 +1,384 @@
+/* Sculpting. A shape is what undo brings back: cells, strokes, and the state it had when it was left. A turn holds the
+ * shape that comes, a scene with copies of its own, and room for the state that goes. */
+#include "server/session/sculpt.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct shape {
+    pal_cells cells;
+    pal_stroke *stroke; /* [n_stroke] */
+    int n_stroke;
+    double *x, *v; /* state when it was left, NULL: never left [cells.n_vertex][3] */
+} shape;
+
+struct pal_sculptor {
+    int body;
+    double origin_m[3]; /* of the body's frame, whatever becomes of its shape */
+    bool cut;
+    double cut_normal[3], cut_m;
+    shape now, past[PAL_SCULPT_PAST], future[PAL_SCULPT_PAST]; /* newest last */
+    int n_past, n_future;
+};
+
+struct pal_sculpt_turn {
+    pal_sculpt_kind kind;
+    int body;
+    const pal_cells *from;   /* the sculptor's, until the turn is taken        */
+    shape to;                /* after the command; moves into the sculptor       */
+    pal_cells_edit edit;     /* CELLS: where its points come from                */
+    double *x, *v;           /* state that is left            [n points before]  */
+    double *next_x, *next_v; /* state that comes            [n points after]  */
+    int n_before;
+    bool cut;
+    double cut_normal[3], cut_m;
+    /* the scene and what its body borrows */
+    pal_scene scene;
+    pal_cells cells;
+    pal_stroke *stroke;
+    pal_prepared mesh;
+};
+
+/* ---- shapes ---- */
+
+static void free_shape(shape *s)
+{
+    pal_cells_free(&s->cells);
+    free(s->stroke);
+    free(s->x);
+    free(s->v);
+    *s = (shape){.n_stroke = 0};
+}
+
+static void *copied(const void *from, size_t n_byte)
+{
+    void *to = malloc(n_byte ? n_byte : 1);
+    if (to && n_byte) memcpy(to, from, n_byte);
+    return to;
+}
+
+/* cells and strokes; not the state */
+static pal_err copy_shape(const shape *from, shape *to)
+{
+    *to = (shape){.n_stroke = from->n_stroke};
+    to->stroke = copied(from->stroke, sizeof *to->stroke * (size_t)from->n_stroke);
+    pal_err err = to->stroke ? pal_cells_copy(&from->cells, &to->cells) : PAL_ERR_MEMORY;
+    if (err) free_shape(to);
+    return err;
+}
+
+/* puts a shape on top of a list, the oldest falls out */
+static void push(shape *list, int *n, const shape *s)
+{
+    if (*n == PAL_SCULPT_PAST) {
+        free_shape(&list[0]);
+        memmove(list, list + 1, sizeof *list * (size_t)(PAL_SCULPT_PAST - 1));
+        --*n;
+    }
+    list[(*n)++] = *s;
+}
+
+pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_note *note, pal_sculptor **out)
+{
+    if (body < 0 || body >= scene->n_body || !scene->body[body].cells)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body %d is no solid of control cells", body);
+    pal_sculptor *s = calloc(1, sizeof *s);
+    if (!s) return PAL_ERR_MEMORY;
+    const pal_body_def *def = &scene->body[body];
+    s->body = body;
+    pal_copy3(s->origin_m, def->mesh->surface.origin_m);
+    s->cut = def->cut, s->cut_m = def->cut_m;
+    pal_copy3(s->cut_normal, def->cut_normal);
+    shape from = {.cells = *def->cells, .n_stroke = def->n_stroke};
+    from.stroke = (pal_stroke *)(uintptr_t)def->stroke;
+    pal_err err = copy_shape(&from, &s->now);
+    if (err)
+        free(s);
+    else
+        *out = s;
+    return err;
+}
+
+void pal_sculptor_destroy(pal_sculptor *sculptor)
+{
+    if (!sculptor) return;
+    free_shape(&sculptor->now);
+    for (int i = 0; i < sculptor->n_past; i++) free_shape(&sculptor->past[i]);
+    for (int i = 0; i < sculptor->n_future; i++) free_shape(&sculptor->future[i]);
+    free(sculptor);
+}
+
+const pal_cells *pal_sculptor_cells(const pal_sculptor *sculptor)
+{
+    return &sculptor->now.cells;
+}
+
+int pal_sculptor_past(const pal_sculptor *sculptor)
+{
+    return sculptor->n_past;
+}
+
+int pal_sculptor_future(const pal_sculptor *sculptor)
+{
+    return sculptor->n_future;
+}
+
+/* ---- commands ---- */
+
+static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to, pal_note *note)
+{
+    PAL_TRY(pal_stroke_check(stroke, note));
+    if (s->now.n_stroke >= PAL_STROKE_MAX)
+        return pal_note_set(note, PAL_ERR_REFUSED, "there are %d strokes already, the most there may be",
+                            s->now.n_stroke);
+    PAL_TRY(copy_shape(&s->now, to));
+    pal_stroke *more = realloc(to->stroke, sizeof *more * (size_t)(to->n_stroke + 1));
+    if (!more) return PAL_ERR_MEMORY;
+    to->stroke = more;
+    to->stroke[to->n_stroke++] = *stroke;
+    return PAL_ERR_OK;
+}
+
+static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to, pal_note *note)
+{
+    const pal_cells *cells = &s->now.cells;
+    pal_cells_fault fault;
+    if (!command->point_m || command->n_point != cells->n_vertex)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%d points of the shape to be kept, wanted %d", command->n_point,
+                            cells->n_vertex);
+    for (int i = 0; i < 3 * command->n_point; i++)
+        if (!(fabs(command->point_m[i]) <= 1e9))
+            return pal_note_set(note, PAL_ERR_REFUSED, "point %d of the shape to be kept is at %g m", i / 3,
+                                command->point_m[i]);
+    if (!pal_cells_shape_good(cells, command->point_m, &fault))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "the shape as it is cannot be kept: control cell %d is folded over (%s %g)", fault.cell,
+                            fault.face_use < 0 ? "volume" : "area", fault.measure);
+    PAL_TRY(copy_shape(&s->now, to));
+    memcpy(to->cells.x, command->point_m, 3 * sizeof(double) * (size_t)cells->n_vertex);
+    return PAL_ERR_OK;
+}
+
+/* back or forth: the shape and the state it was left in */
+static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_turn *turn, pal_note *note)
+{
+    if (n == 0) return pal_note_set(note, PAL_ERR_REFUSED, "there is nothing to %s", what);
+    const shape *from = &list[n - 1];
+    size_t n_byte = 3 * sizeof(double) * (size_t)from->cells.n_vertex;
+    PAL_TRY(copy_shape(from, &turn->to));
+    if (!from->x) return PAL_ERR_OK;
+    turn->next_x = copied(from->x, n_byte);
+    turn->next_v = copied(from->v, n_byte);
+    return turn->next_x && turn->next_v ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_note *note)
+{
+    double length = pal_norm3(command->cut_normal);
+    turn->cut = command->cut;
+    if (command->cut && !(length > 1e-12 && length < 1e12 && fabs(command->cut_m) <= 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "a cut has a direction and a place: %g %g %g at %g m",
+                            command->cut_normal[0], command->cut_normal[1], command->cut_normal[2], command->cut_m);
+    if (command->cut) pal_scale3(turn->cut_normal, 1 / length, command->cut_normal);
+    turn->cut_m = command->cut_m;
+    return copy_shape(&s->now, &turn->to);
+}
+
+static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_note *note)
+{
+    switch (command->kind) {
+    case PAL_SCULPT_CELLS:
+        PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &turn->edit, note));
+        turn->to.stroke = copied(s->now.stroke, sizeof *turn->to.stroke * (size_t)s->now.n_stroke);
+        turn->to.n_stroke = s->now.n_stroke;
+        PAL_TRY(turn->to.stroke ? PAL_ERR_OK : PAL_ERR_MEMORY);
+        return pal_cells_copy(&turn->edit.cells, &turn->to.cells);
+    case PAL_SCULPT_PAINT:
+        return paint(s, &command->stroke, &turn->to, note);
+    case PAL_SCULPT_KEEP:
+        return keep(s, command, &turn->to, note);
+    case PAL_SCULPT_CUT:
+        return set_cut(s, command, turn, note);
+    case PAL_SCULPT_UNDO:
+        return turn_to(s->past, s->n_past, "undo", turn, note);
+    case PAL_SCULPT_REDO:
+        return turn_to(s->future, s->n_future, "redo", turn, note);
+    case PAL_SCULPT_KINDS:
+        break;
+    }
+    return pal_note_set(note, PAL_ERR_REFUSED, "there is no way of sculpting %d", (int)command->kind);
+}
+
+/* ---- turns ---- */
+
+/* the scene with the body's new shape; everything that the body borrows is the turn's */
+static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_turn *turn)
+{
+    pal_surface surface = {0};
+    turn->scene = *scene;
+    pal_body_def *def = &turn->scene.body[s->body];
+    PAL_TRY(pal_cells_copy(&turn->to.cells, &turn->cells));
+    turn->stroke = copied(turn->to.stroke, sizeof *turn->stroke * (size_t)turn->to.n_stroke);
+    if (!turn->stroke) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_cells_boundary(&turn->cells, &surface, NULL, NULL));
+    /* the body's frame stays where it is */
+    pal_copy3(surface.origin_m, s->origin_m);
+    pal_err err = pal_prepared_surface(&surface, &turn->mesh);
+    pal_surface_free(&surface);
+    def->cells = &turn->cells;
+    def->stroke = turn->stroke, def->n_stroke = turn->to.n_stroke;
+    def->mesh = &turn->mesh;
+    def->cut = turn->cut, def->cut_m = turn->cut_m;
+    pal_copy3(def->cut_normal, turn->cut_normal);
+    return err;
+}
+
+static pal_err make_room(const pal_sculptor *s, pal_sculpt_turn *turn)
+{
+    size_t before = 3 * sizeof(double) * (size_t)s->now.cells.n_vertex;
+    size_t after = 3 * sizeof(double) * (size_t)turn->to.cells.n_vertex;
+    turn->n_before = s->now.cells.n_vertex;
+    turn->x = malloc(before), turn->v = malloc(before);
+    if (!turn->next_x) turn->next_x = calloc(1, after), turn->next_v = calloc(1, after);
+    bool all = turn->x && turn->v && turn->next_x && turn->next_v;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scene, const pal_sculpt *command,
+                             pal_note *note, pal_sculpt_turn **out)
+{
+    const pal_sculptor *s = sculptor;
+    pal_sculpt_turn *turn = calloc(1, sizeof *turn);
+    if (!turn) return PAL_ERR_MEMORY;
+    turn->kind = command->kind;
+    turn->from = &s->now.cells;
+    turn->body = s->body;
+    turn->cut = s->cut, turn->cut_m = s->cut_m;
+    pal_copy3(turn->cut_normal, s->cut_normal);
+    pal_err err = obey(s, command, turn, note);
+    if (!err) err = make_room(s, turn);
+    if (!err) err = make_scene(s, scene, turn);
+    if (err)
+        pal_sculpt_free(turn);
+    else
+        *out = turn;
+    return err;
+}
+
+const pal_scene *pal_sculpt_scene(const pal_sculpt_turn *turn)
+{
+    return &turn->scene;
+}
+
+/* where an edit's points stand now */
+static void carry_points(pal_sculpt_turn *turn)
+{
+    const pal_cells_edit *edit = &turn->edit;
+    pal_cells_edit_place(edit, turn->from, turn->x, turn->next_x);
+    pal_point_rows_place(&edit->rows, turn->v, turn->next_v);
+}
+
+void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
+{
+    pal_sculpt_turn *turn = user;
+    const pal_body *from = pal_world_body((pal_world *)(uintptr_t)before, turn->body);
+    size_t n_byte = 3 * sizeof(double) * (size_t)turn->n_before;
+    memcpy(turn->x, from->x, n_byte);
+    memcpy(turn->v, from->v, n_byte);
+    bool back = turn->kind == PAL_SCULPT_UNDO || turn->kind == PAL_SCULPT_REDO;
+    if (turn->kind == PAL_SCULPT_CELLS) {
+        carry_points(turn);
+    } else if (!back) {
+        memcpy(turn->next_x, turn->x, n_byte);
+        memcpy(turn->next_v, turn->v, n_byte);
+    }
+    pal_world_follow(next, before, turn->body, turn->next_x, turn->next_v);
+}
+
+void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)
+{
+    pal_sculptor *s = sculptor;
+    s->cut = turn->cut, s->cut_m = turn->cut_m;
+    pal_copy3(s->cut_normal, turn->cut_normal);
+    if (turn->kind == PAL_SCULPT_CUT) return;
+    shape left = s->now;
+    left.x = turn->x, left.v = turn->v;
+    turn->x = turn->v = NULL;
+    s->now = turn->to;
+    turn->to = (shape){.n_stroke = 0};
+    if (turn->kind == PAL_SCULPT_UNDO) {
+        free_shape(&s->past[--s->n_past]);
+        push(s->future, &s->n_future, &left);
+        return;
+    }
+    if (turn->kind == PAL_SCULPT_REDO) {
+        free_shape(&s->future[--s->n_future]);
+    } else {
+        while (s->n_future > 0) free_shape(&s->future[--s->n_future]);
+    }
+    push(s->past, &s->n_past, &left);
+}
+
+void pal_sculpt_free(pal_sculpt_turn *turn)
+{
+    if (!turn) return;
+    free_shape(&turn->to);
+    pal_cells_edit_free(&turn->edit);
+    free(turn->x), free(turn->v), free(turn->next_x), free(turn->next_v);
+    pal_cells_free(&turn->cells);
+    free(turn->stroke);
+    pal_prepared_free(&turn->mesh);
+    free(turn);
+}
+
+/* ---- what was pointed at ---- */
+
+static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
+{
+    const double *a = c->x + 3 * (size_t)c->edge[edge].vertex[0], *b = c->x + 3 * (size_t)c->edge[edge].vertex[1];
+    double ab[3], ap[3], near[3];
+    pal_sub3(ab, b, a);
+    pal_sub3(ap, at, a);
+    double t = pal_dot3(ap, ab) / pal_dot3(ab, ab);
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    pal_copy3(near, a);
+    pal_axpy3(near, t, ab);
+    return pal_dist3(near, at);
+}
+
+/* the edge use of the face whose edge, or whose start, is nearest; -1: no such face */
+static int32_t nearest_use(const pal_cells *c, int32_t face, const double at[3], bool vertex)
+{
+    int32_t first, best = -1;
+    double least = INFINITY;
+    if (face < 0 || face >= c->n_face) return -1;
+    int32_t n = pal_cells_face_loop(c, face, &first);
+    for (int32_t use = first; use < first + n; use++) {
+        const double *x = c->x + 3 * (size_t)c->edge_use[use].vertex;
+        double off = vertex ? pal_dist3(x, at) : off_edge(c, c->edge_use[use].edge, at);
+        if (off < least) least = off, best = use;
+    }
+    return best;
+}
+
+int32_t pal_sculptor_near_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
+{
+    const pal_cells *c = &sculptor->now.cells;
+    int32_t use = nearest_use(c, face, at_m, false);
+    return use < 0 ? -1 : c->edge_use[use].edge;
+}
+
+int32_t pal_sculptor_near_vertex(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
+{
+    const pal_cells *c = &sculptor->now.cells;
+    int32_t use = nearest_use(c, face, at_m, true);
+    return use < 0 ? -1 : c->edge_use[use].vertex;
+}
+
+int32_t pal_sculptor_cell(const pal_sculptor *sculptor, int32_t face)
+{
+    const pal_cells *c = &sculptor->now.cells;
+    return face < 0 || face >= c->n_face ? -1 : c->face_use[c->face[face].use[0]].cell;
+}
