@@ -1,6 +1,9 @@
 /* Body arrays and sums over them. */
 #include "server/sim/body.h"
 
+#include "server/base/vec3.h"
+#include "server/sim/solid_mass.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -69,9 +72,21 @@ void pal_body_place(pal_body *body)
     pal_point_rows_place(body->embed, body->v, body->dv);
 }
 
+/* v' M~ v / 2 */
+static double coupled_kinetic_J(const pal_body *body)
+{
+    const pal_solid_mass *mass = body->solid_mass;
+    double sum = 0;
+    for (int i = 0; i < mass->n_point; i++)
+        for (int32_t k = mass->start[i]; k < mass->start[i + 1]; k++)
+            sum += 0.5 * mass->mass_kg[k] * pal_dot3(body->v + 3 * (size_t)i, body->v + 3 * (size_t)mass->point[k]);
+    return sum;
+}
+
 double pal_body_kinetic_J(const pal_body *body)
 {
     double sum = 0;
+    if (body->solid_mass) return coupled_kinetic_J(body);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         const double *v = body->v + 3 * i;

@@ -20,6 +20,7 @@
     X(inflate)                                                                                                         \
     X(verlet)                                                                                                          \
     X(rk4)                                                                                                             \
+    X(central_cg)                                                                                                      \
     X(implicit_euler)                                                                                                  \
     X(sdirk2)                                                                                                          \
     X(static_newton)                                                                                                   \

@@ -1,0 +1,460 @@
+/* Solver central_cg: central differences on the control points of a solid, the mass matrix by conjugate gradients (A
+ * 3.3, eq. 16-20; explicit in the stiffness, erratum A10). In steps of the velocity between the points of time,
+ * body->v, eq. 20 is (M~ + theta k D~) (v+ - v) = k (f~ - D~ v),    p+ = p + dt v+,    theta 1/2, k = dt, v being (p -
+ * p-) / dt. What is zero stays zero to the bit, and no digits go into where the body is. When the sub-step changes, k =
+ * (dt + dt-) / 2 and theta = dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and
+ * whenever the body was put somewhere else v is that at p and dt- = 0, the start p- = p - dt v + dt^2 a / 2.
+ *
+ * D~ is the rows' drag (hook `drag`) times M~, and where the samples' gamma/mu varies their matrix as well. Departure:
+ * theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round within a sub-step lets it creep.
+ * Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-), and end when |r| <= tolerance |k (f~ - D~ v)| (key,
+ * 1e-4). Key preconditioner: "factor" (default), a Cholesky factor of M~ (num/envelope.h), or "diagonal".
+ *
+ * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
+ * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
+ * have moved a fifth of an element against one another. Stiffness and damping that CONTACT rows say at nodes add their
+ * own largest eigenvalues. Held points' rows are dropped, led ones (held 2) keep their velocity and pull their
+ * neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
+ * afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
+#include "server/base/vec3.h"
+#include "server/num/conjugate.h"
+#include "server/num/envelope.h"
+#include "server/num/lanczos.h"
+#include "server/sim/effect_list.h"
+#include "server/sim/solid_mass.h"
+
+#include <string.h>
+
+typedef struct central {
+    const pal_solid *solid;
+    const pal_solid_mass *mass;
+    double safety, tolerance;
+    double dt_s; /* of the sub-step before; 0: none, v is that at p */
+    pal_conjugate cg;
+    double a, b;           /* its matrix is a M~ + b D~ on the free points, D~ that of the samples where it varies */
+    pal_envelope envelope; /* n 0: too large, or not asked for                                             */
+    bool factored;
+    uint8_t *fixed;   /* held when the preconditioner was made                     [n_dof]    */
+    double *inverse;  /* 1 / diagonal of M~, 0 for fixed points                    [n_dof]    */
+    double *change;   /* v+ - v                                                    [n_dof][3] */
+    double *was;      /* v of the sub-step before                                  [n_dof][3] */
+    uint64_t sampled; /* of the solid, when the preconditioner was made; 0: never            */
+    pal_solve_report report;
+
+    /* ---- the limit ---- */
+    pal_lanczos lanczos;
+    double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
+    double way_m;                 /* no point has moved farther against the others since it was taken */
+    bool known;                   /* rows2 holds, but for what has moved                             */
+    double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
+    pal_step *step;               /* that asks for the limit                                  */
+    const double *x;              /* the body's own                                                       */
+    double *at, *still, *g, *g0;  /* the body's x, v, g while it looks; g at the state itself  [n_dof][3]  */
+    double *d, *dv, *f;           /* its d, dv, f                                              [n_node][3] */
+    double *bound;                /* of CONTACT rows                                           [n_node]    */
+} central;
+
+static const double most_way_h = 0.2, most_move_S = 0.2;
+/* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
+static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
+/* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
+enum { MOST = 300, FIRST = 24, AGAIN = 6, MOST_ENTRY = 1 << 22 };
+
+/* ---- load ---- */
+
+/* n arrays of count numbers; false: no memory */
+static bool take(pal_arena *arena, size_t count, double **to[], int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!(*to[i] = PAL_NEW(arena, double, count))) return false;
+    return true;
+}
+
+static void multiply(void *user, const double *p, double *out);
+static void precondition(void *user, const double *r, double *out);
+static bool multiply_stiffness(void *user, const double *v, double *out);
+static bool solve_mass(void *user, const double *b, double *out);
+
+static pal_err allocate(central *row, const pal_body *body, pal_arena *arena)
+{
+    const size_t n3 = 3 * (size_t)body->n_dof;
+    double **of_dof[] = {&row->cg.r,      &row->cg.z,      &row->cg.p,      &row->cg.q,   &row->change,
+                         &row->was,       &row->at,        &row->still,     &row->g,      &row->g0,
+                         &row->lanczos.z, &row->lanczos.w, &row->lanczos.u, &row->inverse};
+    double **of_node[] = {&row->d, &row->dv, &row->f, &row->bound};
+    row->fixed = PAL_NEW(arena, uint8_t, body->n_dof);
+    row->lanczos.basis = PAL_NEW(arena, double, FIRST *n3);
+    if (!row->fixed || !row->lanczos.basis || !take(arena, n3, of_dof, 14) ||
+        !take(arena, 3 * (size_t)body->n_node, of_node, 4))
+        return PAL_ERR_MEMORY;
+    row->cg.n = row->lanczos.n = (int)n3;
+    row->cg.multiply = multiply, row->cg.precondition = precondition, row->cg.user = row;
+    row->lanczos.multiply = multiply_stiffness, row->lanczos.solve = solve_mass, row->lanczos.user = row;
+    return PAL_ERR_OK;
+}
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    double safety = 0.9, tolerance = 1e-4;
+    const char *preconditioner = "factor";
+    const pal_body *body = build->body;
+    PAL_TRY(pal_item_number(item, "safety", 0.01, 0.98, &safety, build->note));
+    PAL_TRY(pal_item_number(item, "tolerance", 1e-14, 0.1, &tolerance, build->note));
+    PAL_TRY(pal_item_text(item, "preconditioner", &preconditioner, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    bool factor = !strcmp(preconditioner, "factor");
+    if (!factor && strcmp(preconditioner, "diagonal"))
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
+                            item->path, preconditioner);
+    if (!body->solid || !body->solid_mass)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
+                            item->path, item->name);
+    central *row = PAL_NEW(build->arena, central, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->solid = body->solid, row->mass = body->solid_mass;
+    row->safety = safety, row->tolerance = tolerance;
+    PAL_TRY(allocate(row, body, build->arena));
+    if (factor) {
+        pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MOST_ENTRY,
+                                        build->arena, &row->envelope);
+        if (err && err != PAL_ERR_BUDGET) return err;
+    }
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+/* ---- the left side ---- */
+
+static void multiply(void *user, const double *p, double *out)
+{
+    const central *row = user;
+    const pal_solid_mass *m = row->mass;
+    for (int i = 0; i < m->n_point; i++) {
+        double x = 0, y = 0, z = 0, *to = out + 3 * (size_t)i;
+        for (int32_t k = m->start[i]; k < m->start[i + 1] && !row->fixed[i]; k++) {
+            const double *q = p + 3 * (size_t)m->point[k];
+            double w = row->a * m->mass_kg[k];
+            if (row->b != 0) w += row->b * m->damping_kg_s[k];
+            x += w * q[0], y += w * q[1], z += w * q[2];
+        }
+        to[0] = x, to[1] = y, to[2] = z;
+    }
+}
+
+static void precondition(void *user, const double *r, double *out)
+{
+    central *row = user;
+    if (row->factored) {
+        pal_envelope_solve(&row->envelope, r, out);
+        return;
+    }
+    for (int i = 0; i < row->mass->n_point; i++) pal_scale3(out + 3 * (size_t)i, row->inverse[i], r + 3 * (size_t)i);
+}
+
+/* the preconditioner again when masses or supports are others. True: it was */
+static bool renew(central *row, const pal_body *body)
+{
+    const pal_solid_mass *m = row->mass;
+    if (row->sampled == row->solid->sampled && !memcmp(row->fixed, body->held, (size_t)body->n_dof)) return false;
+    row->sampled = row->solid->sampled;
+    memcpy(row->fixed, body->held, (size_t)body->n_dof);
+    for (int i = 0; i < m->n_point; i++) {
+        int32_t k = m->start[i];
+        while (m->point[k] != i) k++;
+        row->inverse[i] = row->fixed[i] || !(m->mass_kg[k] > 0) ? 0 : 1 / m->mass_kg[k];
+    }
+    row->factored =
+        row->envelope.n > 0 && !pal_envelope_factor(&row->envelope, m->start, m->point, m->mass_kg, row->fixed);
+    return true;
+}
+
+/* x += A^-1 r from what is in cg.r, until |r| <= target; rows of fixed points are no rows */
+static void solve(central *row, double *x, double target)
+{
+    for (int i = 0; i < row->mass->n_point; i++)
+        if (row->fixed[i]) pal_set3(row->cg.r + 3 * (size_t)i, 0, 0, 0);
+    row->report.n_cg += pal_conjugate_run(&row->cg, x, target, 0, MOST);
+}
+
+/* ---- the limit ---- */
+
+static bool solve_mass(void *user, const double *b, double *out)
+{
+    central *row = user;
+    const size_t n_byte = sizeof(double) * (size_t)row->cg.n;
+    memcpy(row->cg.r, b, n_byte);
+    memset(out, 0, n_byte);
+    row->a = 1, row->b = 0;
+    solve(row, out, exact * sqrt(pal_sum_products(row->cg.n, b, b)));
+    return true;
+}
+
+static bool gather(central *row)
+{
+    pal_step *step = row->step;
+    const size_t used = step->scratch ? pal_arena_used(step->scratch) : 0;
+    const bool good = !pal_gather(step);
+    if (step->scratch) pal_arena_return(step->scratch, used);
+    return good;
+}
+
+/* out = K~ v of the FORCE rows, by the difference of forces over a small move along v */
+static bool multiply_stiffness(void *user, const double *v, double *out)
+{
+    central *row = user;
+    const int n = row->cg.n;
+    double most = 0;
+    for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
+    const double small = most > 0 ? small_h * row->step->body->h_m / most : 0, per = most > 0 ? 1 / small : 0;
+    for (int i = 0; i < n; i++) row->at[i] = row->x[i] + small * v[i];
+    if (!gather(row)) return false;
+    for (int i = 0; i < n; i++) out[i] = row->fixed[i / 3] ? 0 : per * (row->g0[i] - row->g[i]);
+    return true;
+}
+
+/* out = A' bound A v, bound being one number at each node */
+static bool multiply_bound(void *user, const double *v, double *out)
+{
+    central *row = user;
+    const pal_point_rows *rows = &row->solid->rows;
+    pal_point_rows_place(rows, v, row->f);
+    for (int i = 0; i < rows->n_row; i++) pal_scale3(row->f + 3 * (size_t)i, row->bound[i], row->f + 3 * (size_t)i);
+    memset(out, 0, sizeof *out * (size_t)row->cg.n);
+    pal_point_rows_pull(rows, row->f, out);
+    for (int i = 0; i < row->cg.n; i++) out[i] *= !row->fixed[i / 3];
+    return true;
+}
+
+/* adds any signs at the free points, of length `share` of the vector's own, 1 when there is none */
+static void add_any(const central *row, double share, double *z)
+{
+    const double norm = sqrt(pal_sum_products(row->cg.n, z, z)), each = share * norm / sqrt(row->cg.n);
+    for (int i = 0; i < row->cg.n; i++) {
+        uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
+        bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u, bits ^= bits >> 32;
+        if (!row->fixed[i / 3]) z[i] += (norm > 0 ? each : 1) * ((double)(bits >> 11) * 0x1p-52 - 1);
+    }
+}
+
+/* omega^2 of the FORCE rows on a body that stands still at its present place, all of whose arrays stay as they are */
+static double find_rows2(central *row, pal_step *step)
+{
+    pal_body *body = step->body;
+    const pal_body kept = *body;
+    const bool apart = step->drag_apart;
+    const int n_cg = row->report.n_cg;
+    double most = NAN;
+    row->step = step, row->x = body->x;
+    memcpy(row->at, body->x, sizeof(double) * (size_t)row->cg.n);
+    body->x = row->at, body->v = row->still, body->g = row->g;
+    body->d = row->d, body->dv = row->dv, body->f = row->f;
+    step->drag_apart = true;
+    if (gather(row)) {
+        memcpy(row->g0, row->g, sizeof(double) * (size_t)row->cg.n);
+        if (!row->known) memset(row->lanczos.z, 0, sizeof(double) * (size_t)row->cg.n);
+        add_any(row, 0.1, row->lanczos.z);
+        row->lanczos.multiply = multiply_stiffness;
+        most = pal_lanczos_run(&row->lanczos, near, row->known ? 3 : 8, row->known ? AGAIN : FIRST);
+    }
+    step->drag_apart = apart;
+    body->x = kept.x, body->v = kept.v, body->g = kept.g;
+    body->d = kept.d, body->dv = kept.dv, body->f = kept.f;
+    row->report.n_cg = n_cg;
+    return most > 0 || isnan(most) ? most : 0;
+}
+
+/* the largest eigenvalue of row->bound over mass */
+static double find_bound(central *row)
+{
+    /* the Ritz vector of the FORCE rows is kept for later */
+    double *z = row->lanczos.z, sum = 0;
+    const int n_cg = row->report.n_cg;
+    for (int i = 0; i < row->solid->rows.n_row; i++) sum += row->bound[i];
+    if (sum == 0) return 0;
+    row->lanczos.z = row->at;
+    memset(row->at, 0, sizeof(double) * (size_t)row->cg.n);
+    add_any(row, 0, row->at);
+    multiply_bound(row, row->at, row->g);
+    memcpy(row->at, row->g, sizeof(double) * (size_t)row->cg.n);
+    row->lanczos.multiply = multiply_bound;
+    const double most = pal_lanczos_run(&row->lanczos, near, 2, AGAIN);
+    row->lanczos.z = z;
+    row->report.n_cg = n_cg;
+    return most;
+}
+
+static void clear_bound(central *row)
+{
+    memset(row->bound, 0, sizeof(double) * (size_t)row->solid->rows.n_row);
+}
+
+/* contact comes and goes between steps without any point moving */
+static void find_contact(central *row, const pal_step *step)
+{
+    clear_bound(row);
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_effect *effect = step->contact[i].effect;
+        if (effect->stiffness) effect->stiffness(step->contact[i].self, step->body, row->bound);
+    }
+    row->contact2 = find_bound(row);
+    clear_bound(row);
+    for (int i = 0; i < step->n_contact + step->n_force; i++) {
+        const pal_row *of = i < step->n_contact ? &step->contact[i] : &step->force[i - step->n_contact];
+        if (of->effect->damping && !of->effect->drag) of->effect->damping(of->self, step->body, row->bound);
+    }
+    row->contact_1_s = find_bound(row);
+}
+
+static bool finite_state(const pal_body *body)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) sum += 0 * body->x[i] + 0 * body->v[i];
+    return sum == 0;
+}
+
+/* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */
+static double limit(void *self, pal_step *step)
+{
+    central *row = self;
+    const pal_body *body = step->body;
+    if (!finite_state(body)) return NAN;
+    if (renew(row, body)) row->known = false;
+    if (!row->known || !(row->way_m <= most_way_h * body->h_m)) {
+        row->rows2 = find_rows2(row, step);
+        row->known = true;
+        row->way_m = 0;
+    }
+    if (step->sub == 0) find_contact(row, step);
+    const double lambda = row->rows2 + row->contact2, c = row->contact_1_s;
+    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda));
+    return row->limit_s;
+}
+
+/* ---- a sub-step ---- */
+
+static double drag_rate(const pal_step *step)
+{
+    double rate = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
+    return rate;
+}
+
+/* what the velocities of fixed points change by is known; `was` is v before the change everywhere. True: it is not 0 */
+static bool begin_change(central *row, const pal_body *body)
+{
+    bool any = false;
+    memset(row->change, 0, sizeof(double) * (size_t)row->cg.n);
+    for (int i = 0; i < body->n_dof; i++) {
+        double *was = row->was + 3 * (size_t)i, *change = row->change + 3 * (size_t)i;
+        const double *v = body->v + 3 * (size_t)i;
+        if (body->held[i] == 2 && row->dt_s > 0)
+            pal_sub3(change, v, was);
+        else
+            pal_copy3(was, v);
+        if (body->held[i] == 1) pal_scale3(change, -1, v);
+        any |= change[0] != 0 || change[1] != 0 || change[2] != 0;
+    }
+    return any;
+}
+
+/* r -= (a M~ + b D~)(s was + t change); z and q are free */
+static void take_away(central *row, double a, double b, double s, double t)
+{
+    for (int i = 0; i < row->cg.n; i++) row->cg.z[i] = s * row->was[i] + t * row->change[i];
+    row->a = a, row->b = b;
+    multiply(row, row->cg.z, row->cg.q);
+    for (int i = 0; i < row->cg.n; i++) row->cg.r[i] -= row->cg.q[i];
+}
+
+static void find_change(central *row, const pal_step *step)
+{
+    const pal_body *body = step->body;
+    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s), rate = drag_rate(step),
+                 over = row->limit_s > 0 ? dt / row->limit_s : 0;
+    const double scale = step->heavy && over > 1 ? over * over : 1;
+    const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
+    const double most = k * (rate + (varies ? row->mass->damping_most_1_s : 0));
+    double theta = row->dt_s / (dt + row->dt_s);
+    if (most > 0) theta = fmax(theta, 1 - 1 / most);
+    const double a = scale + theta * k * rate, b = varies ? theta * k : 0;
+    for (int i = 0; i < row->cg.n; i++) row->cg.r[i] = k * body->g[i];
+    if (rate > 0 || moves) take_away(row, 1, 0, k * rate, a);
+    if (varies) take_away(row, 0, 1, k, b);
+    row->a = a, row->b = b;
+    for (int i = 0; i < row->cg.n; i++)
+        if (row->fixed[i / 3]) row->cg.r[i] = 0;
+    const double norm = sqrt(pal_sum_products(row->cg.n, row->cg.r, row->cg.r));
+    if (step->sub == 0) row->report.n_cg = 0;
+    solve(row, row->change, row->tolerance * norm);
+    row->report.residual = norm > 0 ? row->cg.residual / norm : 0;
+    row->report.converged = row->cg.residual <= row->tolerance * norm;
+}
+
+/* v+ and p+; the longest way of a point against the others, which is no number when a velocity is none */
+static double move(central *row, pal_body *body, double dt)
+{
+    const double most_m = most_move_S * body->size_m;
+    double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
+    for (int i = 0; i < body->n_dof; i++) {
+        double *v = body->v + 3 * (size_t)i;
+        /* led points have theirs */
+        if (body->held[i] == 1) pal_set3(v, 0, 0, 0);
+        if (!body->held[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
+        const double way = pal_norm3(v) * dt;
+        poison += 0 * way;
+        if (way > most_m) pal_scale3(v, most_m / way, v), body->n_clamped++;
+        pal_axpy3(body->x + 3 * (size_t)i, dt, v);
+        pal_copy3(row->was + 3 * (size_t)i, v);
+        pal_axpy3(mean, 1.0 / body->n_dof, v);
+    }
+    for (int i = 0; i < body->n_dof; i++) {
+        double from[3];
+        pal_sub3(from, body->v + 3 * (size_t)i, mean);
+        most2 = fmax(most2, pal_dot3(from, from));
+    }
+    return dt * sqrt(most2) + poison;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    central *row = self;
+    step->drag_apart = true;
+    PAL_TRY(pal_gather(step));
+    renew(row, step->body);
+    find_change(row, step);
+    row->way_m += move(row, step->body, step->dt_s);
+    row->dt_s = step->dt_s;
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    central *row = self;
+    (void)body;
+    row->dt_s = 0;
+    row->known = false;
+}
+
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+{
+    (void)body, (void)to, (void)note;
+    ((central *)self)->known = false;
+    return PAL_ERR_OK;
+}
+
+static void report(const void *self, pal_solve_report *out)
+{
+    const central *row = self;
+    *out = row->report;
+    out->factor_nonzeros = row->factored ? row->envelope.start[row->envelope.n] : 0;
+}
+
+const pal_effect pal_effect_central_cg = {.name = "central_cg",
+                                          .stage = PAL_STAGE_SOLVE,
+                                          .make = make,
+                                          .run = run,
+                                          .limit = limit,
+                                          .material = material,
+                                          .reset = reset,
+                                          .report = report};
