@@ -8,6 +8,7 @@
 static const pal_command_entry command[] = {
     {"serve", "run scenes and let browsers and devices touch them", command_serve},
     {"prepare", "turn a surface or a segmented scan into a scene that serve can run", command_prepare},
+    {"cells", "make and subdivide solids of control cells, named ones, primitives or files", command_cells},
     {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
     {"replay", "run a recorded input log again and compare the world's hashes", command_replay},
     {"solve", "solve a load case with finite elements and compare it with a reference", command_solve},

@@ -15,6 +15,7 @@ typedef struct pal_command_entry {
 
 int command_serve(int argc, char **argv);
 int command_prepare(int argc, char **argv);
+int command_cells(int argc, char **argv);
 int command_plan(int argc, char **argv);
 int command_replay(int argc, char **argv);
 int command_bench(int argc, char **argv);

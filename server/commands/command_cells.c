@@ -1,0 +1,376 @@
+/* `palpate cells`: control cells of a primitive, of a named solid or of a file, subdivided and written as cells or as
+ * their boundary, with the figures of Table 1 of paper A. */
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/mesh/cell_elements.h"
+#include "server/mesh/cell_file.h"
+#include "server/mesh/cell_models.h"
+#include "server/mesh/cell_shapes.h"
+#include "server/mesh/maccracken_joy.h"
+#include "server/mesh/mesh_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char about[] =
+    "Makes the cells of a solid for model subdivision (paper A), subdivides them and writes them to a file.\n"
+    "SHAPE is block, ring, tube or torus; or soccer, monster, block3, chair, block4, head, bridge, nozzle or kidney;\n"
+    "or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk get the cells, FILE.ply, .obj and .stl the\n"
+    "boundary. Without -o only the figures are shown; --list shows those of all named solids beside the paper's.\n";
+
+typedef struct wishes {
+    const char *file, *rule, *cells, *size;
+    int n_level;
+    bool list;
+} wishes;
+
+/* a solid, its control cells and what is known of them */
+typedef struct outcome {
+    char name[128];
+    const pal_cell_model *model; /* NULL: another shape */
+    pal_cells control;
+    pal_subdivision made;
+    bool has_elements; /* cells that are no hexahedra have none before the first level */
+    pal_cell_elements elements;
+    pal_cells_topology topology;
+    double control_m3, volume_m3, size_m[3];
+    int n_boundary_vertex, n_triangle;
+} outcome;
+
+static void free_outcome(outcome *o)
+{
+    pal_cells_free(&o->control);
+    pal_subdivision_free(&o->made);
+    pal_cell_elements_free(&o->elements);
+}
+
+/* ---- shapes ---- */
+
+/* a primitive: its numbers of cells and sizes, with what they are when not given */
+typedef struct primitive {
+    const char *name, *cells_are, *sizes_are;
+    int n_count, n_size;
+    double count[3], size_m[3];
+} primitive;
+
+static const primitive primitive_list[] = {
+    {"block", "along x, y and z", "along x, y and z", 3, 3, {3, 3, 3}, {0.1, 0.1, 0.1}},
+    {"ring", "around", "radius and thickness", 1, 2, {8}, {0.05, 0.02}},
+    {"tube",
+     "around, through the wall and along",
+     "inner radius, outer radius and length",
+     3,
+     3,
+     {8, 1, 4},
+     {0.02, 0.03, 0.1}},
+    {"torus", "around and across the middle", "radius and radius of the tube", 2, 2, {8, 1}, {0.05, 0.02}},
+};
+enum { N_PRIMITIVE = sizeof primitive_list / sizeof primitive_list[0] };
+
+static const primitive *find_primitive(const char *name)
+{
+    for (int k = 0; k < N_PRIMITIVE; k++)
+        if (!strcmp(name, primitive_list[k].name)) return &primitive_list[k];
+    return NULL;
+}
+
+/* exactly n numbers with commas between, whole if asked; false: text is not that */
+static bool read_list(const char *text, int n, bool whole, double *out)
+{
+    for (int k = 0; k < n; k++) {
+        char *end;
+        out[k] = strtod(text, &end);
+        if (end == text || !(fabs(out[k]) <= 1e9) || (whole && out[k] != floor(out[k]))) return false;
+        if (*end != (k + 1 < n ? ',' : 0)) return false;
+        text = end + 1;
+    }
+    return true;
+}
+
+static pal_err make_primitive(const primitive *p, const double count[3], const double size_m[3], pal_cells *out,
+                              pal_note *note)
+{
+    const int32_t n[3] = {(int32_t)count[0], (int32_t)count[1], (int32_t)count[2]};
+    switch (p - primitive_list) {
+    case 0:
+        return pal_cells_block(n, size_m, out, note);
+    case 1:
+        return pal_cells_ring(n[0], size_m[0], size_m[1], out, note);
+    case 2:
+        return pal_cells_tube(n, size_m[0], size_m[1], size_m[2], out, note);
+    default:
+        return pal_cells_torus(n[0], n[1], size_m[0], size_m[1], out, note);
+    }
+}
+
+/* ---- figures ---- */
+
+static pal_err measure(outcome *o, pal_note *note)
+{
+    const pal_cells *c = &o->made.cells;
+    pal_surface surface;
+    o->control_m3 = pal_cells_volume(&o->control, NULL);
+    o->volume_m3 = pal_cells_volume(c, NULL);
+    PAL_TRY(pal_cells_find_topology(c, &o->topology));
+    PAL_TRY(pal_cells_boundary(c, &surface, NULL, NULL));
+    double low[3], high[3];
+    pal_surface_box(&surface, low, high);
+    for (int a = 0; a < 3; a++) o->size_m[a] = high[a] - low[a];
+    o->n_triangle = surface.n_tri;
+    o->n_boundary_vertex = surface.n_vertex;
+    pal_surface_free(&surface);
+    pal_err err = pal_cell_elements_make(c, &o->elements, o->made.n_level ? note : NULL);
+    o->has_elements = !err;
+    return err == PAL_ERR_REFUSED && o->made.n_level == 0 ? PAL_ERR_OK : err;
+}
+
+static pal_err subdivide(outcome *o, int n_level, pal_subdivision_rule rule, pal_note *note)
+{
+    const pal_subdivision_options options = {.n_level = n_level, .rule = rule};
+    pal_note why = {""};
+    pal_err err = pal_subdivision_make(&o->control, &options, &o->made, &why);
+    if (!err) err = measure(o, &why);
+    return err ? pal_note_set(note, err, "%s: %s", o->name, why.text[0] ? why.text : pal_err_text(err)) : err;
+}
+
+static cJSON *as_json(const outcome *o, const char *rule)
+{
+    const pal_cells *c = &o->made.cells;
+    cJSON *to = cJSON_CreateObject();
+    cJSON_AddBoolToObject(to, "ok", true);
+    cJSON_AddStringToObject(to, "name", o->name);
+    cJSON_AddNumberToObject(to, "levels", o->made.n_level);
+    cJSON_AddStringToObject(to, "rule", rule);
+    cJSON_AddNumberToObject(to, "control_cells", o->control.n_cell);
+    cJSON_AddNumberToObject(to, "control_vertices", o->control.n_vertex);
+    cJSON_AddNumberToObject(to, "cells", c->n_cell);
+    cJSON_AddNumberToObject(to, "vertices", c->n_vertex);
+    if (o->has_elements) {
+        static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "linear_percent", "pyramid_percent"};
+        cJSON_AddNumberToObject(to, "elements", pal_cell_elements_count(&o->elements));
+        for (int k = 0; k < PAL_CELL_KINDS; k++)
+            cJSON_AddNumberToObject(to, kind[k], pal_cell_elements_percent(&o->elements, (pal_cell_kind)k));
+    }
+    if (o->model && o->model->n_element) {
+        cJSON *paper = cJSON_AddObjectToObject(to, "paper");
+        cJSON_AddNumberToObject(paper, "levels", o->model->n_level);
+        cJSON_AddNumberToObject(paper, "control_cells", o->model->n_cell);
+        cJSON_AddNumberToObject(paper, "elements", o->model->n_element);
+        cJSON_AddItemToObject(paper, "percent", cJSON_CreateIntArray(o->model->percent, PAL_CELL_KINDS));
+    }
+    cJSON_AddNumberToObject(to, "pieces", o->topology.n_piece);
+    cJSON_AddNumberToObject(to, "genus", o->topology.genus);
+    cJSON_AddNumberToObject(to, "cavities", o->topology.n_cavity);
+    cJSON_AddNumberToObject(to, "pinched_edges", c->n_pinched_edge);
+    cJSON_AddNumberToObject(to, "pinched_vertices", c->n_pinched_vertex);
+    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->size_m, 3));
+    cJSON_AddNumberToObject(to, "control_volume_m3", o->control_m3);
+    cJSON_AddNumberToObject(to, "volume_m3", o->volume_m3);
+    cJSON_AddNumberToObject(to, "boundary_vertices", o->n_boundary_vertex);
+    cJSON_AddNumberToObject(to, "boundary_triangles", o->n_triangle);
+    cJSON_AddNumberToObject(to, "bytes", (double)o->made.n_byte);
+    return to;
+}
+
+static const char *plural(int64_t n)
+{
+    return n == 1 ? "" : "s";
+}
+
+static void print(const outcome *o, const char *rule)
+{
+    const pal_cells *c = &o->made.cells;
+    printf("%s: %d control cell%s, %.0f x %.0f x %.0f mm\n", o->name, o->control.n_cell, plural(o->control.n_cell),
+           1e3 * o->size_m[0], 1e3 * o->size_m[1], 1e3 * o->size_m[2]);
+    printf("%d level%s of %s: %d cell%s, %d vertices\n", o->made.n_level, plural(o->made.n_level), rule, c->n_cell,
+           plural(c->n_cell), c->n_vertex);
+    if (o->has_elements)
+        printf("%d finite element%s: %.1f %% cubic, %.1f %% linear, %.1f %% pyramids\n",
+               pal_cell_elements_count(&o->elements), plural(pal_cell_elements_count(&o->elements)),
+               pal_cell_elements_percent(&o->elements, PAL_CELL_CUBIC),
+               pal_cell_elements_percent(&o->elements, PAL_CELL_HEX),
+               pal_cell_elements_percent(&o->elements, PAL_CELL_PYRAMID));
+    else
+        printf("no finite elements yet: some cells are no hexahedra, a level of subdivision makes them so\n");
+    printf("%d piece%s, genus %d, %d cavit%s", o->topology.n_piece, plural(o->topology.n_piece), o->topology.genus,
+           o->topology.n_cavity, o->topology.n_cavity == 1 ? "y" : "ies");
+    if (c->n_pinched_edge + c->n_pinched_vertex > 0)
+        printf(", pinched in %d edges and %d vertices", c->n_pinched_edge, c->n_pinched_vertex);
+    printf("; %.6g ml of the control cells' %.6g ml; %.1f MB\n", 1e6 * o->volume_m3, 1e6 * o->control_m3,
+           1e-6 * (double)o->made.n_byte);
+}
+
+/* ---- --list ---- */
+
+/* a row of Table 1: ours, then the paper's in brackets */
+static void print_row(const outcome *o)
+{
+    const pal_cell_model *m = o->model;
+    const pal_cell_elements *e = &o->elements;
+    char paper[64] = "-";
+    if (m->n_element)
+        snprintf(paper, sizeof paper, "%d: %d %d %d", m->n_element, m->percent[0], m->percent[1], m->percent[2]);
+    printf("%-8s %6d %6d %6d %5.1f %5.1f %5.1f   %-16s %5d %10.1f %7.2f   %s\n", m->name, o->made.n_level,
+           o->control.n_cell, pal_cell_elements_count(e), pal_cell_elements_percent(e, PAL_CELL_CUBIC),
+           pal_cell_elements_percent(e, PAL_CELL_HEX), pal_cell_elements_percent(e, PAL_CELL_PYRAMID), paper,
+           o->topology.genus, 1e6 * o->volume_m3, 1e-6 * (double)o->made.n_byte, m->about);
+}
+
+static int list_models(const pal_flag_common *common, pal_subdivision_rule rule, const char *rule_name)
+{
+    cJSON *all = cJSON_CreateObject(), *list = NULL;
+    pal_note note = {""};
+    pal_err err = PAL_ERR_OK;
+    cJSON_AddBoolToObject(all, "ok", true);
+    list = cJSON_AddArrayToObject(all, "models");
+    if (!common->json && !common->quiet)
+        printf("%-8s %6s %6s %6s %5s %5s %5s   %-16s %5s %10s %7s\n", "name", "levels", "#CC", "#FE", "%BE", "%LE",
+               "%PE", "Table 1 of A", "genus", "volume ml", "MB");
+    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) {
+        outcome o = {.model = &pal_cell_model_list[k]};
+        snprintf(o.name, sizeof o.name, "%s", o.model->name);
+        err = pal_cell_model_make(o.model, &o.control, &note);
+        if (!err) err = subdivide(&o, o.model->n_level, rule, &note);
+        if (!err && common->json) cJSON_AddItemToArray(list, as_json(&o, rule_name));
+        if (!err && !common->json && !common->quiet) print_row(&o);
+        free_outcome(&o);
+    }
+    if (!err && common->json) return pal_report_json(common, all);
+    cJSON_Delete(all);
+    return err ? pal_report_refusal(common, err, &note) : 0;
+}
+
+/* ---- the command ---- */
+
+static int usage(const pal_flag_common *common, const char *sentence)
+{
+    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
+    return 2;
+}
+
+static bool ends_in(const char *path, const char *const *end)
+{
+    for (size_t n = strlen(path); *end; end++)
+        if (n > strlen(*end) && !strcmp(path + n - strlen(*end), *end)) return true;
+    return false;
+}
+
+static const char *const cell_end[] = {".palcells", ".vtk", NULL};
+static const char *const surface_end[] = {".ply", ".obj", ".stl", NULL};
+
+static pal_err write_file(const outcome *o, const char *path, pal_note *note)
+{
+    pal_surface surface;
+    if (ends_in(path, cell_end)) return pal_cell_file_save(&o->made.cells, path, note);
+    PAL_TRY(pal_cells_boundary(&o->made.cells, &surface, NULL, NULL));
+    pal_err err = pal_mesh_file_write(path, &surface, note);
+    pal_surface_free(&surface);
+    return err;
+}
+
+static int run(const pal_flag_common *common, outcome *o, const wishes *wish, pal_subdivision_rule rule)
+{
+    pal_note note = {""};
+    pal_err err = subdivide(o, wish->n_level, rule, &note);
+    if (!err && wish->file) err = write_file(o, wish->file, &note);
+    if (err) return pal_report_refusal(common, err, &note);
+    if (common->json) {
+        cJSON *object = as_json(o, wish->rule);
+        if (wish->file) cJSON_AddStringToObject(object, "file", wish->file);
+        return pal_report_json(common, object);
+    }
+    if (common->quiet) return 0;
+    print(o, wish->rule);
+    if (wish->file && ends_in(wish->file, cell_end)) printf("wrote the cells to %s\n", wish->file);
+    if (wish->file && ends_in(wish->file, surface_end))
+        printf("wrote the boundary, %d triangles, to %s\n", o->n_triangle, wish->file);
+    return 0;
+}
+
+/* -1: the control cells are there, else the exit code */
+static int make_control(const pal_flag_common *common, const char *shape, const wishes *wish, outcome *o)
+{
+    const primitive *p = find_primitive(shape);
+    char sentence[200];
+    pal_note note = {""};
+    pal_err err;
+    snprintf(o->name, sizeof o->name, "%.100s", shape);
+    o->model = pal_cell_model_find(shape);
+    if (p) {
+        double count[3], size_m[3];
+        memcpy(count, p->count, sizeof count);
+        memcpy(size_m, p->size_m, sizeof size_m);
+        if (wish->cells && !read_list(wish->cells, p->n_count, true, count)) {
+            snprintf(sentence, sizeof sentence, "--cells: \"%.40s\" is not %d whole number%s with commas between (%s)",
+                     wish->cells, p->n_count, plural(p->n_count), p->cells_are);
+            return usage(common, sentence);
+        }
+        if (wish->size && !read_list(wish->size, p->n_size, false, size_m)) {
+            snprintf(sentence, sizeof sentence, "--size-m: \"%.40s\" is not %d numbers with commas between (%s)",
+                     wish->size, p->n_size, p->sizes_are);
+            return usage(common, sentence);
+        }
+        err = make_primitive(p, count, size_m, &o->control, &note);
+    } else if (wish->cells || wish->size) {
+        return usage(common, wish->cells ? "--cells: only goes with block, ring, tube and torus"
+                                         : "--size-m: only goes with block, ring, tube and torus");
+    } else if (o->model) {
+        err = pal_cell_model_make(o->model, &o->control, &note);
+    } else if (ends_in(shape, cell_end) || strchr(shape, '/')) {
+        err = pal_cell_file_load(shape, &o->control, &note);
+    } else {
+        snprintf(sentence, sizeof sentence, "there is no shape \"%.60s\"", shape);
+        return usage(common, sentence);
+    }
+    return err ? pal_report_refusal(common, err, &note) : -1;
+}
+
+static wishes wish = {.rule = "maccracken_joy"};
+static const pal_flag flag[] = {
+    {"-o", "FILE", PAL_FLAG_TEXT, &wish.file, 0, 0, "file to write to, .palcells, .vtk, .ply, .obj or .stl"},
+    {"--levels", "N", PAL_FLAG_COUNT, &wish.n_level, 0, PAL_SUBDIVISION_MOST,
+     "levels of subdivision, each with eight times the cells (0)"},
+    {"--rule", "WORD", PAL_FLAG_TEXT, &wish.rule, 0, 0, "maccracken_joy or averaging (maccracken_joy)"},
+    {"--cells", "N,...", PAL_FLAG_TEXT, &wish.cells, 0, 0,
+     "numbers of cells: of block along x, y, z (3,3,3); of ring around (8); of tube around,\nthrough the wall, along "
+     "(8,1,4); of torus around, across the middle (8,1)"},
+    {"--size-m", "M,...", PAL_FLAG_TEXT, &wish.size, 0, 0,
+     "of block along x, y, z (0.1,0.1,0.1); of ring radius, thickness (0.05,0.02); of tube\ninner radius, outer "
+     "radius, "
+     "length (0.02,0.03,0.1); of torus radius, tube's radius (0.05,0.02)"},
+    {"--list", NULL, PAL_FLAG_SWITCH, &wish.list, 0, 0,
+     "no SHAPE: the named solids at the levels of Table 1 of paper A, beside its figures"},
+};
+
+int command_cells(int argc, char **argv)
+{
+    const pal_flag_table table = {.usage = "cells SHAPE [-o FILE] [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .most_operand = 1};
+    pal_flag_common common;
+    const char *word[1] = {NULL};
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    if (code >= 0) return code;
+    pal_subdivision_rule rule = PAL_SUBDIVISION_MACCRACKEN_JOY;
+    if (!strcmp(wish.rule, "averaging"))
+        rule = PAL_SUBDIVISION_AVERAGING;
+    else if (strcmp(wish.rule, "maccracken_joy") != 0)
+        return usage(&common, "--rule: is not maccracken_joy or averaging");
+    if (wish.list == (n > 0)) return usage(&common, "needs either a SHAPE or --list");
+    if (wish.list) {
+        if (wish.file || wish.cells || wish.size || wish.n_level)
+            return usage(&common, "--list goes with --rule, --json and --quiet only");
+        return list_models(&common, rule, wish.rule);
+    }
+    if (wish.file && !ends_in(wish.file, cell_end) && !ends_in(wish.file, surface_end))
+        return usage(&common, "-o: is not a .palcells, .vtk, .ply, .obj or .stl file");
+    outcome o = {.model = NULL};
+    code = make_control(&common, word[0], &wish, &o);
+    if (code < 0) code = run(&common, &o, &wish, rule);
+    free_outcome(&o);
+    return code;
+}
