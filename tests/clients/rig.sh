@@ -66,7 +66,7 @@ await() {
 # start_server [flags]: serves $scene, the ball when it is not set; sets $server_pid, $port, $url
 start_server() {
     : >"$work/serve.out"
-    timeout 120 "$bin/palpate" serve "${scene:-$work/ball.json}" --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
+    timeout 280 "$bin/palpate" serve "${scene:-$work/ball.json}" --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
     pids="$pids $!"
     server_job=$!
     if ! await 60 grep -q '"port"' "$work/serve.out"; then
@@ -82,9 +82,21 @@ start_server() {
 # json KEY FILE: first number (or word) of that key
 json() { tr ',{}' '\n\n\n' <"$2" | sed -n "s/^\"$1\":\"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p" | head -1; }
 
+# stop JOB: ends what runs under a `timeout`, which hands the signal on; its exit code
+stop() {
+    kill "$1" 2>/dev/null
+    wait "$1" 2>/dev/null
+}
+
+# late FILE: the JSON of a bridge says that its servo loop was late and gave no force, or less, for that
+late() { [ "$(json watchdog_stops "$1")" != 0 ] || ! grep -q '"forces":"full"' "$1"; }
+
+# holds ACTUAL OPERATOR WANTED: compares numbers; nothing is no number
+holds() { [ -n "$1" ] && awk -v a="$1" -v b="$3" "BEGIN { exit !(a $2 b) }"; }
+
 # check SENTENCE ACTUAL OPERATOR WANTED: compares numbers
 check() {
-    if [ -n "$2" ] && awk -v a="$2" -v b="$4" "BEGIN { exit !(a $3 b) }"; then
+    if holds "$2" "$3" "$4"; then
         passed=$((passed + 1))
         echo "ok   $1 ($2 $3 $4)"
     else
@@ -96,6 +108,7 @@ check() {
 finish() {
     # a sanitizer that speaks on any stderr is a failure
     check "no sanitizer has spoken" "$(cat "$work"/*.err 2>/dev/null | grep -c 'Sanitizer')" == 0
+    if [ "$failed" -gt 0 ]; then tail -n 5 "$work"/*.err; fi
     echo "$passed passed, $failed failed"
     [ "$failed" -eq 0 ]
     exit
