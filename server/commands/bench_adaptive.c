@@ -7,11 +7,11 @@
  *     (Fig. 11). The paper does not give its constants; ours: E 5 kPa, a wall of 3 mm that bears the mass of what it
  *     encloses, 1000 kg/m^3, anchors fixed in space, thresholds from size and stiffness. Every body has a look at the
  *     press for 0.1 ms before the run, so that what adapts is there when it begins. `off` is how far the pressed vertex
- *     strays from its way in the wholly refined body, at most, in parts of that way (Fig. 12).
- * (b) a hollow ball of 0.2 m with four levels, the finest of 28,674 vertices, on which a palm of 7 cm rests: once its
- *     place is refined, against all of it refined.
- * (c) the same with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms.
- * (d) there, what one switch costs: a face split or joined, and what the rows have to do anew in the step after it.
+ *     strays from its way in the wholly refined body, at most, in parts of that way (Fig. 12). A picture shows those
+ * ways over time, of our own two surfaces (Figs. 10 and 12). (b) a hollow ball of 0.2 m with four levels, the finest of
+ * 28,674 vertices, on which a palm of 7 cm rests: once its place is refined, against all of it refined. (c) the same
+ * with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms. (d) there, what one switch
+ * costs: a face split or joined, and what the rows have to do anew in the step after it.
  *
  * The press is spread over the nodes of a patch by their masses and a smooth bump: the same pressure on every level. */
 #include "server/commands/commands.h"
@@ -19,6 +19,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/commands/median.h"
+#include "server/lab/plot.h"
 #include "server/mesh/stomach.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/shell.h"
@@ -489,12 +490,37 @@ static pal_err run_tables(results *out, pal_note *note)
     return err;
 }
 
-int bench_adaptive(bool json)
+/* the way of the pressed vertex over time, of what was made here */
+static pal_err draw_ways(const results *r, const char *path, pal_note *note)
+{
+    static const char *const name[2][KINDS] = {{"sphere, coarse", "sphere, refined", "sphere, adaptive"},
+                                               {"stomach, coarse", "stomach, refined", "stomach, adaptive"}};
+    static double time_s[TABLE_STEPS], way_mm[2 * KINDS][TABLE_STEPS];
+    pal_plot plot = {.title = "The vertex that is pressed for 2 s and then let go",
+                     .x_label = "time, s",
+                     .y_label = "displacement, mm"};
+    for (int i = 0; i < TABLE_STEPS; i++) time_s[i] = (i + 1) * frame_s;
+    for (int t = 0, body = 0; t < r->n_table && body < 2; t++) {
+        const table_row *row = &r->table[t];
+        if (strcmp(row->source, "procedural") != 0) continue;
+        for (int k = 0; k < KINDS; k++) {
+            double *y = way_mm[plot.n_curve];
+            for (int i = 0; i < row->n_way; i++) y[i] = 1e3 * row->way_m[k][i];
+            plot.curve[plot.n_curve++] = (pal_curve){
+                .name = name[body][k], .n = row->n_way, .x = time_s, .y = y, .bare = true, .dashed = k == ADAPTIVE};
+        }
+        body++;
+    }
+    return pal_plot_write(&plot, path, note);
+}
+
+int bench_adaptive(bool json, const char *picture)
 {
     static results r;
     pressed ball[2] = {{.name = NULL}};
     pal_note note = {""};
     pal_err err = run_tables(&r, &note);
+    if (!err && picture) err = draw_ways(&r, picture, &note);
     if (!err) err = make_ball(1, 0.035, 0.12, &ball[0], &note);
     if (!err) err = run_palm(&ball[0], &r.palm, &note);
     if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], &note);

@@ -7,6 +7,9 @@
 
 int command_bench(int argc, char **argv)
 {
+    const char *picture = NULL;
+    const pal_flag flag[] = {{"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
+                              "adaptive: where the pressed vertex is over time (paper C Figs. 10 and 12)"}};
     const pal_flag_table table = {
         .usage =
             "bench mesh [SURFACE.ply] | springs | adaptive | fem | calibrate [FOLDER] | protocol | latency [flags]",
@@ -20,6 +23,8 @@ int command_bench(int argc, char **argv)
                  "annealing (FOLDER: deploy/problems)\n"
                  "  protocol  encoding and decoding of frames\n"
                  "  latency   from a pose put into a session to the frame that shows it\n",
+        .flag = flag,
+        .n_flag = sizeof flag / sizeof flag[0],
         .least_operand = 1,
         .most_operand = 2};
     pal_flag_common common;
@@ -31,12 +36,16 @@ int command_bench(int argc, char **argv)
         fprintf(stderr, "palpate bench: \"%.60s\" is one word too many (see palpate bench --help)\n", word[1]);
         return 2;
     }
+    if (picture && strcmp(word[0], "adaptive") != 0) {
+        fprintf(stderr, "palpate bench: --picture belongs to adaptive (see palpate bench --help)\n");
+        return 2;
+    }
     /* a quiet bench is one that only has to run */
     if (common.quiet && !common.json && !freopen("/dev/null", "w", stdout)) return 3;
     if (mesh) return bench_mesh(word[1], common.json);
     if (calibrate) return bench_calibrate(word[1], common.json);
     if (!strcmp(word[0], "springs")) return bench_springs(common.json);
-    if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json);
+    if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json, picture);
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);

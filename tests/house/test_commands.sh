@@ -529,6 +529,8 @@ run replay one
 refused 2 "a word is missing"
 run bench nothing
 refused 2 'no bench "nothing"'
+run bench mesh --picture x.svg
+refused 2 '--picture belongs to adaptive'
 run serve box.obj --port 70000
 refused 2 "--port: 70000 is outside 0 .. 65535"
 check "a folder was made" no_such x
