@@ -1,2 +1,3 @@
 pal_fuzz(prepared LINK pal_mesh)
 pal_fuzz(cell_file LINK pal_mesh)
+pal_fuzz(cell_edit LINK pal_mesh)
