@@ -295,6 +295,7 @@ static void find_contact(central *row, const pal_step *step)
     for (int i = 0; i < step->n_contact; i++) {
         const pal_effect *effect = step->contact[i].effect;
         if (effect->stiffness) effect->stiffness(step->contact[i].self, step->body, row->bound);
+        if (effect->wanted) effect->wanted(step->contact[i].self, step->body, row->bound);
     }
     row->contact2 = find_bound(row);
     clear_bound(row);
@@ -387,6 +388,8 @@ static void find_change(central *row, const pal_step *step)
     const double norm = sqrt(pal_sum_products(row->cg.n, row->cg.r, row->cg.r));
     if (step->sub == 0) row->report.n_cg = 0;
     solve(row, row->change, row->tolerance * norm);
+    /* forces that are no numbers give velocities that are none */
+    for (int i = 0; i < row->cg.n && !isfinite(norm); i++) row->change[i] = NAN;
     row->report.residual = norm > 0 ? row->cg.residual / norm : 0;
     row->report.converged = row->cg.residual <= row->tolerance * norm;
 }
