@@ -103,6 +103,9 @@ typedef struct pal_effect {
      * current state, [n_dof] each: bound_N_m, bound_Ns_m */
     void (*stiffness)(void *self, const pal_body *body, double *bound_N_m);
     void (*damping)(void *self, const pal_body *body, double *bound_Ns_m);
+    /* CONTACT, on bodies whose points carry nodes: += the row sums at nodes, [n_node], of the stiffness that the row
+     * would like to have in the coming step; central_cg makes its sub-steps short enough for it */
+    void (*wanted)(void *self, const pal_body *body, double *bound_N_m);
     /* FORCE: the row is nothing but -m rate v; the rate, 1/s, for solvers that apply it implicitly (drag_apart) */
     double (*drag)(void *self);
     /* SOLVE: largest stable sub-step at the current state, s; NaN: the state is not finite. Asked before every

@@ -448,17 +448,25 @@ static double point_motion(const pal_touch *touch, const pal_body *body, const p
     return sum;
 }
 
+double pal_touch_bound(const pal_touch *touch, const pal_body *body, int point, double k_N_m, double *bound_N_m)
+{
+    int32_t vertex[3];
+    double share[3], rate = 0;
+    int n = corners(touch, point, vertex, share);
+    for (int c = 0; c < n; c++) {
+        int32_t node = body->shown_node[vertex[c]];
+        if (bound_N_m) bound_N_m[node] += k_N_m * share[c];
+        rate += k_N_m * share[c] * pal_body_ease(body, node);
+    }
+    return rate;
+}
+
 /* the same where points carry the nodes: the sum of the eigenvalues is no less than the largest, and what a point
  * between nodes moves is no more than their mean */
 static double sum_of_rates(const pal_touch *touch, const pal_body *body, const pal_contact *contact, int n)
 {
-    int32_t vertex[3];
-    double share[3], rate = 0;
-    for (int i = 0; i < n; i++) {
-        int m = corners(touch, contact[i].point, vertex, share);
-        for (int c = 0; c < m; c++)
-            rate += contact[i].k_N_m * share[c] * pal_body_ease(body, body->shown_node[vertex[c]]);
-    }
+    double rate = 0;
+    for (int i = 0; i < n; i++) rate += pal_touch_bound(touch, body, contact[i].point, contact[i].k_N_m, NULL);
     return rate;
 }
 
@@ -502,6 +510,21 @@ double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_cont
         for (int i = 0; i < m; i++) motion[i] *= scale;
     }
     return rate;
+}
+
+pal_err pal_touch_young(const pal_touch *touch, const pal_body *body, const pal_body_def *def, pal_arena *arena,
+                        float **out)
+{
+    *out = NULL;
+    if (def->n_region == 0 && def->n_stroke == 0) return PAL_ERR_OK;
+    *out = PAL_NEW(arena, float, touch->n_vertex);
+    if (!*out) return PAL_ERR_MEMORY;
+    for (int i = 0; i < touch->n_vertex; i++) {
+        pal_material at;
+        pal_material_painted(def, body->surface->x + 3 * (size_t)i, &at);
+        if (at.young_Pa != def->material.young_Pa) (*out)[i] = (float)at.young_Pa;
+    }
+    return PAL_ERR_OK;
 }
 
 bool pal_touch_share(pal_touch *touch, const pal_body *body, const pal_contact *a, int n_a, const pal_contact *b,

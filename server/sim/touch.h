@@ -17,6 +17,7 @@
 #ifndef PAL_SIM_TOUCH_H
 #define PAL_SIM_TOUCH_H
 #include "server/sim/body.h"
+#include "server/sim/def.h"
 #include "server/sim/tools.h"
 #include "server/sim/turn.h"
 
@@ -93,6 +94,8 @@ bool pal_touch_nearest(const pal_touch *touch, const pal_body *body, const doubl
  * nearly the vector looked for, since all points are pushed the same way. Where points carry the nodes
  * (pal_body.embed), a bound of it: the sum of k times the ease of each point. */
 double pal_touch_stiffest(pal_touch *touch, const pal_body *body, const pal_contact *contact, int n);
+/* where points carry the nodes: bound [n_node] += row sums of the stiffness k of a point; returns k times its ease */
+double pal_touch_bound(const pal_touch *touch, const pal_body *body, int point, double k_N_m, double *bound_N_m);
 /* true when two lists of contacts press on some common slot */
 bool pal_touch_share(pal_touch *touch, const pal_body *body, const pal_contact *a, int n_a, const pal_contact *b,
                      int n_b);
@@ -112,6 +115,11 @@ int pal_touch_bearers(const pal_touch *touch, const pal_body *body, int point, i
 int pal_touch_slot_node(const pal_body *body, int slot);
 /* how the slot's frame turns at the state of the last pal_touch_update; body has a skin */
 const pal_turn *pal_touch_turning(pal_touch *touch, const pal_body *body, int slot);
+
+/* Young's modulus, Pa, at shown vertices where regions or strokes make it another than the body's, else 0 [n_vertex];
+ * NULL: it is that nowhere. MEMORY. [load] */
+pal_err pal_touch_young(const pal_touch *touch, const pal_body *body, const pal_body_def *def, pal_arena *arena,
+                        float **out);
 
 /* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */
 int pal_touch_nodes(const pal_body *body, int vertex, int32_t *node, double *weight);

@@ -22,8 +22,9 @@
  * once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force does not rise
  * in that moment, and grows again in EASE_S.
  *
- * Where points carry the nodes (pal_body.embed) central_cg steps up to 0.9 of its limit, a <= 3.3, so that contact
- * keeps to alpha 0.3; its bound is above the eigenvalue, as it sums over the points that are touched.
+ * Where points carry the nodes (pal_body.embed) k is that of implicit solvers below, and central_cg is told in time
+ * what the points near a tool want (pal_effect.wanted), so that its sub-steps allow it. Beyond that alpha is 0.3; the
+ * bound is the sum of the points' own, which is above their eigenvalue.
  *
  * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
@@ -55,8 +56,9 @@
 #define STIFFER     15.0
 #define NEAR_RADII  0.125
 #define STILL_RADII 0.01
-/* points so far from the sphere can come to touch in a sub-step */
+/* points so far from the sphere can come to touch in a sub-step, with an implicit and an explicit solver */
 #define COMING_RADII 1.0
+#define COMING_NEAR  0.25
 /* and it grows by STIFFEN a step while the proxy is kept from its tool, down again by SOFTEN while contact is shallow
  */
 #define STIFFEN       1.3
@@ -93,6 +95,7 @@ typedef struct holder {
     double slip[3];  /* sideways way of the tool over tissue that friction still holds, m */
     double raw_N;    /* normal force of the last sub-step before caps */
     bool renewed;    /* other triangles are drawn since the step before */
+    double told;     /* the bound that `wanted` gave */
     double share;    /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3]; /* on the tool, this sub-step, this body */
     pal_patches patches;
@@ -185,7 +188,6 @@ static pal_err read_keys(tool_push *push, pal_item *item, pal_note *note)
 static pal_err make_implicit(tool_push *push, pal_build *build)
 {
     pal_body *body = build->body;
-    const pal_body_def *def = build->def;
     push->ties = PAL_NEW(build->arena, pal_ties, 1);
     if (!push->ties) return PAL_ERR_MEMORY;
     PAL_TRY(pal_ties_make(body, push->n_tool * (PAL_PRESS_MOST + 2), build->arena, push->ties));
@@ -193,15 +195,6 @@ static pal_err make_implicit(tool_push *push, pal_build *build)
         push->holder[t].firm = PAL_NEW(build->arena, firm, 1);
         if (!push->holder[t].firm) return PAL_ERR_MEMORY;
         PAL_TRY(pal_press_make(build->arena, &push->holder[t].firm->press));
-    }
-    if (def->n_region > 0 || def->n_stroke > 0) {
-        push->point_Pa = PAL_NEW(build->arena, float, push->touch.n_vertex);
-        if (!push->point_Pa) return PAL_ERR_MEMORY;
-        for (int i = 0; i < push->touch.n_vertex; i++) {
-            pal_material at;
-            pal_material_painted(def, body->surface->x + 3 * (size_t)i, &at);
-            if (at.young_Pa != def->material.young_Pa) push->point_Pa[i] = (float)at.young_Pa;
-        }
     }
     body->wants_compliance = true;
     size_t scratch = pal_felt_scratch(body) + (size_t)push->touch.most_point * 4 * sizeof(double) + CONTACT_MAX + 256;
@@ -239,6 +232,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     /* positions and allowed distances of one tool's points */
     size_t scratch = n_point * 4 * sizeof(double) + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    if (build->body->implicit || build->body->embed)
+        PAL_TRY(pal_touch_young(&push->touch, build->body, build->def, build->arena, &push->point_Pa));
     if (build->body->implicit) PAL_TRY(make_implicit(push, build));
     reset(push, build->body);
     *self = push;
@@ -320,7 +315,7 @@ static void find_contacts(const tool_push *push, holder *h, const pal_body *body
         pal_copy3(c->x, x + 3 * i);
         if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
         c->depth_m = fmin(radius - distance, h->limits.deepest_m);
-        if (body->implicit) k_area = implicit_Pa_m(push, c->point, radius, body->h_m);
+        if (body->implicit || body->embed) k_area = implicit_Pa_m(push, c->point, radius, body->h_m);
         c->k_N_m = k_area * push->touch.area_m2[c->point];
     }
 }
@@ -416,12 +411,28 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
             pal_touch_share(&push->touch, step->body, h->contact, h->n_contact, other->contact, other->n_contact);
     }
     double rate = SAFETY * n_share * pal_touch_stiffest(&push->touch, step->body, h->contact, h->n_contact);
-    double most = (step->body->shell   ? ALPHA_HELD
-                   : step->body->embed ? ALPHA_CARRIED
-                                       : ALPHA) /
-                  (step->dt_s * step->dt_s),
+    double alpha = step->body->shell ? ALPHA_HELD : step->body->embed ? ALPHA_CARRIED : ALPHA;
+    double most = fmax(alpha / (step->dt_s * step->dt_s), SAFETY * n_share * h->told),
            share = rate > most ? most / rate : 1;
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
+}
+
+/* of points near a proxy as they were in the last sub-step; damping over dt/2 takes as much of a step's stability */
+static void wanted(void *self, const pal_body *body, double *bound_N_m)
+{
+    tool_push *push = self;
+    for (int t = 0; t < push->n_tool; t++) {
+        holder *h = &push->holder[t];
+        double radius = h->limits.radius_m, reach = (1 + COMING_NEAR) * radius, x[3];
+        h->told = 0;
+        for (int i = 0; i < h->n_list && h->active && !body->implicit; i++) {
+            int point = h->list[i];
+            pal_touch_point(&push->touch, point, x);
+            if (!(pal_dist3(x, h->proxy.x) < reach)) continue;
+            double k = implicit_Pa_m(push, point, radius, body->h_m) * push->touch.area_m2[point];
+            h->told += 0.5 * pal_touch_bound(&push->touch, body, point, 2 * k, bound_N_m);
+        }
+    }
 }
 
 /* the side the tool is on, slowly */
@@ -684,4 +695,5 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
+                                         .wanted = wanted,
                                          .tangent = &tangent};
