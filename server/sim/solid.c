@@ -7,13 +7,16 @@
 
 double pal_solid_jacobian(const double *x, const int32_t *node, int n_node, double (*g)[3], double J[9])
 {
-    for (int i = 0; i < 9; i++) J[i] = 0;
+    /* sums of its own: J might be anywhere */
+    double a[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
     for (int m = 0; m < n_node; m++) {
-        const double *at = x + 3 * (size_t)node[m];
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++) J[3 * a + b] += at[a] * g[m][b];
+        const double *at = x + 3 * (size_t)node[m], u = g[m][0], v = g[m][1], w = g[m][2];
+        a[0] += at[0] * u, a[1] += at[0] * v, a[2] += at[0] * w;
+        a[3] += at[1] * u, a[4] += at[1] * v, a[5] += at[1] * w;
+        a[6] += at[2] * u, a[7] += at[2] * v, a[8] += at[2] * w;
     }
-    return J[0] * (J[4] * J[8] - J[5] * J[7]) - J[1] * (J[3] * J[8] - J[5] * J[6]) + J[2] * (J[3] * J[7] - J[4] * J[6]);
+    for (int i = 0; i < 9; i++) J[i] = a[i];
+    return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
 }
 
 /* calls back at every Gauss point of every element: place and volume of the point at rest */
