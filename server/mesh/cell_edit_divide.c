@@ -434,8 +434,8 @@ static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell, bool *listed, pal_note *note)
 {
     pal_edit_work w = pal_edit_begin(from, "divide");
-    if (n < 1 || n > from->n_cell)
-        return pal_note_set(note, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, from->n_cell);
+    int32_t most = from->n_cell < PAL_DIVIDE_CELLS_MOST ? from->n_cell : PAL_DIVIDE_CELLS_MOST;
+    if (n < 1 || n > most) return pal_note_set(note, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, most);
     for (int32_t i = 0; i < n; i++) {
         PAL_TRY(pal_edit_check_number(&w, "cell", cell[i], from->n_cell, note));
         if (listed[cell[i]]) return pal_note_set(note, PAL_ERR_REFUSED, "divide: cell %d is given twice", cell[i]);

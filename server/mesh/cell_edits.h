@@ -15,7 +15,7 @@
 #include "server/mesh/point_rows.h"
 
 #define PAL_EXTRUDE_SCALE_MOST 1000.0
-enum { PAL_DIVIDE_CORNERS_MOST = 1024, PAL_DIVIDE_RINGS_MOST = 1000 };
+enum { PAL_DIVIDE_CORNERS_MOST = 1024, PAL_DIVIDE_RINGS_MOST = 1000, PAL_DIVIDE_CELLS_MOST = 512 };
 
 /* name of each kind and the numbers it reads */
 #define PAL_CELLS_COMMAND_TABLE(X)                                                                                     \
@@ -77,7 +77,8 @@ pal_err pal_cells_bridge(const pal_cells *from, int32_t face, int32_t other_face
  * order does not matter but for numbers, and dividing all cells is a level of subdivision. Keeps the volume where faces
  * are flat. Subdivided, cells that have a vertex in the middle of a bent edge may become turned elements (least det J
  * below 0): a solid is to be asked for that before it is taken. Refused for a cell of more than
- * PAL_DIVIDE_CORNERS_MOST corners, or the same cell twice. */
+ * PAL_DIVIDE_CORNERS_MOST corners, the same cell twice, more than PAL_DIVIDE_CELLS_MOST cells (each takes time linear
+ * in the size of all). */
 pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out, pal_note *note);
 /* the same for a cell and those round it that it has a vertex in common with, and again, rings times */
 pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out, pal_note *note);

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_COMMANDS = 40, MOST_CELLS = 120 };
+enum { MOST_COMMANDS = 24, MOST_CELLS = 40 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 

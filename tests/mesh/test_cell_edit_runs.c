@@ -147,6 +147,10 @@ static void rings_take_the_neighbours_along(void)
     CHECK_TEXT(note.text, "divide: 0 cells, must be 1 to 45");
     CHECK(!e.cells.x && !e.rows.start && !e.offset);
     pal_cells_free(&c);
+    c = solid_block(9, 8, 8);
+    CHECK_INT(pal_cells_divide_near(&c, 0, 99, &e, &note), PAL_ERR_REFUSED);
+    CHECK_TEXT(note.text, "divide: 576 cells, must be 1 to 512");
+    pal_cells_free(&c);
 }
 
 /* a sharp face between the divided cell and one that was deleted or divided before keeps its sharpness in all parts */
