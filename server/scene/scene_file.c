@@ -203,12 +203,12 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
+    PAL_TRY(pal_strokes_read(json, object, path, scene, index));
     if (solid)
         PAL_TRY(pal_solid_read(json, object, path, folder, scene, index));
     else
         PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
-    PAL_TRY(pal_strokes_read(json, object, path, scene, index));
     return pal_region_read(json, object, path, folder, scene, index);
 }
 

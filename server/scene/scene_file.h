@@ -123,8 +123,9 @@ typedef struct pal_surface_scene_report {
  * levels do not fit into 512 MiB. report may be NULL */
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                                pal_surface_scene_report *report, pal_note *note);
-/* a file of control cells -> default scene of model subdivision_fem; of options: unit_m (0: metres), material, up, hold
- * and gravity. Errors as of pal_cell_file_load */
+/* a file of control cells -> default scene of model subdivision_fem; of options: unit_m (0: metres), material, up,
+ * hold, gravity and n_level (0: 2, or 1 where that would give more than 2,000 elements). Errors as of
+ * pal_cell_file_load */
 pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                              pal_note *note);
 /* our own procedural organ as a scene, for when nothing else can be had; or the shapes of mesh/stomach.h: a stomach

@@ -25,7 +25,14 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { WANTED_VOXELS = 2600, WANTED_NODES = 2500, WANTED_TRI = 50000, COARSE_TRI = 1500, LABELS = 64 };
+enum {
+    WANTED_VOXELS = 2600,
+    WANTED_NODES = 2500,
+    WANTED_TRI = 50000,
+    COARSE_TRI = 1500,
+    LABELS = 64,
+    WANTED_ELEMENTS = 2000
+};
 static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
 static const double fem_least_fill = 0.1;
 
@@ -377,6 +384,12 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     return PAL_ERR_OK;
 }
 
+/* so many levels that the elements are about as many as real time bears; what is no hexahedron needs one */
+static int choose_levels(const pal_cells *cells)
+{
+    return cells->n_cell <= WANTED_ELEMENTS / 64 ? 2 : 1;
+}
+
 /* name, body and tools of control cells in cells[0] with their boundary in mesh[0] */
 static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
 {
@@ -390,6 +403,8 @@ static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal
     scene->step_s = LIVE_STEP_S;
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default_cells(body, plain, &loaded->mesh[0], &loaded->cells[0]);
+    PAL_TRY(pal_item_put_number(&body->model, "levels",
+                                options->n_level ? options->n_level : choose_levels(&loaded->cells[0]), note));
     if (!options->gravity) leave_gravity_out(body);
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) body->material = options->material;

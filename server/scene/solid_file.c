@@ -128,7 +128,7 @@ pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *pa
     PAL_TRY(pal_json_list(json, body, path, "strokes", PAL_STROKE_MAX, &list));
     if (!list || !list->child) return PAL_ERR_OK;
     pal_json_key(at, path, "strokes");
-    if (!def->cells)
+    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
         return pal_json_bad(json, at, "model \"%s\" cannot be painted; \"subdivision_fem\" can", def->model.name);
     pal_stroke *stroke = calloc((size_t)cJSON_GetArraySize(list), sizeof *stroke);
     if (!stroke) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for %s", json->file, at);
