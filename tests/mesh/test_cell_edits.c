@@ -136,7 +136,9 @@ static void merging_the_ends_of_a_bent_bar_makes_a_handle(void)
     pal_cells_edit e;
     check_holes(&c, 1, 0, 0);
     check_counts(&c, 32, 60, 36, 7);
-    c.vertex_sharp[3] = 2;
+    int32_t first, corner;
+    pal_cells_face_loop(&c, face[1], &first);
+    corner = c.edge_use[first].vertex, c.vertex_sharp[corner] = 2, c.edge[c.edge_use[first].edge].sharp = 3;
     REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &note));
     check_carrying(&e, &c);
     check_holes(&e.cells, 1, 0, 1);
@@ -145,6 +147,15 @@ static void merging_the_ends_of_a_bent_bar_makes_a_handle(void)
     double moved = 0;
     for (int32_t i = 0; i < e.rows.n_row; i++) moved += e.rows.start[i + 1] - e.rows.start[i] == 2;
     CHECK_NEAR(moved, 4, 0);
+    /* a joined corner and edge are as sharp as the sharper of the two */
+    float vertex = 0, edge = 0;
+    for (int32_t i = 0; i < e.cells.n_vertex; i++) vertex += e.cells.vertex_sharp[i];
+    for (int32_t i = 0; i < e.cells.n_edge; i++) edge += e.cells.edge[i].sharp;
+    CHECK(vertex == 2 && edge == 3);
+    pal_cells_edit_free(&e);
+    /* smooth again: joined to elements that are not turned */
+    c.vertex_sharp[corner] = 0, c.edge[c.edge_use[first].edge].sharp = 0;
+    REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &note));
     CHECK_INT(quality(&e.cells, 2, PAL_SUBDIVISION_MACCRACKEN_JOY), 2);
     pal_cells_edit_free(&e);
     /* a bridge is the cell that went */
