@@ -572,6 +572,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
     if (core->system.n_free == 0) return;
     pal_turns_reset(&core->turns);
     pal_answer_forget(&core->answer);
+    if (core->answer.door.solve) pal_warp_turn(&core->answer.warp, &core->turns);
     /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */
     if (core->warp.refreshed || core->warp.wait > 0 || core->probing) (void)factor_at_rest(core);
 }
