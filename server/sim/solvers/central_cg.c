@@ -8,11 +8,13 @@
  * D~ is the rows' drag (hook `drag`) times M~, and where the samples' gamma/mu varies their matrix as well. Departure:
  * theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round within a sub-step lets it creep.
  * Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-), and end when |r| <= tolerance |k (f~ - D~ v)| (key,
- * 1e-4). Key preconditioner: "factor" (default), a Cholesky factor of M~ (num/envelope.h), or "diagonal".
+ * 1e-4): in one iteration with the default preconditioner, a Cholesky factor of M~ (num/envelope.h), and in 40 to 100
+ * with key preconditioner "diagonal", which the paper has. Its own 2 to 4 leave 1e-4 of the whole right side of eq. 20.
  *
  * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
  * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
- * have moved a fifth of an element against one another. Stiffness and damping that CONTACT rows say at nodes add their
+ * have moved a fifth of a control cell against one another, but at most once in 12 sub-steps, and once in up to 96 as
+ * long as that changes it by less than 2 %. Stiffness and damping that CONTACT rows say at nodes add their
  * own largest eigenvalues. Held points' rows are dropped, led ones (held 2) keep their velocity and pull their
  * neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
  * afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
@@ -44,7 +46,9 @@ typedef struct central {
     /* ---- the limit ---- */
     pal_lanczos lanczos;
     double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
+    double cell_m;                /* edge of a control cell, about */
     double way_m;                 /* no point has moved farther against the others since it was taken */
+    int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
     double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
     pal_step *step;               /* that asks for the limit                                  */
@@ -54,9 +58,10 @@ typedef struct central {
     double *bound;                /* of CONTACT rows                                           [n_node]    */
 } central;
 
-static const double most_way_h = 0.2, most_move_S = 0.2;
+static const double most_way = 0.2, most_move_S = 0.2;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
+enum { PAUSE = 12, MOST_PAUSE = 96 };
 /* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
 enum { MOST = 300, FIRST = 24, AGAIN = 6, MOST_ENTRY = 1 << 22 };
 
@@ -113,6 +118,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     row->solid = body->solid, row->mass = body->solid_mass;
     row->safety = safety, row->tolerance = tolerance;
+    row->cell_m = cbrt(pal_solid_volume_m3(body->solid) / build->def->cells->n_cell);
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
         pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MOST_ENTRY,
@@ -313,6 +319,17 @@ static bool finite_state(const pal_body *body)
     return sum == 0;
 }
 
+static void look(central *row, pal_step *step)
+{
+    const double before = row->known ? row->rows2 : 0;
+    row->rows2 = find_rows2(row, step);
+    bool same = fabs(row->rows2 - before) <= near * before;
+    row->pause = !same ? PAUSE : row->pause < MOST_PAUSE ? 2 * row->pause : MOST_PAUSE;
+    row->known = true;
+    row->way_m = 0;
+    row->n_since = 0;
+}
+
 /* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */
 static double limit(void *self, pal_step *step)
 {
@@ -320,11 +337,7 @@ static double limit(void *self, pal_step *step)
     const pal_body *body = step->body;
     if (!finite_state(body)) return NAN;
     if (renew(row, body)) row->known = false;
-    if (!row->known || !(row->way_m <= most_way_h * body->h_m)) {
-        row->rows2 = find_rows2(row, step);
-        row->known = true;
-        row->way_m = 0;
-    }
+    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
     if (step->sub == 0) find_contact(row, step);
     const double lambda = row->rows2 + row->contact2, c = row->contact_1_s;
     row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda));
@@ -428,6 +441,7 @@ static pal_err run(void *self, pal_step *step)
     find_change(row, step);
     row->way_m += move(row, step->body, step->dt_s);
     row->dt_s = step->dt_s;
+    row->n_since += row->n_since < MOST_PAUSE;
     return PAL_ERR_OK;
 }
 
