@@ -14,6 +14,7 @@
     X(tet_volume)                                                                                                      \
     X(tet_elastic)                                                                                                     \
     X(hex_elastic)                                                                                                     \
+    X(cell_elastic)                                                                                                    \
     X(moving_support)                                                                                                  \
     X(edge_spring)                                                                                                     \
     X(shape_spring)                                                                                                    \

@@ -1,0 +1,105 @@
+/* Row cell_elastic: the elements of a subdivided solid in their own moving frames (A 3.2-3.4; cell_kernel.h).
+ *
+ * Key: operator ("polar": displacements from the rest shape turned by the element's polar rotation, the default |
+ * "edges": changes of edge lengths and angles as the paper has them, corrected; its forces have no energy, and
+ * `energy` gives 1/2 d^' K d^ of them).
+ *
+ * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when the model
+ * has taken others (painting, a live edit of the material), the constants are made anew before they are used next.
+ * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
+ * of forces. For the same reason the tangent is given by products only. */
+#include "server/sim/cell_kernel.h"
+#include "server/sim/effect_list.h"
+
+#include <string.h>
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    const pal_solid *solid = build->body->solid;
+    const char *name = "polar";
+    if (!solid)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
+                            item->path, item->name);
+    PAL_TRY(pal_item_text(item, "operator", &name, build->note));
+    if (strcmp(name, "polar") != 0 && strcmp(name, "edges") != 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.operator: \"%s\" is neither polar nor edges", item->path,
+                            name);
+    PAL_TRY(pal_item_done(item, build->note));
+    pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *self = row;
+    return pal_cells_elastic_make(solid, strcmp(name, "polar") == 0 ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena,
+                                  row, build->note);
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    pal_cells_elastic_refresh(self);
+    pal_cells_elastic_force(self, step->body->d, step->body->f);
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    pal_cells_elastic_refresh(self);
+    return pal_cells_elastic_energy(self, body->d);
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    pal_cells_elastic_reset(self);
+}
+
+/* elements overlap far beyond the points' own neighbours: a matrix of nodes would be mostly full */
+static bool couple(void *self, pal_cliques *out)
+{
+    (void)self, (void)out;
+    return false;
+}
+
+static void linearise(void *self, const pal_body *body)
+{
+    pal_cells_elastic_refresh(self);
+    pal_cells_elastic_linearise(self, body->d);
+}
+
+static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+{
+    (void)body, (void)c;
+    pal_cells_elastic_multiply(self, k, p, out);
+}
+
+static void rotate(void *self, const pal_body *body, double *turn)
+{
+    (void)body;
+    pal_cells_elastic_rotate(self, turn);
+}
+
+static double von_mises(const pal_cell_points *points, int p)
+{
+    return points->von_mises_Pa[p];
+}
+static double density(const pal_cell_points *points, int p)
+{
+    return points->energy_J_m3[p];
+}
+
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    if (field == PAL_FIELD_VON_MISES_PA) pal_cells_elastic_measure(self, body->d, von_mises, sum, volume_m3);
+    if (field == PAL_FIELD_ENERGY_J_M3) pal_cells_elastic_measure(self, body->d, density, sum, volume_m3);
+}
+
+static const pal_tangent tangent = {.couple = couple, .linearise = linearise, .multiply = multiply, .rotate = rotate};
+
+const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
+                                            .stage = PAL_STAGE_FORCE,
+                                            .internal = true,
+                                            .make = make,
+                                            .run = run,
+                                            .energy = energy,
+                                            .reset = reset,
+                                            .tangent = &tangent,
+                                            .measure = measure,
+                                            .fields = 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3};
