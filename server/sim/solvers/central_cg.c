@@ -1,9 +1,12 @@
 /* Solver central_cg: central differences on the control points of a solid, the mass matrix by conjugate gradients (A
- * 3.3, eq. 16-20; explicit in the stiffness, erratum A10). In steps of the velocity between the points of time,
- * body->v, eq. 20 is (M~ + theta k D~) (v+ - v) = k (f~ - D~ v),    p+ = p + dt v+,    theta 1/2, k = dt, v being (p -
- * p-) / dt. What is zero stays zero to the bit, and no digits go into where the body is. When the sub-step changes, k =
- * (dt + dt-) / 2 and theta = dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and
- * whenever the body was put somewhere else v is that at p and dt- = 0, the start p- = p - dt v + dt^2 a / 2.
+ * 3.3, eq. 16-20; explicit in the stiffness, erratum A10). Eq. 20 in steps of body->v, the velocity between the points
+ * of time:
+ *
+ *     (M~ + theta k D~) (v+ - v) = k (f~ - D~ v),    p+ = p + dt v+,    theta = 1/2, k = dt, v = (p - p-) / dt
+ *
+ * What is zero stays zero to the bit, and no digits go into where the body is. When the sub-step changes, k is (dt +
+ * dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and whenever the
+ * body was put somewhere else v is that at p and dt- = 0, which is the start p- = p - dt v + dt^2 a / 2.
  *
  * D~ is the rows' drag (hook `drag`) times M~, and where the samples' gamma/mu varies their matrix as well. Departure:
  * theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round within a sub-step lets it creep.
@@ -14,10 +17,10 @@
  * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
  * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
  * have moved a fifth of a control cell against one another, but at most once in 12 sub-steps, and once in up to 96 as
- * long as that changes it by less than 2 %. Stiffness and damping that CONTACT rows say at nodes add their
- * own largest eigenvalues. Held points' rows are dropped, led ones (held 2) keep their velocity and pull their
- * neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
- * afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
+ * long as that changes it by less than 2 %. Stiffness and damping that CONTACT rows say or want at nodes add their own
+ * largest eigenvalues at the begin of every step. Held points' rows are dropped, led ones (held 2) keep their velocity
+ * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3). Where the
+ * world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
 #include "server/num/envelope.h"
@@ -301,6 +304,7 @@ static void find_contact(central *row, const pal_step *step)
     for (int i = 0; i < step->n_contact; i++) {
         const pal_effect *effect = step->contact[i].effect;
         if (effect->stiffness) effect->stiffness(step->contact[i].self, step->body, row->bound);
+        if (effect->wanted) effect->wanted(step->contact[i].self, step->body, row->bound);
         if (effect->wanted) effect->wanted(step->contact[i].self, step->body, row->bound);
     }
     row->contact2 = find_bound(row);
