@@ -1,5 +1,6 @@
 #!/bin/sh
-# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed".
+# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed". What failed is shown where
+# it failed, whole, and once more in short right before that line.
 # usage: deploy/test.sh [--fast]     --fast: the release build's tests only, no sanitizers, fuzzers or browser
 # PALPATE_BUILD names another build folder.
 set -u
@@ -20,7 +21,21 @@ install_missing scan || say "tests of the scan say that it is not there and are 
 install_missing mpi || say "calibration over MPI is not built and its test says so"
 fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
 
-passed=0 failed=0
+passed=0 failed=0 left_out=0
+digest=$build/digest.log
+: >"$digest"
+
+brief() { # NAME: the lines of standard input that say what failed, at most 15, into the digest
+    echo "FAILED $1" >>"$digest"
+    cat >"$build/brief.log"
+    # shell tests say FAIL, tests in C the file and line, node "not ok", compilers and sanitizers error
+    grep -E '^ *(FAIL|not ok|palpate:)|^ *[^ :]+\.[a-z]+:[0-9]+: |(^|[ :])[Ee]rror: |Sanitizer|\*\*\*' "$build/brief.log" |
+        cut -c 1-240 | head -n 15 >"$build/brief_lines.log"
+    # of one that only stopped, how far it came
+    grep -qv '\*\*\*' "$build/brief_lines.log" ||
+        grep -v '\*\*\*' "$build/brief.log" | grep . | tail -n 5 | cut -c 1-240 >>"$build/brief_lines.log"
+    sed 's/^/    /' "$build/brief_lines.log" >>"$digest"
+}
 step() { # NAME COMMAND...: one test that is a command; its output is shown when it fails
     name=$1
     shift
@@ -30,22 +45,43 @@ step() { # NAME COMMAND...: one test that is a command; its output is shown when
     else
         failed=$((failed + 1))
         cat "$build/step.log"
+        brief "$name" <"$build/step.log"
         say "FAIL  $name"
     fi
+}
+# a test's result in ctest's log; what it printed stands below
+result='^ *[0-9]+/[0-9]+ Test +#[0-9]+: '
+output_of() { # LOG TEST: that test's result and output
+    awk -v result="$result" -v test="$2" '
+        $0 ~ result { on = 0; for (i = 1; i <= NF; i++) if ($i == test) on = 1 }
+        /^ +Start +[0-9]+: / || /^[0-9]+% tests passed/ || /^The following tests/ { on = 0 }
+        on' "$1"
 }
 tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its tests
     preset=$1
     shift
+    log=$build/ctest_$preset.log
     # first what computes, then, side by side, what mostly waits (tests/clients/CMakeLists.txt)
     (cd "$build/$preset" && ctest --output-on-failure -j 2 "$@" -LE "waits${leave:+|$leave}"
-        ctest --output-on-failure -j "${side:-4}" "$@" -L waits) >"$build/ctest_$preset.log" 2>&1
-    sed -n '/^ *[0-9]*\/[0-9]* Test /p' "$build/ctest_$preset.log"
-    n_pass=$(grep -c '^ *[0-9]*/[0-9]* Test .*   Passed ' "$build/ctest_$preset.log")
-    n_fail=$(grep -cE '^ *[0-9]*/[0-9]* Test .*(\*\*\*|Not Run)' "$build/ctest_$preset.log")
-    if [ "$n_pass" -eq 0 ]; then n_fail=$((n_fail + 1)); fi
-    if [ "$n_fail" -gt 0 ]; then cat "$build/ctest_$preset.log"; fi
+        ctest --output-on-failure -j "${side:-4}" "$@" -L waits) >"$log" 2>&1
+    grep -E "$result" "$log"
+    n_pass=$(grep -cE "$result.* Passed " "$log")
+    n_left=$(grep -cE "$result.*\*\*\*Skipped" "$log")
+    # "7/9 Test #3: room/test_name ....***Failed": the words before the dots are the name
+    bad=$(grep -E "$result.*(\*\*\*|Not Run)" "$log" | grep -v '\*\*\*Skipped' | sed -E "s|$result([^ ]+) .*|\1|")
+    n_fail=$(echo "$bad" | grep -c .)
+    for test in $bad; do
+        output_of "$log" "$test"
+        output_of "$log" "$test" | brief "$preset: $test"
+    done
+    if [ "$n_pass" -eq 0 ]; then
+        n_fail=$((n_fail + 1))
+        tail -n 40 "$log"
+        tail -n 15 "$log" | brief "$preset: no test has passed"
+    fi
     passed=$((passed + n_pass))
     failed=$((failed + n_fail))
+    left_out=$((left_out + n_left))
     say "$preset: $n_pass passed, $n_fail failed"
 }
 build_preset() { # PRESET "TARGET..." [cmake options]
@@ -55,6 +91,7 @@ build_preset() { # PRESET "TARGET..." [cmake options]
     cmake -S "$tree" -B "$build/$preset" -G Ninja -D PAL_PRESET="$preset" "$@" >"$build/build_$preset.log" 2>&1 &&
         cmake --build "$build/$preset" --target $target >>"$build/build_$preset.log" 2>&1 && return 0
     tail -n 40 "$build/build_$preset.log"
+    brief "build of $preset" <"$build/build_$preset.log"
     say "FAIL  build of $preset"
     failed=$((failed + 1))
     return 1
@@ -73,7 +110,9 @@ if [ -z "$fast" ]; then
     step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
-    build_preset asan all && leave="accuracy|bench" tests_of asan
+    # all but what is left out below
+    rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
+    build_preset asan "server/all clients/all $(printf 'tests/%s/all ' $rooms)" && leave="accuracy|bench" tests_of asan
     say "building with thread sanitizer"
     # the rooms that have threads
     threads="base num session net clients"
@@ -93,5 +132,7 @@ if [ -z "$fast" ]; then
         done
     fi
 fi
+[ "$left_out" -eq 0 ] || say "$left_out left out (each says why in $build/ctest_*.log)"
+cat "$digest"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]
