@@ -69,6 +69,7 @@ typedef struct pal_body {
     const int32_t *active; /* [n_active] */
     int n_active;
     struct pal_shell *shell; /* NULL: the body does not adapt */
+    struct pal_pack *pack;   /* working arrays of rows and solver (pack.h); NULL: none made */
     struct pal_solid *solid; /* model subdivision_fem (solid.h); heap, freed with the world; NULL: another model */
     bool frozen;             /* set by finite_guard or the solver: the body no longer moves           */
     double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */

@@ -97,6 +97,8 @@ typedef struct pal_effect {
     pal_err (*make)(pal_item *item, pal_build *build, void **self);
     /* FORCE rows add to body->f, CONTACT rows to body->load and the tools' forces. [sim] */
     pal_err (*run)(void *self, pal_step *step);
+    /* optional, FORCE: the same on body->pack, made in `make`: adds to its f (pack.h). [sim] */
+    pal_err (*pull)(void *self, pal_step *step);
     /* optional, NULL when there is nothing to do or say */
     double (*energy)(void *self, const pal_body *body); /* J; run = -gradient of it (tests)                          */
     /* FORCE, CONTACT: += Gershgorin row sums of the stiffness (numerics.md 1 B) and of the explicit damping at the

@@ -11,6 +11,23 @@ typedef double pal_v8 __attribute__((vector_size(64)));
 typedef int64_t pal_i8 __attribute__((vector_size(64)));
 typedef double pal_lanes __attribute__((vector_size(64), aligned(8), may_alias));
 
+/* x y z 0 of a node */
+typedef double pal_quad __attribute__((vector_size(32)));
+
+PAL_INLINE pal_quad pal_quad_load(const double a[3])
+{
+    return (pal_quad){a[0], a[1], a[2], 0};
+}
+PAL_INLINE void pal_quad_store(double a[3], pal_quad q)
+{
+    a[0] = q[0], a[1] = q[1], a[2] = q[2];
+}
+PAL_INLINE double pal_quad_dot(pal_quad a, pal_quad b)
+{
+    pal_quad p = a * b;
+    return p[0] + p[1] + p[2];
+}
+
 PAL_INLINE pal_v8 pal_load8(const double *at)
 {
     return *(const pal_lanes *)at;

@@ -144,4 +144,6 @@ typedef struct pal_shell_frame {
     double V_m_s[3], Omega_1_s[3];
 } pal_shell_frame;
 void pal_shell_fit_frame(const pal_shell *shell, const pal_body *body, pal_shell_frame *frame);
+/* the same of packed points (pack.h) */
+void pal_shell_fit_pack(const pal_shell *shell, const struct pal_pack *pack, pal_shell_frame *frame);
 #endif

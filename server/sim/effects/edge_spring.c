@@ -8,21 +8,17 @@
  * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
  * so that a collapsed surface opens again.
  *
- * The springs in use are taken from the shell whenever its revision is a new one. Positions, velocities and forces of
- * their ends stand in arrays of this row, four numbers a node in the order of shell->node: then the ends of a spring
- * are one load each, and a force one load and one store. */
+ * The springs in use are taken from the shell whenever its revision is a new one. Their ends stand in body->pack, in
+ * the order of shell->node: place and velocity of an end are one load, and a force is one load and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
-#include "server/sim/lanes.h"
+#include "server/sim/pack.h"
 #include "server/sim/shell.h"
 
 #include <math.h>
 
 /* of (l/l0)^2 */
 #define LEAST_Q 1e-18
-
-/* x y z 0 of a node */
-typedef double quad __attribute__((vector_size(32)));
 
 /* springs at a time, so that the processor has several blocks under way */
 enum { BATCH = 8 };
@@ -36,12 +32,11 @@ typedef struct edge_spring {
     float *young;    /* E at the middles of all edges, NaN: the body's; NULL: no regions [n edges] */
 
     uint64_t revision; /* of the shell, what follows was made for; 0: none yet */
-    int n_spring, n_block, n_node;
-    int32_t *place;  /* of a vertex in shell->node                                  [finest vertices] */
-    int32_t *end;    /* places of both ends, in blocks of 8: first ends, then second [n_block][2][8]  */
-    double *w2, *q;  /* 1/l0^2 and share; 0 in lanes without a spring                [n_block][8]     */
-    double *bound;   /* sum of 2 q over the springs of a node                        [n_node]         */
-    quad *x, *v, *f; /* working arrays  [n_node] */
+    int n_block, n_node;
+    int32_t *place; /* of a vertex in shell->node                                       [finest vertices] */
+    uint32_t *end;  /* 8 times the places of both ends, in blocks of 8: first, then second [n_block][2][8] */
+    double *w2, *q; /* 1/l0^2 and share; 0 in lanes without a spring                       [n_block][8]    */
+    double *bound;  /* sum of 2 q over the springs of a node                               [n_node]        */
 } edge_spring;
 
 static double derived_k(const edge_spring *e, double young_Pa)
@@ -88,15 +83,11 @@ static pal_err allocate(edge_spring *e, pal_arena *arena)
     size_t n_vertex = (size_t)levels->n_vertex[finest];
     size_t n_lane = ((size_t)pal_levels_n_edge(levels, finest) + PAL_LANES - 1) / PAL_LANES * PAL_LANES;
     e->place = PAL_NEW(arena, int32_t, n_vertex);
-    e->end = PAL_NEW(arena, int32_t, 2 * n_lane);
+    e->end = PAL_NEW(arena, uint32_t, 2 * n_lane);
     e->w2 = PAL_NEW(arena, double, n_lane);
     e->q = PAL_NEW(arena, double, n_lane);
     e->bound = PAL_NEW(arena, double, n_vertex);
-    e->x = PAL_NEW(arena, quad, n_vertex);
-    e->v = PAL_NEW(arena, quad, n_vertex);
-    e->f = PAL_NEW(arena, quad, n_vertex);
-    bool all = e->place && e->end && e->w2 && e->q && e->bound && e->x && e->v && e->f;
-    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return e->place && e->end && e->w2 && e->q && e->bound ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -121,103 +112,100 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     e->k_N_m = derived_k(e, e->young_Pa);
     PAL_TRY(find_young(e, build));
     PAL_TRY(allocate(e, build->arena));
+    PAL_TRY(pal_pack_make(build->body, build->arena));
     *self = e;
     return PAL_ERR_OK;
 }
 
-/* the springs in use */
+/* the springs in use. Neighbours in the shell's list stand in other blocks: springs side by side have no end in common,
+ * for whose force the next would have to wait */
 static void take_springs(edge_spring *e)
 {
     const pal_shell *shell = e->shell;
     const double *x = shell->levels.x;
     if (e->revision == shell->revision && e->n_block > 0) return;
     e->revision = shell->revision;
-    e->n_spring = shell->n_spring, e->n_node = shell->n_node;
-    e->n_block = (e->n_spring + PAL_LANES - 1) / PAL_LANES;
+    e->n_node = shell->n_node;
+    e->n_block = (shell->n_spring + PAL_LANES - 1) / PAL_LANES;
     for (int k = 0; k < e->n_node; k++) {
         e->place[shell->node[k]] = k;
         e->bound[k] = 0;
-        e->f[k] = (quad){0};
     }
     for (int s = 0; s < PAL_LANES * e->n_block; s++) {
-        int32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
+        uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
         end[0] = end[PAL_LANES] = 0;
         e->w2[s] = e->q[s] = 0;
-        if (s >= e->n_spring) continue;
-        int32_t edge = shell->spring[s], a = shell->levels.edge[edge].vertex[0], b = shell->levels.edge[edge].vertex[1];
+        int k = s % PAL_LANES * e->n_block + s / PAL_LANES;
+        if (k >= shell->n_spring) continue;
+        int32_t edge = shell->spring[k], a = shell->levels.edge[edge].vertex[0], b = shell->levels.edge[edge].vertex[1];
         double d[3];
         pal_sub3(d, x + 3 * (size_t)b, x + 3 * (size_t)a);
-        end[0] = e->place[a], end[PAL_LANES] = e->place[b];
+        end[0] = PAL_LANES * (uint32_t)e->place[a], end[PAL_LANES] = PAL_LANES * (uint32_t)e->place[b];
         e->w2[s] = 1 / pal_dot3(d, d);
-        e->q[s] = (double)shell->spring_share[s] * young_ratio(e, edge);
-        e->bound[end[0]] += 2 * e->q[s];
-        e->bound[end[PAL_LANES]] += 2 * e->q[s];
+        e->q[s] = (double)shell->spring_share[k] * young_ratio(e, edge);
+        e->bound[e->place[a]] += 2 * e->q[s];
+        e->bound[e->place[b]] += 2 * e->q[s];
     }
 }
 
-/* sums of x y z over 8 nodes' products */
-PAL_INLINE pal_v8 sum_quads(const quad p[PAL_LANES])
+/* halves of a vector as x y z 0: sums of the first halves of 8 vectors, and of the second */
+PAL_INLINE void sum_halves(const pal_v8 p[PAL_LANES], pal_v8 *first, pal_v8 *second)
 {
-    quad half[2];
-    for (int h = 0; h < 2; h++) {
-        const quad *a = p + 4 * h;
-        /* x + y and z + 0 of two nodes each */
-        quad s = __builtin_shufflevector(a[0], a[1], 0, 4, 2, 6) + __builtin_shufflevector(a[0], a[1], 1, 5, 3, 7);
-        quad t = __builtin_shufflevector(a[2], a[3], 0, 4, 2, 6) + __builtin_shufflevector(a[2], a[3], 1, 5, 3, 7);
-        half[h] = __builtin_shufflevector(s, t, 0, 1, 4, 5) + __builtin_shufflevector(s, t, 2, 3, 6, 7);
-    }
-    return __builtin_shufflevector(half[0], half[1], 0, 1, 2, 3, 4, 5, 6, 7);
+    pal_v8 s[4], t[2];
+    /* x + y and z + 0 of two springs each */
+    for (int k = 0; k < 4; k++)
+        s[k] = __builtin_shufflevector(p[2 * k], p[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14) +
+               __builtin_shufflevector(p[2 * k], p[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+    for (int k = 0; k < 2; k++)
+        t[k] = __builtin_shufflevector(s[2 * k], s[2 * k + 1], 0, 1, 4, 5, 8, 9, 12, 13) +
+               __builtin_shufflevector(s[2 * k], s[2 * k + 1], 2, 3, 6, 7, 10, 11, 14, 15);
+    *first = __builtin_shufflevector(t[0], t[1], 0, 1, 4, 5, 8, 9, 12, 13);
+    *second = __builtin_shufflevector(t[0], t[1], 2, 3, 6, 7, 10, 11, 14, 15);
 }
 
-/* first ends to second ends of a block */
-PAL_INLINE void differences(const quad *at, const int32_t *end, quad d[PAL_LANES])
+/* (l/l0)^2 of n blocks, and their strains' rates (dv.d)/l0^2; d [n][8] */
+PAL_INLINE void measure_blocks(const edge_spring *e, const double *xv, int first, int n, pal_quad *d, pal_v8 *q,
+                               pal_v8 *rate)
 {
-    for (int l = 0; l < PAL_LANES; l++) d[l] = at[end[PAL_LANES + l]] - at[end[l]];
-}
-
-/* (l/l0)^2 of n blocks, and their strains' rates (dv.d)/l0^2 when damped; d [n][8] */
-PAL_INLINE void measure_blocks(const edge_spring *e, int first, int n, bool damped, quad *d, pal_v8 *q, pal_v8 *rate)
-{
-    const quad *x = e->x, *v = e->v;
     for (int b = 0; b < n; b++) {
-        const int32_t *end = e->end + 2 * PAL_LANES * (first + b);
-        pal_v8 w2 = pal_load8(e->w2 + PAL_LANES * (first + b));
-        quad p[PAL_LANES], *to = d + PAL_LANES * b;
-        differences(x, end, to);
-        for (int l = 0; l < PAL_LANES; l++) p[l] = to[l] * to[l];
-        q[b] = sum_quads(p) * w2;
-        if (!damped) continue;
-        differences(v, end, p);
-        for (int l = 0; l < PAL_LANES; l++) p[l] *= to[l];
-        rate[b] = sum_quads(p) * w2;
+        const uint32_t *end = e->end + 2 * PAL_LANES * (first + b);
+        pal_v8 w2 = pal_load8(e->w2 + PAL_LANES * (first + b)), p[PAL_LANES];
+        for (int l = 0; l < PAL_LANES; l++) {
+            p[l] = *(const pal_v8 *)(xv + end[PAL_LANES + l]) - *(const pal_v8 *)(xv + end[l]);
+            d[PAL_LANES * b + l] = pal_first(p[l]);
+            p[l] *= pal_join(pal_first(p[l]), pal_first(p[l]));
+        }
+        sum_halves(p, &q[b], &rate[b]);
+        q[b] *= w2, rate[b] *= w2;
     }
 }
 
 /* with q = (l/l0)^2 and r = 1/sqrt(q): k (l - l0) d/l = k (1 - r) d, and c (dv.d)/l^2 d; returns the least q */
-PAL_INLINE double run_springs(edge_spring *e, double k, double c, bool damped)
+static double run_springs(const edge_spring *e, const pal_pack *pack, double k, double c)
 {
     const pal_v8 floor = LEAST_Q - (pal_v8){0}, none = {0}, one = 1 - none;
     pal_v8 least = one;
-    quad *f = e->f;
+    const double *xv = (const double *)pack->xv;
+    float *f = (float *)pack->f; /* 8 floats are as long as 4 doubles */
     for (int first = 0; first < e->n_block; first += BATCH) {
         const int n = e->n_block - first < BATCH ? e->n_block - first : BATCH;
-        quad d[BATCH * PAL_LANES];
+        pal_quad d[BATCH * PAL_LANES];
         pal_v8 q[BATCH], rate[BATCH];
         double s[BATCH * PAL_LANES];
-        measure_blocks(e, first, n, damped, d, q, rate);
+        measure_blocks(e, xv, first, n, d, q, rate);
         for (int b = 0; b < n; b++) {
             pal_v8 share = pal_load8(e->q + PAL_LANES * (first + b)), known = pal_pick8(share > none, q[b], one);
             least = pal_pick8(known < least, known, least);
-            pal_v8 r = pal_inverse_root8(pal_pick8(q[b] < floor, floor, q[b])), s8 = k * (one - r);
-            if (damped) s8 += c * rate[b] * r * r;
+            pal_v8 r = pal_inverse_root8(pal_pick8(q[b] < floor, floor, q[b])),
+                   s8 = k * (one - r) + c * rate[b] * r * r;
             *(pal_lanes *)(s + PAL_LANES * b) = pal_pick8(q[b] < floor, none, share * s8);
         }
         for (int b = 0; b < n; b++) {
-            const int32_t *end = e->end + 2 * PAL_LANES * (first + b);
+            const uint32_t *end = e->end + 2 * PAL_LANES * (first + b);
             for (int l = 0; l < PAL_LANES; l++) {
-                quad force = s[PAL_LANES * b + l] * d[PAL_LANES * b + l];
-                f[end[l]] += force;
-                f[end[PAL_LANES + l]] -= force;
+                pal_quad force = s[PAL_LANES * b + l] * d[PAL_LANES * b + l];
+                *(pal_quad *)(f + end[l]) += force;
+                *(pal_quad *)(f + end[PAL_LANES + l]) -= force;
             }
         }
     }
@@ -225,74 +213,63 @@ PAL_INLINE double run_springs(edge_spring *e, double k, double c, bool damped)
     return least[0];
 }
 
-static void spring_ends(const edge_spring *e, int s, int32_t vertex[2])
+/* false: the lane has no spring */
+static bool spring_ends(const edge_spring *e, int s, int place[2], int32_t vertex[2])
 {
-    const int32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
-    vertex[0] = e->shell->node[end[0]], vertex[1] = e->shell->node[end[PAL_LANES]];
+    const uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
+    for (int k = 0; k < 2; k++) {
+        place[k] = (int)(end[k * PAL_LANES] / PAL_LANES);
+        vertex[k] = e->shell->node[place[k]];
+    }
+    return e->w2[s] > 0;
 }
 
 /* what the vectors leave out: springs without length push their ends apart along the rest direction */
-static void reopen(const edge_spring *e, const pal_body *body, double k)
+static void reopen(const edge_spring *e, const pal_pack *pack, double k)
 {
-    for (int s = 0; s < e->n_spring; s++) {
+    for (int s = 0; s < PAL_LANES * e->n_block; s++) {
         int32_t vertex[2];
-        double d[3];
-        spring_ends(e, s, vertex);
-        size_t a = 3 * (size_t)vertex[0], b = 3 * (size_t)vertex[1];
-        pal_sub3(d, body->d + b, body->d + a);
-        if (pal_dot3(d, d) * e->w2[s] >= LEAST_Q) continue;
-        pal_sub3(d, body->x_rest + b, body->x_rest + a);
-        pal_axpy3(body->f + b, k * e->q[s], d);
-        pal_axpy3(body->f + a, -k * e->q[s], d);
+        int place[2];
+        if (!spring_ends(e, s, place, vertex)) continue;
+        pal_quad d = pal_first(pack->xv[place[1]]) - pal_first(pack->xv[place[0]]);
+        if (pal_quad_dot(d, d) * e->w2[s] >= LEAST_Q) continue;
+        d = pack->rest[place[1]] - pack->rest[place[0]];
+        d[3] = 0;
+        pack->f[place[1]] += k * e->q[s] * d;
+        pack->f[place[0]] -= k * e->q[s] * d;
     }
 }
 
-static void gather_nodes(const edge_spring *e, const double *from, quad *to)
+static pal_err pull(void *self, pal_step *step)
 {
-    const int32_t *node = e->shell->node;
-    for (int k = 0; k < e->n_node; k++) {
-        const double *a = from + 3 * (size_t)node[k];
-        to[k] = (quad){a[0], a[1], a[2], 0};
-    }
+    edge_spring *e = self;
+    take_springs(e);
+    double k = e->k_N_m * e->shell->spring_ramp;
+    if (run_springs(e, step->body->pack, k, damping_now(e)) < LEAST_Q) reopen(e, step->body->pack, k);
+    return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    edge_spring *e = self;
-    pal_body *body = step->body;
-    take_springs(e);
-    double k = e->k_N_m * e->shell->spring_ramp, c = damping_now(e), least;
-    gather_nodes(e, body->d, e->x);
-    if (c > 0) {
-        gather_nodes(e, body->dv, e->v);
-        least = run_springs(e, k, c, true);
-    } else {
-        least = run_springs(e, k, 0, false);
-    }
-    /* forces out, and back to zero for the next time */
-    const int32_t *node = e->shell->node;
-    for (int i = 0; i < e->n_node; i++) {
-        double *f = body->f + 3 * (size_t)node[i];
-        for (int q = 0; q < 3; q++) f[q] += e->f[i][q];
-        e->f[i] = (quad){0};
-    }
-    if (least < LEAST_Q) reopen(e, body, k);
-    return PAL_ERR_OK;
+    return pal_pack_run(self, step, pull);
 }
 
 static double energy(void *self, const pal_body *body)
 {
     edge_spring *e = self;
     take_springs(e);
-    double sum = 0;
-    for (int s = 0; s < e->n_spring; s++) {
-        int32_t vertex[2];
-        spring_ends(e, s, vertex);
-        double longer =
-            pal_dist3(body->d + 3 * (size_t)vertex[1], body->d + 3 * (size_t)vertex[0]) - 1 / sqrt(e->w2[s]);
-        sum += e->q[s] * longer * longer;
+    pal_pack_take(body);
+    pal_v8 sum = {0};
+    for (int b = 0; b < e->n_block; b++) {
+        pal_quad d[PAL_LANES];
+        pal_v8 q, rate, none = {0}, share = pal_load8(e->q + PAL_LANES * b), w2 = pal_load8(e->w2 + PAL_LANES * b);
+        measure_blocks(e, (const double *)body->pack->xv, b, 1, d, &q, &rate);
+        pal_v8 strain = pal_root8(q) - 1;
+        sum += pal_pick8(w2 > none, share * strain * strain / w2, none);
     }
-    return 0.5 * e->k_N_m * e->shell->spring_ramp * sum;
+    double half = 0;
+    for (int l = 0; l < PAL_LANES; l++) half += 0.5 * sum[l];
+    return e->k_N_m * e->shell->spring_ramp * half;
 }
 
 /* k at both ends along the spring; across it k (1 - l0/l) is never more for l > l0 and none for l < l0 */
@@ -329,6 +306,7 @@ const pal_effect pal_effect_edge_spring = {.name = "edge_spring",
                                            .internal = true,
                                            .make = make,
                                            .run = run,
+                                           .pull = pull,
                                            .energy = energy,
                                            .stiffness = stiffness,
                                            .damping = damping,

@@ -16,6 +16,7 @@
  * (as the model has it). What is not given follows a live material edit. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/pack.h"
 #include "server/sim/shell.h"
 
 #include <string.h>
@@ -77,6 +78,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
                             frame);
     row->world = frame[0] == 'w';
     turn_back(row);
+    PAL_TRY(pal_pack_make(build->body, build->arena));
     *self = row;
     return PAL_ERR_OK;
 }
@@ -93,13 +95,16 @@ static double damp_1_s(const shape_spring *row, const pal_shell *shell)
     return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
 }
 
-/* frame: where the last fit ended, and the new one */
-static hold find_hold(const shape_spring *row, const pal_body *body, pal_shell_frame *frame)
+/* frame: where the last fit ended, and the new one; packed: of body->pack */
+static hold find_hold(const shape_spring *row, const pal_body *body, pal_shell_frame *frame, bool packed)
 {
     hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .k = stiff_1_s2(row, body->shell), .c = damp_1_s(row, body->shell)};
     if (row->world) return h;
     double at[3];
-    pal_shell_fit_frame(body->shell, body, frame);
+    if (packed)
+        pal_shell_fit_pack(body->shell, body->pack, frame);
+    else
+        pal_shell_fit_frame(body->shell, body, frame);
     memcpy(h.R, frame->R, sizeof h.R);
     pal_mul33(at, h.R, frame->rest_centre_m);
     pal_sub3(h.shift, frame->centre_m, at);
@@ -109,56 +114,53 @@ static hold find_hold(const shape_spring *row, const pal_body *body, pal_shell_f
     return h;
 }
 
-static inline void strain(const hold *h, const pal_body *body, size_t i, double out[3])
+static inline void strain(const hold *h, const double x[3], const double rest[3], double out[3])
 {
     double at[3];
-    pal_mul33(at, h->R, body->x_rest + 3 * i);
+    pal_mul33(at, h->R, rest);
     pal_add3(at, at, h->shift);
-    pal_sub3(out, body->d + 3 * i, at);
+    pal_sub3(out, x, at);
 }
 
-/* on the places at rest; the loops tell the compiler that force, place and rest are apart */
-static void pull_to_rest(const hold *h, const pal_body *body)
+static pal_err pull(void *self, pal_step *step)
 {
-    for (int k = 0; k < body->n_active; k++) {
-        size_t i = (size_t)pal_body_point(body, k);
-        const double *restrict x = body->d + 3 * i, *restrict v = body->dv + 3 * i, *restrict at = body->x_rest + 3 * i;
-        double *restrict f = body->f + 3 * i, stiff = body->mass_kg[i] * h->k, damp = body->mass_kg[i] * h->c;
-        f[0] -= stiff * (x[0] - at[0]) + damp * v[0];
-        f[1] -= stiff * (x[1] - at[1]) + damp * v[1];
-        f[2] -= stiff * (x[2] - at[2]) + damp * v[2];
+    shape_spring *row = self;
+    const pal_body *body = step->body;
+    pal_pack *pack = body->pack;
+    const hold h = find_hold(row, body, &row->frame, true);
+    if (row->world) {
+        for (int k = 0; k < body->n_active; k++) {
+            pal_quad rest = pack->rest[k], x = pal_first(pack->xv[k]), v = pal_second(pack->xv[k]);
+            const double m = rest[3];
+            rest[3] = 0;
+            pack->f[k] -= m * h.k * (x - rest) + m * h.c * v;
+        }
+        return PAL_ERR_OK;
     }
+    for (int k = 0; k < body->n_active; k++) {
+        const double *x = (const double *)&pack->xv[k], *v = x + 4, *rest = (const double *)&pack->rest[k];
+        double *f = (double *)&pack->f[k], u[3], turn[3];
+        strain(&h, x, rest, u);
+        pal_cross3(turn, h.Omega, x);
+        for (int c = 0; c < 3; c++) f[c] -= rest[3] * (h.k * u[c] + h.c * (v[c] - h.V[c] - turn[c]));
+    }
+    return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    shape_spring *row = self;
-    pal_body *body = step->body;
-    const hold h = find_hold(row, body, &row->frame);
-    if (row->world) {
-        pull_to_rest(&h, body);
-        return PAL_ERR_OK;
-    }
-    for (int k = 0; k < body->n_active; k++) {
-        size_t i = (size_t)pal_body_point(body, k);
-        const double *x = body->d + 3 * i, *v = body->dv + 3 * i, m = body->mass_kg[i];
-        double u[3], turn[3], *f = body->f + 3 * i;
-        strain(&h, body, i, u);
-        pal_cross3(turn, h.Omega, x);
-        for (int c = 0; c < 3; c++) f[c] -= m * (h.k * u[c] + h.c * (v[c] - h.V[c] - turn[c]));
-    }
-    return PAL_ERR_OK;
+    return pal_pack_run(self, step, pull);
 }
 
 static double energy(void *self, const pal_body *body)
 {
     const shape_spring *row = self;
     pal_shell_frame frame = row->frame;
-    const hold h = find_hold(row, body, &frame);
+    const hold h = find_hold(row, body, &frame, false);
     double sum = 0, u[3];
     for (int k = 0; k < body->n_active; k++) {
         size_t i = (size_t)pal_body_point(body, k);
-        strain(&h, body, i, u);
+        strain(&h, body->d + 3 * i, body->x_rest + 3 * i, u);
         sum += body->mass_kg[i] * pal_dot3(u, u);
     }
     return 0.5 * h.k * sum;
@@ -201,6 +203,7 @@ const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
                                             .stage = PAL_STAGE_FORCE,
                                             .make = make,
                                             .run = run,
+                                            .pull = pull,
                                             .energy = energy,
                                             .stiffness = stiffness,
                                             .damping = damping,

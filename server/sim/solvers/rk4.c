@@ -18,25 +18,33 @@
  * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/pack.h"
 #include "server/sim/shell.h"
 
 #include <string.h>
 
-/* what a node keeps between the stages: place and velocity at the start, first acceleration, velocity of the second
- * stage, sums of velocities and accelerations, inverse mass */
+/* what a node keeps between the stages, as place and velocity: what its next one starts from, and the sum of rates.
+ * Lanczos' iteration: place and q, forces at the state itself and the q before */
 typedef struct memory {
-    double x[3], v[3], a[3], v2[3], sum_v[3], sum_a[3], inverse_kg;
+    pal_v8 from, sum;
 } memory;
 
-/* of a sub-step dt with drag r, z = r dt: half and whole are exp(-z/2), exp(-z); grow is dt/2 phi1(z/2); weights of the
- * accelerations of stages 1, 2 and 3, 4 */
+/* of a sub-step dt with drag r, z = r dt, for place and velocity. What is kept of the start after half a sub-step and a
+ * whole one (exp(-z/2), exp(-z)), of free and of led nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)), in the
+ * fourth stage, and in the sum in stages 1, 2 and 3, 4 */
 typedef struct rates {
-    double dt, half, whole, grow, weight[3];
+    double dt;
+    pal_v8 half[2], whole[2], grow, last, weight[3];
 } rates;
 
 typedef struct rk4 {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
-    memory *memory;       /* by place among the active nodes   [n_dof] */
+    /* by place among the active nodes [n_dof] */
+    memory *memory;
+    pal_quad *load;
+    double *inverse_kg;
+    uint8_t *led;
+    bool pulls;           /* all FORCE rows can work on the pack */
     double safety, reach; /* of the stability limit; safety times the radius 2.7 */
     double limit_s;
     double way_m; /* no node has moved farther since the bounds were taken */
@@ -76,7 +84,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     row->stiff = PAL_NEW(build->arena, double, body->n_dof);
     row->damp = PAL_NEW(build->arena, double, body->n_dof);
     row->memory = PAL_NEW(build->arena, memory, body->n_dof);
-    if (!row->stiff || !row->damp || !row->memory) return PAL_ERR_MEMORY;
+    row->load = PAL_NEW(build->arena, pal_quad, body->n_dof);
+    row->inverse_kg = PAL_NEW(build->arena, double, body->n_dof);
+    row->led = PAL_NEW(build->arena, uint8_t, body->n_dof);
+    if (!row->stiff || !row->damp || !row->memory || !row->load || !row->inverse_kg || !row->led) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_pack_make(build->body, build->arena));
     if (body->shell) {
         row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
@@ -88,6 +100,43 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     row->safety = safety;
     row->reach = safety * radius;
     *self = row;
+    return PAL_ERR_OK;
+}
+
+/* ---- forces ---- */
+
+/* the body as it is, and its loads */
+static void take_body(rk4 *row, const pal_step *step)
+{
+    const pal_body *body = step->body;
+    pal_pack_take(body);
+    row->pulls = pal_pack_complete(step);
+    for (int k = 0; k < body->n_active && row->pulls; k++)
+        row->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
+}
+
+/* places and velocities of the pack to the body */
+static void give_motion(const pal_body *body)
+{
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        pal_quad_store(body->x + i, pal_first(body->pack->xv[k]));
+        pal_quad_store(body->v + i, pal_second(body->pack->xv[k]));
+    }
+}
+
+/* forces at the pack's places and velocities, into the pack */
+static pal_err find_forces(const rk4 *row, pal_step *step)
+{
+    pal_body *body = step->body;
+    if (row->pulls) {
+        memcpy(body->pack->f, row->load, sizeof *row->load * (size_t)body->n_active);
+        return pal_pack_gather(step);
+    }
+    give_motion(body);
+    PAL_TRY(pal_gather(step));
+    for (int k = 0; k < body->n_active; k++)
+        body->pack->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
     return PAL_ERR_OK;
 }
 
@@ -147,8 +196,7 @@ static double one_if_finite(const rk4 *row, const pal_body *body)
     return 1 + sum;
 }
 
-/* ---- Lanczos' iteration; vectors are sqrt(m) times moves: q in v, the one before in v2, A q in a; forces at the state
- * itself in sum_v, places in x ---- */
+/* ---- Lanczos' iteration; vectors are sqrt(m) times moves, A q takes the place of the forces ---- */
 
 /* the first one: any signs, nodes weighted by their row sums over mass, as the stiffest are where fast modes live */
 static void begin_lanczos(rk4 *row, const pal_body *body)
@@ -156,64 +204,63 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
     double norm2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        memory *m = &row->memory[k];
         double weight = row->stiff[i] / body->mass_kg[i];
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
-        m->inverse_kg = body->held[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
-        for (int c = 0; c < 3; c++) {
+        pal_quad q = {0};
+        row->inverse_kg[k] = body->held[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
+        for (int c = 0; c < 3 && !body->held[i]; c++) {
             bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u;
-            m->v[c] = body->held[i] ? 0 : weight * ((double)(bits >> 11) * 0x1p-52 - 1);
-            m->x[c] = body->x[3 * (size_t)i + (size_t)c];
-            m->sum_v[c] = row->force[3 * (size_t)i + (size_t)c];
-            m->v2[c] = 0;
-            norm2 += m->v[c] * m->v[c];
+            q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
+        norm2 += pal_quad_dot(q, q);
+        row->memory[k].from = pal_join(pal_first(body->pack->xv[k]), q);
+        row->memory[k].sum = pal_join(body->pack->f[k], (pal_quad){0});
     }
-    double scale = norm2 > 0 ? 1 / sqrt(norm2) : 0;
-    for (int k = 0; k < body->n_active; k++) pal_scale3(row->memory[k].v, scale, row->memory[k].v);
+    const pal_quad one = {1, 1, 1, 1};
+    const pal_v8 scale = pal_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
+    for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
 }
 
 /* A q by the difference of forces over a move of 1e-6 of an element; returns q A q */
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
+    pal_pack *pack = body->pack;
     double most2 = 0;
     for (int k = 0; k < body->n_active; k++) {
-        const memory *m = &row->memory[k];
-        most2 = fmax(most2, m->inverse_kg * m->inverse_kg * pal_dot3(m->v, m->v));
+        pal_quad q = row->inverse_kg[k] * pal_second(row->memory[k].from);
+        double q2 = pal_quad_dot(q, q);
+        most2 = q2 > most2 ? q2 : most2;
     }
     double small = most2 > 0 ? 1e-6 * body->h_m / sqrt(most2) : 0, per = most2 > 0 ? 1 / small : 0;
     for (int k = 0; k < body->n_active; k++) {
-        const memory *m = &row->memory[k];
-        double *at = row->at + 3 * (size_t)pal_body_point(body, k);
-        pal_copy3(at, m->x);
-        pal_axpy3(at, small * m->inverse_kg, m->v);
+        pal_quad move = small * row->inverse_kg[k] * pal_second(row->memory[k].from);
+        pack->xv[k] = pal_join(pal_first(row->memory[k].from) + move, (pal_quad){0});
     }
-    PAL_TRY(pal_gather(step));
+    PAL_TRY(find_forces(row, step));
     *along = 0;
     for (int k = 0; k < body->n_active; k++) {
-        memory *m = &row->memory[k];
-        pal_sub3(m->a, m->sum_v, row->force + 3 * (size_t)pal_body_point(body, k));
-        pal_scale3(m->a, per * m->inverse_kg, m->a);
-        *along += pal_dot3(m->a, m->v);
+        pack->f[k] = per * row->inverse_kg[k] * (pal_first(row->memory[k].sum) - pack->f[k]);
+        *along += pal_quad_dot(pack->f[k], pal_second(row->memory[k].from));
     }
     return PAL_ERR_OK;
 }
 
 /* the next vector from A q - alpha q - beta q'; returns its length before it was made 1 */
-static double next_lanczos(rk4 *row, int n, double alpha, double beta)
+static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double beta)
 {
     double norm2 = 0;
-    for (int k = 0; k < n; k++) {
+    for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
-        for (int c = 0; c < 3; c++) {
-            m->a[c] -= alpha * m->v[c] + beta * m->v2[c];
-            m->v2[c] = m->v[c];
-            norm2 += m->a[c] * m->a[c];
-        }
+        pal_quad q = pal_second(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_second(m->sum));
+        norm2 += pal_quad_dot(next, next);
+        m->sum = pal_join(pal_first(m->sum), q);
+        m->from = pal_join(pal_first(m->from), next);
     }
-    double norm = sqrt(norm2), scale = norm > 0 ? 1 / norm : 0;
-    for (int k = 0; k < n; k++) pal_scale3(row->memory[k].v, scale, row->memory[k].a);
+    const pal_quad one = {1, 1, 1, 1};
+    const double norm = sqrt(norm2);
+    const pal_v8 scale = pal_join(one, norm > 0 ? one / norm : 0 * one);
+    for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
     return norm;
 }
 
@@ -245,11 +292,12 @@ static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
 {
     double a[LANCZOS], b[LANCZOS];
     int n = 0;
-    PAL_TRY(pal_gather(step));
+    take_body(row, step);
+    PAL_TRY(find_forces(row, step));
     begin_lanczos(row, step->body);
     while (n < LANCZOS) {
         PAL_TRY(apply_stiffness(row, step, &a[n]));
-        b[n] = next_lanczos(row, step->body->n_active, a[n], n > 0 ? b[n - 1] : 0);
+        b[n] = next_lanczos(row, step->body, a[n], n > 0 ? b[n - 1] : 0);
         if (!(b[n++] > 1e-6 * most)) break;
     }
     *out = largest_of(a, b, n, 1.01 * most);
@@ -369,105 +417,107 @@ static void find_phi(double z, double phi[4])
     }
 }
 
-static rates find_rates(double dt_s, double rate)
+static pal_v8 both(double place, double velocity)
 {
-    rates r = {dt_s, 1, 1, 0.5 * dt_s, {dt_s / 6, dt_s / 3, dt_s / 6}};
-    double phi[4], z = rate * dt_s;
-    if (!(z > 0)) return r;
-    find_phi(z / 2, phi);
-    r.half = phi[0];
-    r.grow = 0.5 * dt_s * phi[1];
-    find_phi(z, phi);
-    r.whole = phi[0];
-    r.weight[0] = dt_s * (phi[1] - 3 * phi[2] + 4 * phi[3]);
-    r.weight[1] = dt_s * (2 * phi[2] - 4 * phi[3]);
-    r.weight[2] = dt_s * (4 * phi[3] - phi[2]);
-    return r;
+    const pal_quad one = {1, 1, 1, 1};
+    return pal_join(place * one, velocity * one);
 }
 
-/* the state at the start, and the second stage's */
-static void stage_first(rk4 *row, pal_body *body, const rates *r, bool heavy)
+static rates find_rates(double dt_s, double rate)
+{
+    double half = 1, whole = 1, grow = 0.5 * dt_s, weight[3] = {dt_s / 6, dt_s / 3, dt_s / 6}, phi[4];
+    if (rate * dt_s > 0) {
+        find_phi(rate * dt_s / 2, phi);
+        half = phi[0];
+        grow = 0.5 * dt_s * phi[1];
+        find_phi(rate * dt_s, phi);
+        whole = phi[0];
+        weight[0] = dt_s * (phi[1] - 3 * phi[2] + 4 * phi[3]);
+        weight[1] = dt_s * (2 * phi[2] - 4 * phi[3]);
+        weight[2] = dt_s * (4 * phi[3] - phi[2]);
+    }
+    return (rates){.dt = dt_s,
+                   .half = {both(1, half), both(1, 1)},
+                   .whole = {both(0, whole), both(0, 1)},
+                   .grow = both(0.5 * dt_s, grow),
+                   .last = both(dt_s, 2 * grow),
+                   .weight = {both(dt_s / 6, weight[0]), both(dt_s / 3, weight[1]), both(dt_s / 6, weight[2])}};
+}
+
+/* inverse masses: held nodes have no acceleration, and standing ones no velocity */
+static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool heavy)
 {
     double t = r->dt / row->reach;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        memory *m = &row->memory[k];
-        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, mass = body->mass_kg[i];
-        const double *g = body->g + 3 * (size_t)i;
+        double mass = body->mass_kg[i];
         if (heavy) mass = fmax(mass, fmax(t * t * row->stiff[i], t * row->damp[i]));
-        /* held nodes have no acceleration, and standing ones no velocity */
-        m->inverse_kg = body->held[i] ? 0 : 1 / mass;
-        bool led = body->held[i] == 2, stands = body->held[i] && !led;
-        double half = led ? 1 : r->half;
-        for (int c = 0; c < 3; c++) {
-            m->x[c] = x[c];
-            m->v[c] = stands ? 0 : v[c];
-            m->a[c] = g[c] * m->inverse_kg;
-            m->v2[c] = half * m->v[c] + r->grow * m->a[c];
-            m->sum_v[c] = m->v[c] + 2 * m->v2[c];
-            m->sum_a[c] = r->weight[0] * m->a[c];
-            x[c] = m->x[c] + 0.5 * r->dt * m->v[c];
-            v[c] = m->v2[c];
-        }
+        row->inverse_kg[k] = body->held[i] ? 0 : 1 / mass;
+        row->led[k] = body->held[i] == 2;
+        if (body->held[i] == 1) body->pack->xv[k] = pal_join(pal_first(body->pack->xv[k]), (pal_quad){0});
     }
 }
 
-/* from the second stage's forces the third stage's state */
-static void stage_second(rk4 *row, pal_body *body, const rates *r)
+/* velocity and acceleration of a packed node */
+PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_pack *pack, int k)
 {
+    return pal_join(pal_second(pack->xv[k]), row->inverse_kg[k] * pack->f[k]);
+}
+
+/* the state at the start, and the second stage's */
+static void stage_first(rk4 *row, const pal_body *body, const rates *r)
+{
+    pal_pack *pack = body->pack;
     for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
         memory *m = &row->memory[k];
-        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, half = body->held[i] == 2 ? 1 : r->half;
-        const double *g = body->g + 3 * (size_t)i;
-        for (int c = 0; c < 3; c++) {
-            double a = g[c] * m->inverse_kg;
-            m->sum_a[c] += r->weight[1] * a;
-            x[c] = m->x[c] + 0.5 * r->dt * m->v2[c];
-            v[c] = half * m->v[c] + r->grow * a;
-            m->sum_v[c] += 2 * v[c];
-        }
+        const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
+        m->from = y;
+        m->sum = r->whole[row->led[k]] * y + r->weight[0] * rate;
+        pack->xv[k] = r->half[row->led[k]] * y + r->grow * rate;
+    }
+}
+
+/* from the second stage's forces the third stage's state. The fourth one's velocity goes on from the second's with what
+ * the drag leaves of it, less what the first acceleration gave that */
+static void stage_second(rk4 *row, const pal_body *body, const rates *r)
+{
+    pal_pack *pack = body->pack;
+    for (int k = 0; k < body->n_active; k++) {
+        memory *m = &row->memory[k];
+        const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
+        const pal_v8 kept = half * m->from, next = half * y - (y - kept);
+        m->sum += r->weight[1] * rate;
+        m->from = pal_join(pal_first(m->from), pal_second(next));
+        pack->xv[k] = kept + r->grow * rate;
     }
 }
 
 /* from the third stage's forces the fourth stage's state */
-static void stage_third(rk4 *row, pal_body *body, const rates *r)
+static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
+    pal_pack *pack = body->pack;
     for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
         memory *m = &row->memory[k];
-        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, half = body->held[i] == 2 ? 1 : r->half;
-        const double *g = body->g + 3 * (size_t)i;
-        for (int c = 0; c < 3; c++) {
-            double a = g[c] * m->inverse_kg;
-            m->sum_a[c] += r->weight[1] * a;
-            x[c] = m->x[c] + r->dt * v[c];
-            v[c] = half * m->v2[c] + r->grow * (2 * a - m->a[c]);
-            m->sum_v[c] += v[c];
-        }
+        const pal_v8 rate = rate_of(row, pack, k);
+        m->sum += r->weight[1] * rate;
+        pack->xv[k] = m->from + r->last * rate;
     }
 }
 
 /* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
-static double stage_last(rk4 *row, pal_body *body, const rates *r)
+static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
+    pal_pack *pack = body->pack;
+    const double dt2 = r->dt * r->dt;
     double most2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        memory *m = &row->memory[k];
-        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, whole = body->held[i] == 2 ? 1 : r->whole;
-        const double *g = body->g + 3 * (size_t)i;
-        double way2 = 0, v2 = 0;
-        for (int c = 0; c < 3; c++) {
-            double move = r->dt / 6 * m->sum_v[c];
-            x[c] = m->x[c] + move;
-            v[c] = whole * m->v[c] + m->sum_a[c] + r->weight[2] * g[c] * m->inverse_kg;
-            way2 += move * move, v2 += v[c] * v[c];
-        }
-        v2 *= r->dt * r->dt;
+        const memory *m = &row->memory[k];
+        const pal_v8 sum = m->sum + r->weight[2] * rate_of(row, pack, k), square = sum * sum;
+        double way2 = square[0] + square[1] + square[2], v2 = dt2 * (square[4] + square[5] + square[6]);
+        pack->xv[k] = pal_join(pal_first(m->from) + pal_first(sum), pal_second(sum));
+        poison += 0 * way2 + 0 * v2;
         way2 = v2 > way2 ? v2 : way2;
         most2 = way2 > most2 ? way2 : most2;
-        poison += 0 * way2 + 0 * v2;
     }
     return most2 + poison;
 }
@@ -476,17 +526,21 @@ static double stage_last(rk4 *row, pal_body *body, const rates *r)
 static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double most_m)
 {
     for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i, move[3];
-        pal_sub3(move, x, row->memory[k].x);
-        double way = pal_norm3(move), speed = pal_norm3(v) * dt_s;
-        if (way > most_m) {
-            pal_copy3(x, row->memory[k].x);
-            pal_axpy3(x, most_m / way, move);
-        }
-        if (speed > most_m) pal_scale3(v, most_m / speed, v);
+        pal_v8 *to = &body->pack->xv[k];
+        pal_quad from = pal_first(row->memory[k].from), move = pal_first(*to) - from, v = pal_second(*to);
+        double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
+        if (way > most_m) move *= most_m / way;
+        if (speed > most_m) v *= most_m / speed;
+        if (way > most_m || speed > most_m) *to = pal_join(from + move, v);
         body->n_clamped += way > most_m || speed > most_m;
     }
+}
+
+/* forces of the fourth stage, for those who look at what supports bear */
+static void give_forces(const rk4 *row, const pal_body *body)
+{
+    for (int k = 0; k < body->n_active && row->pulls; k++)
+        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->pack->f[k]);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -495,15 +549,19 @@ static pal_err run(void *self, pal_step *step)
     pal_body *body = step->body;
     const rates r = find_rates(step->dt_s, drag_rate(step));
     step->drag_apart = true;
-    PAL_TRY(pal_gather(step));
-    stage_first(row, body, &r, step->heavy);
-    PAL_TRY(pal_gather(step));
+    take_body(row, step);
+    take_masses(row, body, &r, step->heavy);
+    PAL_TRY(find_forces(row, step));
+    stage_first(row, body, &r);
+    PAL_TRY(find_forces(row, step));
     stage_second(row, body, &r);
-    PAL_TRY(pal_gather(step));
+    PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
-    PAL_TRY(pal_gather(step));
+    PAL_TRY(find_forces(row, step));
     double way = sqrt(stage_last(row, body, &r)), most = most_move_S * body->size_m;
     if (way > most) clamp_moves(row, body, step->dt_s, most);
+    give_motion(body);
+    give_forces(row, body);
     row->way_m += way > most ? most : way;
     row->n_since += row->n_since < PAUSE;
     if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
