@@ -357,7 +357,6 @@ static void hub_wake(void *user)
 {
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
-    pal_hub_sculpt_turn(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_hub_room *room = &hub->room[r];
         bool used[PAL_STREAM_TIER];
@@ -371,6 +370,7 @@ static void hub_wake(void *user)
         next = pal_hub_make_fields(hub, room, now);
         if (next && (!due || next < due)) due = next;
     }
+    pal_hub_sculpt_turn(hub);
     if (due) pal_loop_due(hub->loop, due);
 }
 
@@ -455,7 +455,10 @@ void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
     pal_hub_sculpt_end(hub);
-    for (int i = 0; i < hub->n_room; i++) pal_stream_close(hub->room[i].stream);
+    for (int i = 0; i < hub->n_room; i++) {
+        pal_stream_close(hub->room[i].stream);
+        for (int k = 0; k < PAL_HUB_PAST; k++) pal_packet_drop(hub->room[i].past[k].asset);
+    }
     free(hub->room);
     free(hub->client);
     free(hub->control);

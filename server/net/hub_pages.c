@@ -155,20 +155,26 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
     reply_text(reply, 200, "text/plain; version=0.0.4", p.text, p.n);
 }
 
+static pal_packet *find_asset(const pal_hub_room *room, const char *path)
+{
+    for (int p = 0; p < room->stream->n_part; p++)
+        if (!strcmp(room->stream->part[p].info.asset, path)) return room->stream->part[p].asset;
+    for (int i = 0; i < PAL_HUB_PAST; i++)
+        if (room->past[i].asset && !strcmp(room->past[i].path, path)) return room->past[i].asset;
+    return NULL;
+}
+
 static bool get_asset(pal_hub *hub, const char *path, pal_reply *reply)
 {
-    for (int r = 0; r < hub->n_room; r++)
-        for (int p = 0; p < hub->room[r].stream->n_part; p++) {
-            const pal_stream_part *part = &hub->room[r].stream->part[p];
-            if (strcmp(part->info.asset, path)) continue;
-            reply->status = 200;
-            reply->type = "application/octet-stream";
-            reply->caching = "public, max-age=31536000, immutable";
-            snprintf(reply->etag, sizeof reply->etag, "\"%.40s\"", strrchr(path, '/') + 1);
-            reply->body = pal_packet_hold(part->asset);
-            return true;
-        }
-    return false;
+    pal_packet *asset = NULL;
+    for (int r = 0; r < hub->n_room && !asset; r++) asset = find_asset(&hub->room[r], path);
+    if (!asset) return false;
+    reply->status = 200;
+    reply->type = "application/octet-stream";
+    reply->caching = "public, max-age=31536000, immutable";
+    snprintf(reply->etag, sizeof reply->etag, "\"%.40s\"", strrchr(path, '/') + 1);
+    reply->body = pal_packet_hold(asset);
+    return true;
 }
 
 void pal_hub_get(void *user, const char *path, pal_reply *reply)

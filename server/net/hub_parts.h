@@ -5,7 +5,7 @@
 #include "server/net/credit.h"
 #include "server/net/hub.h"
 
-enum { PAL_HUB_QUEUE = 32 };
+enum { PAL_HUB_QUEUE = 32, PAL_HUB_PAST = 8 };
 
 struct pal_hub_room;
 
@@ -39,11 +39,19 @@ typedef struct pal_client {
     uint64_t scold_ns;                                    /* last error about poses               */
 } pal_client;
 
+/* an asset that was shown before: who was told of it may still be asking for it */
+typedef struct pal_hub_past {
+    char path[PAL_WIRE_NAME_BYTES];
+    pal_packet *asset; /* NULL: none */
+} pal_hub_past;
+
 /* one session as the hub sees it */
 typedef struct pal_hub_room {
     pal_session *session;
     bool own; /* the hub made it: sculpting has replaced the one that was given */
     pal_stream *stream;
+    pal_hub_past past[PAL_HUB_PAST]; /* as a ring, the oldest at n_past */
+    int n_past;
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last asked for */

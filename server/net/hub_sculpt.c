@@ -340,6 +340,19 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
 
 /* ---- one after the other ---- */
 
+/* assets that go are kept for a while: a client may be on its way to fetch one */
+static void keep_assets(pal_hub_room *room, const pal_stream *before)
+{
+    for (int p = 0; p < before->n_part; p++) {
+        const pal_stream_part *part = &before->part[p];
+        if (p < room->stream->n_part && !strcmp(part->info.asset, room->stream->part[p].info.asset)) continue;
+        pal_hub_past *past = &room->past[room->n_past];
+        snprintf(past->path, sizeof past->path, "%s", part->info.asset);
+        pal_packet_replace(&past->asset, pal_packet_hold(part->asset));
+        room->n_past = (room->n_past + 1) % PAL_HUB_PAST;
+    }
+}
+
 /* what came out takes the place of what runs; false: it goes on as it was, note says why */
 static bool take_over(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
 {
@@ -352,6 +365,7 @@ static bool take_over(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
     pal_stream_follow(work->stream, old_stream);
     pal_sculptor_accept(at->sculptor, work->turn);
     room->stream = work->stream, room->session = work->next;
+    keep_assets(room, old_stream);
     hub->session[room - hub->room] = NULL;
     room->own = true;
     pal_workshop_clear(s->workshop, old_stream, old, at->turn);
@@ -404,7 +418,8 @@ static pal_scene *scene_now(const pal_hub_room *room)
 /* gives the next order to the workshop; one that cannot be read is answered and gone */
 static void begin_next(pal_hub *hub, pal_hub_sculpt *s)
 {
-    while (s->n > 0) {
+    /* what is pointed at, and kept, is what is shown: a session that has just begun comes with its first frame */
+    while (s->n > 0 && s->list[0].room->stream->frame) {
         pal_work work = {.err = PAL_ERR_OK};
         s->now = s->list[0];
         memmove(s->list, s->list + 1, sizeof *s->list * (size_t)--s->n);

@@ -1,7 +1,6 @@
 /* Packets are one heap block each: head, room for a road's header, bytes. */
 #include "server/net/packet.h"
 
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +12,7 @@ pal_packet *pal_packet_create(const void *bytes, size_t n_byte, bool text)
     pal_packet *p = malloc(sizeof *p + PAL_PACKET_FRONT + n_byte);
     if (!p) return NULL;
     p->n_byte = n_byte;
-    p->n_user = 1;
+    atomic_init(&p->n_user, 1);
     p->text = text;
     p->bytes = (uint8_t *)(p + 1) + PAL_PACKET_FRONT;
     if (bytes)

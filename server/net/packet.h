@@ -1,9 +1,11 @@
 /* Counted encoded bytes: one message, encoded once, held by everybody who still has to send it.
  *
  * A packet is constant once it has been handed on. Before its bytes lies room that a road may use for its own header
- * (websocket framing), hence one packet belongs to one network thread. Thread: [net]. */
+ * (websocket framing), hence only one network thread sends a packet. Any thread may create, hold and drop: the last one
+ * frees. Thread: [any]. */
 #ifndef PAL_NET_PACKET_H
 #define PAL_NET_PACKET_H
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -12,7 +14,7 @@ enum { PAL_PACKET_FRONT = 32 };
 
 typedef struct pal_packet {
     size_t n_byte;
-    int n_user;
+    atomic_int n_user;
     bool text;      /* control message, else binary */
     uint8_t *bytes; /* [n_byte], writable room of PAL_PACKET_FRONT bytes before it */
 } pal_packet;

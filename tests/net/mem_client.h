@@ -15,6 +15,8 @@ typedef struct mem_client {
     pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
     int n_text[PAL_CONTROL_COUNT];
     int n_frame, n_tools, n_haptic, n_field, n_bad;
+    uint32_t epoch; /* of the asset */
+    int n_old;      /* frames and fields of an older one: ignored */
     pal_frame_head frame;
     pal_wire_tools tools;
     pal_wire_haptic haptic;
@@ -62,14 +64,28 @@ static inline void mem_join(mem_client *c, pal_transport *road, const char *name
     mem_join_as(c, road, name, role, tool, false);
 }
 
-static inline void mem_load_asset(mem_client *c)
+static inline void mem_drop_asset(mem_client *c)
+{
+    pal_frame_decoder_destroy(c->decoder);
+    pal_asset_destroy(c->asset);
+    free(c->position_m);
+    free(c->level);
+    free(c->tri);
+    c->decoder = NULL, c->asset = NULL, c->position_m = NULL, c->level = NULL, c->tri = NULL;
+}
+
+/* part 0 as hello or topology name it */
+static inline void mem_load_asset(mem_client *c, const pal_wire_part_info *part)
 {
     pal_reply reply;
-    pal_mem_get(c->road, c->last[PAL_CONTROL_HELLO].hello.part[0].asset, &reply);
+    pal_mem_get(c->road, part->asset, &reply);
     CHECK_INT(reply.status, 200);
     if (!reply.body) return;
+    mem_drop_asset(c);
+    c->epoch = part->epoch;
     CHECK_INT(pal_asset_decode(reply.body->bytes, reply.body->n_byte, &c->asset), 0);
     CHECK_INT(pal_frame_decoder_create(c->asset, &c->decoder), 0);
+    CHECK_INT(c->asset->order->n_vertex, part->n_vertex);
     c->position_m = calloc(c->asset->order->n_vertex, 3 * sizeof(float));
     c->level = calloc(c->asset->order->n_vertex, 1);
     c->tri = calloc(c->asset->n_triangle, 3 * sizeof *c->tri);
@@ -87,7 +103,9 @@ static inline void mem_take_text(mem_client *c, const pal_packet *p)
     }
     c->last[in.type] = in;
     c->n_text[in.type]++;
-    if (in.type == PAL_CONTROL_HELLO) mem_load_asset(c);
+    if (in.type == PAL_CONTROL_HELLO) mem_load_asset(c, &in.hello.part[0]);
+    if (in.type == PAL_CONTROL_TOPOLOGY && in.topology.part[0].epoch > c->epoch)
+        mem_load_asset(c, &in.topology.part[0]);
 }
 
 /* the places change, and a frame of that part must be next */
@@ -114,8 +132,13 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
     } else if (head.kind == PAL_WIRE_PATCH) {
         mem_take_patch(c, p);
     } else if (head.kind == PAL_WIRE_FRAME) {
-        c->n_frame++;
+        pal_frame_head frame;
         c->patched = false;
+        if (!pal_frame_get_head(p->bytes, p->n_byte, &frame) && frame.epoch < c->epoch) {
+            c->n_old++;
+            return;
+        }
+        c->n_frame++;
         if (!c->decoder || pal_frame_get(c->decoder, p->bytes, p->n_byte, &c->frame, c->position_m)) c->n_bad++;
     } else if (head.kind == PAL_WIRE_TOOLS) {
         c->n_tools++;
@@ -126,6 +149,11 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
             pal_mem_send(c->peer, ack, sizeof ack, false);
         }
     } else if (head.kind == PAL_WIRE_FIELD) {
+        pal_field_head field;
+        if (!pal_field_get_head(p->bytes, p->n_byte, &field) && field.epoch < c->epoch) {
+            c->n_old++;
+            return;
+        }
         c->n_field++;
         if (!c->level || pal_field_get(p->bytes, p->n_byte, c->asset->order->n_vertex, &c->field, c->level)) c->n_bad++;
     } else {
@@ -158,11 +186,7 @@ static inline void mem_pose(mem_client *c, int tool, uint32_t seq, const double 
 static inline void mem_end(mem_client *c)
 {
     if (c->peer) pal_mem_leave(c->peer);
-    pal_frame_decoder_destroy(c->decoder);
-    pal_asset_destroy(c->asset);
-    free(c->position_m);
-    free(c->level);
-    free(c->tri);
+    mem_drop_asset(c);
     memset(c, 0, sizeof *c);
 }
 #endif

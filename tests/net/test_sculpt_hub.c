@@ -1,0 +1,441 @@
+/* Sculpting over the wire: commands of clients on mem:// to a real session that runs, the topology that comes of them,
+ * frames that fit it, answers, refusals, and who goes in the middle. */
+#include "protocol/asset.h"
+#include "server/net/server.h"
+#include "tests/net/mem_client.h"
+#include "tests/session/clay.h"
+
+#include <time.h>
+
+#define FRAME_NS 16666667ull
+
+static clay_scene clay;
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pal_transport *road;
+static uint64_t now_ns;
+
+/* places of a block of 0.1 m, on its top and beside it */
+#define TOP  "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"
+#define SIDE "\"x_m\":0.05,\"y_m\":0.02,\"z_m\":0.02"
+#define FAR  "\"x_m\":0.5,\"y_m\":0,\"z_m\":0"
+
+static void begin(void)
+{
+    pal_note note = {""};
+    gate = pal_server_gate_create();
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
+    pal_server_options net = {.road = "mem"};
+    if (pal_session_open(&clay.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    pal_server_connect(server, gate);
+    road = pal_server_transport(server);
+    now_ns = 1000000000ull;
+}
+
+static void end(void)
+{
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+    CHECK_INT(pal_packet_total(), 0);
+}
+
+/* the loop goes on by a little; others read too, or their queues would fill */
+static void turn(mem_client *a, mem_client *b)
+{
+    now_ns += FRAME_NS / 4;
+    pal_server_turn(server, now_ns);
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+    nanosleep(&(struct timespec){0, 500000}, NULL);
+}
+
+static int n_answer(const mem_client *c)
+{
+    return c->n_text[PAL_CONTROL_ANSWER] + c->n_text[PAL_CONTROL_ERROR];
+}
+
+static void until_answers(mem_client *c, mem_client *other, int n)
+{
+    for (int i = 0; i < 20000 && n_answer(c) < n; i++) turn(c, other);
+    CHECK_INT(n_answer(c), n);
+}
+
+static void send(mem_client *c, const char *verb, const char *args)
+{
+    char text[512];
+    snprintf(text, sizeof text, "{\"type\":\"command\",\"verb\":\"%s\",\"target\":\"\",\"args\":{%s}}", verb, args);
+    mem_text(c, text);
+}
+
+/* was it done? */
+static bool order(mem_client *c, const char *verb, const char *args)
+{
+    int n_done = c->n_text[PAL_CONTROL_ANSWER];
+    send(c, verb, args);
+    until_answers(c, NULL, n_answer(c) + 1);
+    return c->n_text[PAL_CONTROL_ANSWER] > n_done;
+}
+
+static double told(const mem_client *c, const char *key)
+{
+    const pal_wire_answer *a = &c->last[PAL_CONTROL_ANSWER].answer;
+    for (uint32_t i = 0; i < a->n_arg; i++)
+        if (!strcmp(a->arg[i].key, key)) return a->arg[i].value;
+    return NAN;
+}
+
+static const char *trouble(const mem_client *c)
+{
+    return c->last[PAL_CONTROL_ERROR].problem.text;
+}
+
+/* waits for a frame of the epoch that the client has */
+static void until_frame(mem_client *c)
+{
+    for (int i = 0; i < 20000 && (c->frame.epoch != c->epoch || c->n_tools == 0); i++) turn(c, NULL);
+    CHECK_INT(c->frame.epoch, c->epoch);
+    CHECK_INT(c->n_bad, 0);
+}
+
+/* farthest vertex from its place at rest, m */
+static double moved(const mem_client *c)
+{
+    double most = 0;
+    for (size_t i = 0; i < 3 * (size_t)c->asset->order->n_vertex; i++)
+        most = fmax(most, fabs((double)c->position_m[i] - (double)c->asset->rest_m[i]));
+    return most;
+}
+
+static void join(mem_client *c, const char *name, pal_wire_role role, int tool)
+{
+    mem_join(c, road, name, role, tool);
+    mem_pull(c, 1000);
+    REQUIRE(c->asset);
+    until_frame(c);
+}
+
+static const pal_wire_part_info *part(const mem_client *c)
+{
+    return c->n_text[PAL_CONTROL_TOPOLOGY] ? &c->last[PAL_CONTROL_TOPOLOGY].topology.part[0]
+                                           : &c->last[PAL_CONTROL_HELLO].hello.part[0];
+}
+
+static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    const pal_wire_part_info before = *part(&c);
+    CHECK(before.sculpts);
+    CHECK_INT(before.epoch, 1);
+    CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.03"));
+    CHECK_TEXT(c.last[PAL_CONTROL_ANSWER].answer.verb, "extrude");
+    CHECK_NEAR(told(&c, "cells"), 9, 0);
+    CHECK_NEAR(told(&c, "can_undo"), 1, 0);
+    CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 1);
+    CHECK_INT(part(&c)->epoch, 2);
+    /* a brick of the control mesh, subdivided once, adds 4 sides of 4 faces: 16 quads at the sides, 4 on top for 4 */
+    CHECK_INT(part(&c)->n_vertex, before.n_vertex + 16);
+    CHECK_INT(part(&c)->n_triangle, before.n_triangle + 32);
+    uint64_t time_us = c.tools.sim_time_us;
+    until_frame(&c);
+    CHECK_LE(moved(&c), 1e-4); /* at rest, as the block was */
+    for (int i = 0; i < 2000 && c.tools.sim_time_us < time_us + 50000; i++) turn(&c, NULL);
+    CHECK(c.tools.sim_time_us >= time_us + 50000); /* time goes on where it was */
+    /* the topology of before, and its very asset */
+    CHECK(order(&c, "undo", ""));
+    CHECK_INT(part(&c)->epoch, 3);
+    CHECK_INT(part(&c)->n_vertex, before.n_vertex);
+    CHECK_INT(part(&c)->n_triangle, before.n_triangle);
+    CHECK_TEXT(part(&c)->asset, before.asset);
+    until_frame(&c);
+    CHECK(order(&c, "redo", ""));
+    CHECK_INT(part(&c)->n_vertex, before.n_vertex + 16);
+    CHECK_NEAR(told(&c, "can_redo"), 0, 0);
+    until_frame(&c);
+    mem_end(&c);
+    end();
+}
+
+static void assets_that_have_been_replaced_can_still_be_fetched(void)
+{
+    mem_client c;
+    pal_reply reply;
+    char first[PAL_WIRE_NAME_BYTES];
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    snprintf(first, sizeof first, "%s", part(&c)->asset);
+    CHECK(order(&c, "divide", TOP));
+    CHECK(strcmp(first, part(&c)->asset) != 0);
+    pal_mem_get(road, first, &reply);
+    CHECK_INT(reply.status, 200);
+    pal_packet_drop(reply.body);
+    /* not for ever */
+    for (int i = 0; i < 12; i++) {
+        char args[128];
+        snprintf(args, sizeof args, "\"nx\":0,\"ny\":0,\"nz\":1,\"offset_m\":%g", -0.03 + 0.005 * i);
+        CHECK(order(&c, "cut", args));
+    }
+    pal_mem_get(road, first, &reply);
+    CHECK_INT(reply.status, 404);
+    pal_packet_drop(reply.body);
+    mem_end(&c);
+    end();
+}
+
+static void paint_is_what_a_probe_finds(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    CHECK(order(&c, "probe", TOP));
+    double young = told(&c, "young_Pa"), density = told(&c, "density_kg_m3");
+    CHECK_NEAR(young, clay.scene.body[0].material.young_Pa, 1e-9 * young);
+    CHECK(order(&c, "paint", TOP ",\"radius_m\":0.03,\"young_factor\":4,\"density_factor\":2"));
+    CHECK_INT(part(&c)->epoch, 2);
+    CHECK(order(&c, "probe", TOP));
+    CHECK_NEAR(told(&c, "young_Pa"), 4 * young, 1e-6 * young);
+    CHECK_NEAR(told(&c, "density_kg_m3"), 2 * density, 1e-6 * density);
+    /* beyond the brush it is as it was */
+    CHECK(order(&c, "probe", "\"x_m\":-0.05,\"y_m\":-0.04,\"z_m\":-0.04"));
+    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    CHECK_INT(part(&c)->epoch, 2); /* who asks changes nothing */
+    CHECK(order(&c, "undo", ""));
+    CHECK(order(&c, "probe", TOP));
+    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    until_frame(&c);
+    mem_end(&c);
+    end();
+}
+
+static void a_cut_shows_the_inside_and_goes_again(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    const pal_wire_part_info before = *part(&c);
+    CHECK(order(&c, "cut", "\"nx\":0,\"ny\":0,\"nz\":2,\"offset_m\":0.001"));
+    /* the half below: a plane of 4 by 4 faces where the block is cut, and 4 sides of 4 by 2, a bottom of 4 by 4 */
+    CHECK_INT(part(&c)->n_triangle, 2 * (16 + 4 * 8 + 16));
+    until_frame(&c);
+    double most = -1;
+    for (uint32_t i = 0; i < c.asset->order->n_vertex; i++) most = fmax(most, (double)c.asset->rest_m[3 * i + 2]);
+    CHECK_NEAR(most, 0, 0.005);
+    CHECK_NEAR(told(&c, "can_undo"), 0, 0);
+    CHECK(order(&c, "uncut", ""));
+    CHECK_TEXT(part(&c)->asset, before.asset);
+    CHECK(order(&c, "keep", ""));
+    CHECK_NEAR(told(&c, "can_undo"), 1, 0);
+    until_frame(&c);
+    CHECK_LE(moved(&c), 1e-4);
+    mem_end(&c);
+    end();
+}
+
+static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(void)
+{
+    static const struct {
+        const char *verb, *args, *code, *word;
+    } bad[] = {{"delete", FAR, "refused", "nothing of clay is at 0.5 0 0 m"},
+               {"paint", TOP ",\"radius_m\":0", "refused", "radius"},
+               {"paint", TOP, "args", "paint: radius_m is missing"},
+               {"extrude", TOP ",\"distance_m\":0.01,\"colour\":3", "args", "extrude takes x_m y_m z_m distance_m"},
+               {"extrude", TOP ",\"distance_m\":-0.04", "refused", "extrude: "},
+               {"extrude", TOP ",\"distance_m\":0.01,\"scale\":-1", "refused", "extrude: "},
+               {"merge", TOP ",\"x2_m\":0.5,\"y2_m\":0,\"z2_m\":0", "refused", "nothing of clay"},
+               {"merge", TOP ",\"x2_m\":-0.05,\"y2_m\":0.02,\"z2_m\":0.02", "refused", "merge: "},
+               {"bridge", TOP ",\"x2_m\":0.02,\"y2_m\":0.02,\"z2_m\":0.05", "refused", "bridge: "},
+               {"sharpen", TOP ",\"sharp\":1,\"what\":7", "args", "what is 7"},
+               {"sharpen", TOP ",\"sharp\":-1,\"what\":0", "refused", "sharpen: "},
+               {"cut", "\"nx\":0,\"ny\":0,\"nz\":0,\"offset_m\":0", "refused", "direction"},
+               {"cut", "\"nx\":0,\"ny\":0,\"nz\":1,\"offset_m\":-1", "refused", "the cut leaves nothing"},
+               {"undo", "", "refused", "nothing to undo"},
+               {"redo", "", "refused", "nothing to redo"},
+               {"undo", "\"n\":2", "args", "undo takes no numbers"},
+               {"probe", FAR, "refused", "nothing of clay"}};
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        bool done = order(&c, bad[i].verb, bad[i].args);
+        bool as_said = !done && strstr(trouble(&c), bad[i].word);
+        CHECK(as_said);
+        if (done || !as_said) printf("  %s %s: \"%s\"\n", bad[i].verb, bad[i].args, done ? "done" : trouble(&c));
+        CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, bad[i].code);
+    }
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"undo\",\"target\":\"liver\"}");
+    until_answers(&c, NULL, n_answer(&c) + 1);
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "target");
+    CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 0);
+    CHECK_INT(pal_mem_code(c.peer), 0);
+    CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
+    CHECK_INT(part(&c)->epoch, 2);
+    mem_end(&c);
+    end();
+}
+
+static void who_holds_no_tool_and_teaches_nobody_sculpts_nothing(void)
+{
+    mem_client looks, bare, holds;
+    begin();
+    join(&looks, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    join(&bare, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    join(&holds, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    CHECK(!order(&looks, "divide", TOP));
+    CHECK_TEXT(looks.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK(!order(&bare, "divide", TOP));
+    CHECK_TEXT(bare.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK(order(&bare, "probe", TOP)); /* that only asks */
+    CHECK(order(&holds, "divide", TOP));
+    mem_end(&looks);
+    mem_end(&bare);
+    mem_end(&holds);
+    end();
+}
+
+static void sixteen_wait_and_the_next_one_is_told(void)
+{
+    enum { ASKED = 19 };
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    int before = n_answer(&c);
+    for (int i = 0; i < ASKED; i++) send(&c, i % 2 ? "undo" : "extrude", i % 2 ? "" : TOP ",\"distance_m\":0.02");
+    until_answers(&c, NULL, before + ASKED);
+    CHECK_INT(c.n_text[PAL_CONTROL_ERROR], 2); /* one is under way, sixteen wait */
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "busy");
+    CHECK_INT(c.n_text[PAL_CONTROL_ANSWER], 17);
+    CHECK_INT(part(&c)->epoch, 18); /* in order: each undo had something to undo */
+    CHECK_NEAR(told(&c, "cells"), 9, 0);
+    CHECK(order(&c, "undo", "")); /* and there is room again */
+    mem_end(&c);
+    end();
+}
+
+static void everybody_is_told_and_who_comes_late_begins_at_the_new_asset(void)
+{
+    mem_client a, b, late;
+    begin();
+    join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    join(&b, "Ben", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    send(&a, "delete", TOP);
+    until_answers(&a, &b, n_answer(&a) + 1);
+    until_frame(&a);
+    until_frame(&b);
+    CHECK_INT(a.n_text[PAL_CONTROL_TOPOLOGY], 1);
+    CHECK_INT(b.n_text[PAL_CONTROL_TOPOLOGY], 1);
+    CHECK_INT(b.n_text[PAL_CONTROL_ANSWER], 0); /* the answer is who asked's */
+    CHECK_TEXT(part(&b)->asset, part(&a)->asset);
+    join(&late, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(part(&late)->epoch, 2);
+    CHECK_TEXT(part(&late)->asset, part(&a)->asset);
+    mem_end(&a);
+    mem_end(&b);
+    mem_end(&late);
+    end();
+}
+
+static void the_tool_stays_held_and_its_poses_go_on(void)
+{
+    mem_client c;
+    uint32_t seq = 0;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    for (int round = 0; round < 3; round++) {
+        /* close above the top, to and fro */
+        const double at[3] = {0, 0, 0.12 + 0.01 * round};
+        mem_pose(&c, 0, ++seq, at);
+        if (round == 1) CHECK(order(&c, "extrude", SIDE ",\"distance_m\":0.02"));
+        for (int i = 0; i < 20000 && c.tools.tool[0].echo_seq != seq; i++) turn(&c, NULL);
+        CHECK_INT(c.tools.tool[0].echo_seq, seq);
+        CHECK(c.tools.tool[0].flags & PAL_WIRE_TOOL_HELD);
+        CHECK(!(c.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY));
+        CHECK_NEAR((double)c.tools.tool[0].position_m[2], at[2], 1e-6);
+        CHECK_INT(c.tools.tool[0].holder, c.last[PAL_CONTROL_HELLO].hello.you_id);
+    }
+    CHECK_INT(part(&c)->epoch, 2);
+    int n_haptic = c.n_haptic;
+    for (int i = 0; i < 2000 && c.n_haptic == n_haptic; i++) turn(&c, NULL);
+    CHECK(c.n_haptic > n_haptic); /* models of contact still come */
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+static void a_field_that_is_looked_at_goes_on_with_the_new_vertices(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_text(&c, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    for (int i = 0; i < 20000 && c.n_field == 0; i++) turn(&c, NULL);
+    CHECK_INT(c.field.epoch, 1);
+    CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
+    for (int i = 0; i < 20000 && c.field.epoch != 2; i++) turn(&c, NULL);
+    CHECK_INT(c.field.epoch, 2);
+    CHECK_INT(c.field.n_vertex, part(&c)->n_vertex);
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+static void who_asks_and_goes_leaves_the_others_a_session_that_works(void)
+{
+    mem_client goes, stays;
+    begin();
+    join(&goes, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&stays, "Ben", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    send(&goes, "extrude", TOP ",\"distance_m\":0.02"); /* under way */
+    send(&goes, "divide", SIDE);                        /* waits     */
+    mem_end(&goes);
+    CHECK(order(&stays, "probe", TOP));
+    /* what was under way is done for all, what waited went with who wanted it */
+    for (int i = 0; i < 20000 && stays.epoch != 2; i++) turn(&stays, NULL);
+    CHECK_INT(stays.epoch, 2);
+    CHECK(order(&stays, "undo", ""));
+    CHECK_INT(part(&stays)->epoch, 3);
+    until_frame(&stays);
+    CHECK_INT(stays.tools.tool[0].holder, 0); /* the tool is free */
+    mem_end(&stays);
+    end();
+}
+
+static void a_server_that_ends_in_the_middle_ends(void)
+{
+    for (int k = 0; k < 4; k++) {
+        mem_client c;
+        begin();
+        join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+        if (k & 1) CHECK(order(&c, "divide", TOP)); /* with a session of the hub's own */
+        send(&c, "extrude", TOP ",\"distance_m\":0.02");
+        send(&c, "undo", "");
+        if (k & 2) turn(&c, NULL); /* later: while it is made, or when it is done */
+        CHECK(pal_mem_code(c.peer) == 0);
+        pal_mem_leave(c.peer);
+        c.peer = NULL;
+        mem_end(&c);
+        end();
+    }
+}
+
+int main(void)
+{
+    clay_make(&clay, 2, 0.1);
+    RUN(a_cell_grows_and_the_frames_are_of_the_new_epoch);
+    RUN(assets_that_have_been_replaced_can_still_be_fetched);
+    RUN(paint_is_what_a_probe_finds);
+    RUN(a_cut_shows_the_inside_and_goes_again);
+    RUN(what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing);
+    RUN(who_holds_no_tool_and_teaches_nobody_sculpts_nothing);
+    RUN(sixteen_wait_and_the_next_one_is_told);
+    RUN(everybody_is_told_and_who_comes_late_begins_at_the_new_asset);
+    RUN(the_tool_stays_held_and_its_poses_go_on);
+    RUN(a_field_that_is_looked_at_goes_on_with_the_new_vertices);
+    RUN(who_asks_and_goes_leaves_the_others_a_session_that_works);
+    RUN(a_server_that_ends_in_the_middle_ends);
+    clay_free(&clay);
+    return check_report();
+}
