@@ -50,24 +50,30 @@ PAL_INLINE pal_wide root(pal_wide q)
 PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CELL_NODES_MOST], const pal_wide r[9],
                        int at, int a, int b, pal_wide va[3], pal_wide vb[3])
 {
-    const pal_wide zero = {0}, tiny = zero + 1e-8;
+    const pal_wide zero = {0}, tiny2 = zero + 1e-16;
     pal_wide s1[3], s2[3], r1[3], r2[3], axis[3], rest[3];
     from_to(x, at, a, s1), from_to(x, at, b, s2), from_to(y, at, a, r1), from_to(y, at, b, r2);
     cross(s1, s2, axis), cross(r1, r2, rest);
-    pal_wide sn = root(dot(axis, axis)), cs = dot(s1, s2), sn0 = root(dot(rest, rest)), cs0 = dot(r1, r2);
-    pal_wide h = root(sn * sn + cs * cs), h0 = root(sn0 * sn0 + cs0 * cs0), both = h * h0;
-    pal_wide_mask there = (both > 0) & (sn0 > tiny * h0);
-    pal_wide over = pal_wide_pick(there, 1 + zero, zero) / pal_wide_pick(there, both, 1 + zero);
+    pal_wide sn2 = dot(axis, axis), cs = dot(s1, s2), h2 = sn2 + cs * cs;
+    pal_wide rest2 = dot(rest, rest), cs0 = dot(r1, r2), h02 = rest2 + cs0 * cs0, both = h2 * h02;
+    pal_wide sn = root(sn2), sn0 = root(rest2);
+    pal_wide_mask there = (both > 0) & (rest2 > tiny2 * h02), seen = sn2 > tiny2 * h2;
+    pal_wide over = pal_wide_pick(there, 1 + zero, zero) / pal_wide_pick(there, root(both), 1 + zero);
     pal_wide cosine = (cs * cs0 + sn * sn0) * over, sine = (sn * cs0 - cs * sn0) * over;
-    /* half of delta; delta stays short of half a turn by the smaller of both angles at rest */
+    /* half of delta, which stays short of half a turn by the smaller of both angles at rest: sh = sin, less = 1 - cos,
+     * by = sin / |s1 x s2| with one division for all */
     pal_wide half2 = 0.5 + 0.5 * cosine;
-    half2 = pal_wide_pick(half2 > 1e-16, half2, zero + 1e-16);
-    pal_wide ch = root(half2), sh = 0.5 * sine / ch, less = sh * sh / (1 + ch);
-    pal_wide_mask seen = sn > tiny * h;
-    pal_wide by = pal_wide_pick(seen, sh, zero) / pal_wide_pick(seen, sn, 1 + zero);
-    pal_wide instead = pal_wide_pick(there & ~seen, sh, zero) / pal_wide_pick(there, sn0, 1 + zero);
-    for (int i = 0; i < 3; i++)
-        axis[i] = axis[i] * by + (r[3 * i] * rest[0] + r[3 * i + 1] * rest[1] + r[3 * i + 2] * rest[2]) * instead;
+    pal_wide ch = root(pal_wide_pick(half2 > 1e-16, half2, zero + 1e-16)), length = pal_wide_pick(seen, sn, 1 + zero);
+    pal_wide inverse = 1 / (ch * length * (1 + ch)), by = 0.5 * sine * (1 + ch) * inverse;
+    pal_wide sh = by * length, less = sh * sh * ch * length * inverse;
+    if (pal_wide_all(seen)) {
+        for (int i = 0; i < 3; i++) axis[i] *= by;
+    } else {
+        pal_wide instead = pal_wide_pick(there & ~seen, sh, zero) / pal_wide_pick(there, sn0, 1 + zero);
+        by = pal_wide_pick(seen, by, zero);
+        for (int i = 0; i < 3; i++)
+            axis[i] = axis[i] * by + (r[3 * i] * rest[0] + r[3 * i + 1] * rest[1] + r[3 * i + 2] * rest[2]) * instead;
+    }
     cross(axis, s1, r1), cross(axis, s2, r2);
     for (int i = 0; i < 3; i++) va[i] = less * s1[i] - r1[i], vb[i] = less * s2[i] + r2[i];
 }
