@@ -7,6 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* moves times nodes */
+static const double most_work = 2e7;
+
 /* ---- pattern ---- */
 
 /* cliques of points that stand for cliques of nodes; heap */
@@ -191,17 +194,34 @@ static pal_err make_arrays(pal_embedded *e, const pal_body *body, bool with_damp
     return e->damping ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_embedded_make(const pal_body *body, const pal_row *force, int n_force, pal_arena *arena, pal_embedded **out)
+/* at least `n_group` groups are needed: points with a common neighbour, which those of a clique are, go alone */
+static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_note *note)
+{
+    double moves = 3.0 * n_group * (damped ? 2 : 1);
+    if (moves * body->n_node <= most_work) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_BUDGET,
+                        "body \"%s\": an implicit solver finds the matrix of its %d control points by %.0f or more "
+                        "products on %d nodes, which is too much: take central_cg, fewer levels or fewer control cells",
+                        body->name, body->n_dof, moves, body->n_node);
+}
+
+pal_err pal_embedded_make(const pal_body *body, const pal_row *force, int n_force, pal_arena *arena, pal_note *note,
+                          pal_embedded **out)
 {
     pal_embedded *e = PAL_NEW(arena, pal_embedded, 1);
     if (!e) return PAL_ERR_MEMORY;
+    bool damped = damps(force, n_force);
+    int clique = 0;
     clique_list cliques = {0};
     pal_err err = list_cliques(body, force, n_force, &cliques);
+    for (int i = 0; i < cliques.n; i++) clique = cliques.list[i].n_corner > clique ? cliques.list[i].n_corner : clique;
+    if (!err) err = check_work(body, clique, damped, note);
     if (!err) err = pal_blocks_make(body->n_dof, cliques.list, cliques.n, arena, &e->rest);
     free_cliques(&cliques);
     PAL_TRY(err);
-    PAL_TRY(make_arrays(e, body, damps(force, n_force), arena));
+    PAL_TRY(make_arrays(e, body, damped, arena));
     PAL_TRY(make_groups(e, body, arena));
+    PAL_TRY(check_work(body, e->n_group, damped, note));
     e->n_move = 3 * e->n_group * (e->damping ? 2 : 1);
     *out = e;
     return PAL_ERR_OK;

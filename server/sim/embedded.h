@@ -27,8 +27,9 @@ typedef struct pal_embedded {
 } pal_embedded;
 
 /* work space, pattern and groups for the FORCE rows [n_force]. Points are coupled where a row couples nodes of both,
- * for rows that do not say so where an element of body->solid has both, or else everywhere. MEMORY. [load] */
-pal_err pal_embedded_make(const pal_body *body, const pal_row *force, int n_force, pal_arena *arena,
+ * for rows that do not say so where an element of body->solid has both, or else everywhere. BUDGET: moves times nodes
+ * are more than 2e7, some ten seconds' work; MEMORY. [load] */
+pal_err pal_embedded_make(const pal_body *body, const pal_row *force, int n_force, pal_arena *arena, pal_note *note,
                           pal_embedded **out);
 /* the numbers are out of date: rows have other material */
 void pal_embedded_renew(pal_embedded *e);

@@ -23,7 +23,7 @@ pal_err pal_system_make(const pal_build *build, pal_system *out)
     }
     for (int i = 0; i < body->n_dof; i++) out->n_free += !body->held[i];
     if (!body->embed) return PAL_ERR_OK;
-    return pal_embedded_make(body, out->force, out->n_force, build->arena, &out->embedded);
+    return pal_embedded_make(body, out->force, out->n_force, build->arena, build->note, &out->embedded);
 }
 
 /* the cliques of all rows, heap [system->n_force] */

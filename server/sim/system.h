@@ -21,7 +21,7 @@ typedef struct pal_system {
     double mass, stiff, damp; /* factors of M, K, C                        */
 } pal_system;
 
-/* of the FORCE rows made so far; MEMORY. [load] */
+/* of the FORCE rows made so far; BUDGET: see embedded.h; MEMORY. [load] */
 pal_err pal_system_make(const pal_build *build, pal_system *out);
 /* pattern of K; MEMORY. [load] */
 pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_blocks *out);

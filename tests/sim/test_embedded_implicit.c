@@ -427,6 +427,28 @@ static void what_cannot_be_is_refused_in_a_sentence(void)
     free_thing(&t);
 }
 
+/* 200 points that are coupled all with all, and 40,000 nodes */
+static void a_matrix_of_too_much_work_is_refused(void)
+{
+    enum { POINTS = 200, NODES = 40000 };
+    pal_point_rows rows = {.n_row = NODES, .n_point = POINTS};
+    pal_arena *arena = pal_arena_create(1 << 20, true);
+    pal_body body = {.name = "body"};
+    pal_embedded *e = NULL;
+    const pal_row row = {.effect = &silent_springs};
+    rows.start = calloc(NODES + 1, sizeof *rows.start);
+    rows.point = calloc(NODES, sizeof *rows.point);
+    rows.weight = calloc(NODES, sizeof *rows.weight);
+    REQUIRE(arena && rows.start && rows.point && rows.weight);
+    for (int i = 0; i < NODES; i++) rows.start[i + 1] = i + 1, rows.point[i] = i % POINTS, rows.weight[i] = 1;
+    REQUIRE(!pal_body_allocate_embedded(&body, arena, &rows));
+    CHECK_INT(pal_embedded_make(&body, &row, 1, arena, &note, &e), PAL_ERR_BUDGET);
+    CHECK(strstr(note.text, "200 control points by 600 or more products on 40000 nodes") != NULL);
+    CHECK(e == NULL);
+    pal_point_rows_free(&rows);
+    pal_arena_destroy(arena);
+}
+
 static void a_state_that_is_no_number_freezes_the_body(void)
 {
     thing t;
@@ -465,6 +487,7 @@ int main(void)
     RUN(a_step_calls_no_heap);
     RUN(other_samples_bring_another_factor);
     RUN(what_cannot_be_is_refused_in_a_sentence);
+    RUN(a_matrix_of_too_much_work_is_refused);
     RUN(a_state_that_is_no_number_freezes_the_body);
     RUN(all_held_is_no_work);
     return check_report();
