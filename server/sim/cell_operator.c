@@ -9,7 +9,7 @@
  *     ends differ;
  *   - on the 4 x 4 x 4 lattice the edges' vectors are summed along lattice lines, from each line's middle (A6).
  * A pyramid is a hexahedron of which corners 4 to 7 are one: corners there have no angles, and the apex takes the mean
- * of the four.
+ * of the four. An apex drawn out counts for two thirds of that.
  * s1 x s2 below 1e-8 |s1| |s2| (an angle of 0 or 180 degrees) gives no axis: that of rest is taken, turned by the
  * element's last rotation Q. The sum is brought into the axes Q, and forces f = Q K Q' R d back; they have no net
  * force, but a net torque, and no energy. */
