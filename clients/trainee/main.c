@@ -49,9 +49,10 @@ typedef struct totals {
         fault[PAL_FAULT_COUNT];
     uint32_t triangles, places; /* of the last client */
     int joined, with_tool, reconnects, old_after_stall, stalls_done, silent, unanswered;
-    int without_field, ungiven;
+    int without_field, ungiven, n_order, n_refused;
+    uint32_t topologies;
     double seconds, moved_m, force_N, field_low, field_high, field_s;
-    const char *first_fault, *closed;
+    const char *first_fault, *closed, *refused;
 } totals;
 
 static void main_add(totals *sum, const pal_trainee_result *r)
@@ -75,6 +76,8 @@ static void main_add(totals *sum, const pal_trainee_result *r)
     sum->old_after_stall += (int)r->n_old_after_stall, sum->stalls_done += r->stall_done;
     sum->silent += r->n_cycle == 0;
     sum->unanswered += r->n_pose > 50 && r->latency_ms.n == 0;
+    sum->n_order += r->n_order, sum->n_refused += r->n_refused, sum->topologies += r->n_topology;
+    if (!sum->refused && r->refused[0]) sum->refused = r->refused;
     sum->seconds = fmax(sum->seconds, r->seconds);
     sum->moved_m = fmax(sum->moved_m, r->moved_m), sum->force_N = fmax(sum->force_N, r->force_N);
     if (!sum->first_fault && r->first_fault[0]) sum->first_fault = r->first_fault;
@@ -89,6 +92,37 @@ static void main_put_samples(cJSON *object, const char *name, pal_samples *s)
     cJSON_AddNumberToObject(o, "p50", pal_samples_at(s, 0.5));
     cJSON_AddNumberToObject(o, "p99", pal_samples_at(s, 0.99));
     cJSON_AddNumberToObject(o, "max", s->max);
+}
+
+/* one line for each order */
+static void main_told(void *user, const pal_order_told *told)
+{
+    if (!*(const bool *)user) {
+        printf("%s%s", told->answer ? "" : "refused: ", told->text);
+        if (told->frame_ms > 0)
+            printf("; epoch %u, %u vertices, seen after %.0f ms, longest gap %.0f ms", told->epoch, told->n_vertex,
+                   told->frame_ms, told->gap_ms);
+        printf("\n");
+        fflush(stdout);
+        return;
+    }
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddStringToObject(o, "order", told->line->order.verb);
+    cJSON_AddNumberToObject(o, "line", told->line->number);
+    cJSON_AddBoolToObject(o, "done", told->answer != NULL);
+    cJSON_AddStringToObject(o, "text", told->text);
+    cJSON_AddNumberToObject(o, "answer_ms", told->answer_ms);
+    cJSON_AddNumberToObject(o, "frame_ms", told->frame_ms);
+    cJSON_AddNumberToObject(o, "gap_ms", told->gap_ms);
+    cJSON_AddNumberToObject(o, "epoch", told->epoch);
+    cJSON_AddNumberToObject(o, "vertices", told->n_vertex);
+    for (uint32_t i = 0; told->answer && i < told->answer->n_arg; i++)
+        cJSON_AddNumberToObject(o, told->answer->arg[i].key, told->answer->arg[i].value);
+    char *text = cJSON_PrintUnformatted(o);
+    if (text) puts(text);
+    fflush(stdout);
+    cJSON_free(text);
+    cJSON_Delete(o);
 }
 
 /* fields a second that one client got */
@@ -139,6 +173,9 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
     main_put_samples(o, "decode_ms", &sum->decode);
     main_put_samples(o, "gap_ms", &sum->gap);
     cJSON_AddNumberToObject(o, "reconnects", sum->reconnects);
+    cJSON_AddNumberToObject(o, "topologies", sum->topologies);
+    if (sum->n_order) cJSON_AddNumberToObject(o, "orders", sum->n_order);
+    if (sum->n_order) cJSON_AddNumberToObject(o, "orders_refused", sum->n_refused);
     if (sum->stalls_done) cJSON_AddNumberToObject(o, "old_cycles_after_stall", sum->old_after_stall);
     if (sum->closed) cJSON_AddStringToObject(o, "closed", sum->closed);
     cJSON *faults = cJSON_AddObjectToObject(o, "faults");
@@ -175,7 +212,7 @@ static void main_table(totals *sum, int n_client)
 }
 
 /* the verdict: what failed first, or NULL */
-static const char *main_verdict(const totals *sum, int n_client, const char *field)
+static const char *main_verdict(const totals *sum, int n_client, const char *field, const pal_orders *orders)
 {
     static char reason[400];
     if (sum->first_fault) return sum->first_fault;
@@ -187,6 +224,11 @@ static const char *main_verdict(const totals *sum, int n_client, const char *fie
     if (sum->silent) return "a client saw no cycle";
     if (sum->frames == 0) return "no frame came";
     if (sum->unanswered) return "poses were never echoed";
+    if (sum->refused) return sum->refused;
+    if (orders && sum->n_order < orders->n_line) {
+        snprintf(reason, sizeof reason, "%d of %d orders were answered", sum->n_order, orders->n_line);
+        return reason;
+    }
     if (!field || !sum->without_field) return NULL;
     if (sum->ungiven)
         snprintf(reason, sizeof reason, "no body of the session gives the field %.64s", field);
@@ -205,6 +247,7 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
     for (int i = 0; i < wanted && !err; i++) {
         pal_trainee_options one = *base;
         one.index = i;
+        if (i > 0) one.orders = NULL;
         snprintf(c->name[i], sizeof c->name[i], wanted > 1 ? "%.20s %d" : "%.31s", base->name, i + 1);
         one.name = c->name[i];
         err = pal_trainee_open(c->loop, c->store, &one, &note, &c->trainee[i]);
@@ -217,7 +260,8 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
     totals sum = {0};
     for (int i = 0; i < c->n; i++) main_add(&sum, pal_trainee_look(c->trainee[i]));
     pal_link_loop_destroy(c->loop);
-    const char *reason = err ? (note.text[0] ? note.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field);
+    const char *reason =
+        err ? (note.text[0] ? note.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field, base->orders);
     if (json) main_json(&sum, wanted, !reason, reason);
     if (!json && !quiet && !err) main_table(&sum, wanted);
     if (reason) fprintf(stderr, "palpate-trainee: %s\n", reason);
@@ -230,7 +274,7 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
 int main(int argc, char **argv)
 {
     const char *url = NULL, *name = "trainee", *script = "press", *tool = "any", *up = "0,0,1", *stall = NULL,
-               *field = NULL;
+               *field = NULL, *sculpt = NULL;
     double seconds = 5, rate = 120, clients = 1, slow = 0, depth = 0;
     bool json = false, quiet = false;
     int n_operand;
@@ -245,6 +289,8 @@ int main(int argc, char **argv)
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL,
          "ask for displacement | von_mises | energy | stiffness, check it"},
+        {"--sculpt", "FILE", PAL_CLIENT_TEXT, &sculpt, 0, 0, NULL,
+         "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
         {"--slow", "BYTES_S", PAL_CLIENT_NUMBER, &slow, 1, 1e9, NULL, "read no faster than this"},
         {"--stall", "S", PAL_CLIENT_TEXT, &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
         {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "one JSON object on stdout"},
@@ -281,6 +327,14 @@ int main(int argc, char **argv)
                 field);
         return 2;
     }
+    pal_orders orders = {.n_line = 0};
+    pal_note note = {""};
+    if (sculpt && pal_orders_load(&orders, sculpt, &note)) {
+        fprintf(stderr, "palpate-trainee: %s\n", note.text);
+        return 1;
+    }
+    if (sculpt) base.orders = &orders;
+    if (!quiet) base.told = main_told, base.user = &json;
     signal(SIGINT, main_on_signal);
     signal(SIGTERM, main_on_signal);
     pal_log_set_level(PAL_LOG_WARN);
@@ -291,5 +345,6 @@ int main(int argc, char **argv)
     pal_asset_store_destroy(c.store);
     free(c.trainee);
     free(c.name);
+    pal_orders_free(&orders);
     return result;
 }

@@ -39,6 +39,13 @@ struct pal_trainee {
     double decode_s;
     trainee_part part[PAL_WIRE_PART_MAX];
     uint16_t id;
+    /* the order under way */
+    int order;
+    bool asked, answered, reshaped, refused; /* reshaped: another topology came since it was given */
+    uint64_t asked_ns, answered_ns;
+    double gap_ms;
+    pal_wire_answer answer;
+    char text[PAL_WIRE_TEXT_BYTES];
     pal_trainee_result result;
 };
 
@@ -108,6 +115,54 @@ static void trainee_measure(pal_trainee *t, trainee_part *part)
     }
 }
 
+/* what came of the order under way, once it is answered and what it changed is seen */
+static void trainee_tell(pal_trainee *t)
+{
+    if (!t->asked || !t->answered || (t->reshaped && !t->part[0].seen)) return;
+    const pal_order_line *line = &t->options.orders->line[t->order++];
+    const uint64_t now = pal_clock_ns();
+    const pal_order_told told = {.line = line,
+                                 .answer = t->refused ? NULL : &t->answer,
+                                 .text = t->text,
+                                 .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
+                                 .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
+                                 .gap_ms = t->gap_ms,
+                                 .epoch = t->part[0].epoch,
+                                 .n_vertex = t->part[0].n_vertex};
+    t->asked = false;
+    t->result.n_order++;
+    if (t->refused && !line->may_fail && t->result.n_refused++ == 0)
+        snprintf(t->result.refused, sizeof t->result.refused, "line %d: %.200s", line->number, t->text);
+    if (t->options.told) t->options.told(t->options.user, &told);
+}
+
+static void trainee_answered(pal_trainee *t, const pal_control *c)
+{
+    if (!t->asked || t->answered) return;
+    t->refused = c->type == PAL_CONTROL_ERROR;
+    if (!t->refused) t->answer = c->answer;
+    snprintf(t->text, sizeof t->text, "%s", t->refused ? c->problem.text : c->answer.text);
+    t->answered = true;
+    t->answered_ns = pal_clock_ns();
+    trainee_tell(t);
+}
+
+/* gives the next order when its time has come and the one before is done */
+static void trainee_order(pal_trainee *t, uint64_t now)
+{
+    const pal_orders *orders = t->options.orders;
+    const trainee_part *part = &t->part[0];
+    if (!orders || t->order >= orders->n_line || t->asked || !t->cycle_seen || !part->seen) return;
+    if ((double)(now - t->first_cycle_ns) * 1e-9 < orders->line[t->order].t_s) return;
+    pal_control c = {.type = PAL_CONTROL_COMMAND};
+    if (!pal_order_fill(&orders->line[t->order], part->now_m, part->n_vertex, &c.order)) return;
+    if (pal_link_send_control(t->link, &c)) return;
+    t->asked = true;
+    t->answered = t->reshaped = t->refused = false;
+    t->asked_ns = now;
+    t->gap_ms = 0;
+}
+
 static void trainee_decode(pal_trainee *t, uint32_t index, const uint8_t *bytes, size_t n_byte)
 {
     trainee_part *part = &t->part[index];
@@ -123,6 +178,7 @@ static void trainee_decode(pal_trainee *t, uint32_t index, const uint8_t *bytes,
     if (!part->seen) memcpy(part->first_m, part->now_m, (size_t)part->n_vertex * 3 * sizeof(float));
     part->seen = true;
     trainee_measure(t, part);
+    trainee_tell(t);
     /* q = 2 e / (1 + 1/16 + 1/64), protocol README "FRAME" */
     const double error = (double)head.q_m * (1 + 1.0 / 16 + 1.0 / 64) / 2;
     const double stated = t->error_m[index];
@@ -148,6 +204,7 @@ static void trainee_frame(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
         trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before a frame of part %u", t->patched, head.part);
     t->patched = -1;
     if (head.cycle > t->frame_cycle) t->frame_cycle = head.cycle;
+    if (head.epoch < part->epoch && !part->seen && !part->n_kept) return; /* on its way when the topology changed */
     if (part->n_kept || part->seen) {
         if (head.epoch < part->epoch)
             trainee_fault(t, PAL_FAULT_EPOCH, "epoch %u after %u", head.epoch, part->epoch);
@@ -204,8 +261,10 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     t->patched = -1;
     t->frame_cycle = 0;
     t->cycle = tools.cycle;
+    const double gap_ms = t->cycle_seen ? (double)(now - t->last_cycle_ns) * 1e-6 : 0;
+    t->gap_ms = fmax(t->gap_ms, gap_ms);
     if (t->cycle_seen)
-        pal_samples_add(&t->result.gap_ms, (double)(now - t->last_cycle_ns) * 1e-6);
+        pal_samples_add(&t->result.gap_ms, gap_ms);
     else
         t->first_cycle_ns = now;
     t->last_cycle_ns = now;
@@ -226,6 +285,10 @@ static void trainee_patch(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     pal_patch_head head;
     int refusal = pal_patch_get_head(bytes, n_byte, &head);
     if (!refusal && (head.part >= t->n_part || !t->part[head.part].adapts)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && head.epoch < t->part[head.part].epoch) {
+        t->patched = (int)head.part;
+        return;
+    }
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
     if (!refusal) refusal = pal_patch_table_take(&t->part[head.part].table, bytes, n_byte, &head);
     if (refusal) {
@@ -244,6 +307,7 @@ static void trainee_field(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     int refusal = pal_field_get_head(bytes, n_byte, &head);
     if (!refusal && (head.part >= t->n_part || !t->part[head.part].looks)) refusal = PAL_REFUSAL_KIND;
     if (!refusal && t->options.field && head.field != pal_wire_field_find(t->options.field)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && head.epoch < t->part[head.part].epoch) return;
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
     if (!refusal && head.low < 0) refusal = PAL_REFUSAL_RANGE;
     uint8_t *level = refusal ? NULL : malloc((size_t)t->part[head.part].n_vertex + 1);
@@ -320,6 +384,9 @@ static void trainee_parts(pal_trainee *t, const pal_wire_part_info *info, uint32
         part->epoch = info[i].epoch;
         part->n_vertex = info[i].n_vertex;
         part->seen = false;
+        pal_frame_head kept;
+        if (part->n_kept && !pal_frame_get_head(part->kept, part->n_kept, &kept) && kept.epoch < part->epoch)
+            part->n_kept = 0;
         part->now_m = calloc((size_t)part->n_vertex + 1, 3 * sizeof(float));
         part->first_m = calloc((size_t)part->n_vertex + 1, 3 * sizeof(float));
         if (!part->now_m || !part->first_m) t->n_part = i;
@@ -338,6 +405,7 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
     pal_copy3(t->box_low, hello->box_min_m);
     pal_copy3(t->box_high, hello->box_max_m);
     t->cycle_seen = false;
+    t->asked = false; /* an order that was under way is given again */
     t->patched = -1;
     t->echo_seq = 0;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
@@ -364,7 +432,12 @@ static void trainee_on_control(void *user, pal_link *link, const pal_control *c)
     (void)link;
     pal_trainee *t = user;
     if (c->type == PAL_CONTROL_HELLO) trainee_hello(t, &c->hello);
-    if (c->type == PAL_CONTROL_TOPOLOGY) trainee_parts(t, c->topology.part, c->topology.n_part);
+    if (c->type == PAL_CONTROL_TOPOLOGY) {
+        t->result.n_topology++;
+        t->reshaped = true;
+        trainee_parts(t, c->topology.part, c->topology.n_part);
+    }
+    if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) trainee_answered(t, c);
     if (c->type == PAL_CONTROL_MEMBERS)
         for (uint32_t i = 0; i < c->members.n_member; i++)
             if (c->members.member[i].id == t->id) t->result.tool = c->members.member[i].tool;
@@ -431,6 +504,7 @@ static void trainee_tick(void *user)
     pal_trainee *t = user;
     const uint64_t now = pal_clock_ns();
     trainee_stall(t, now);
+    trainee_order(t, now);
     if (!t->script_made || t->script.idle || !t->has_place || t->result.tool < 0) return;
     if (!t->start_ns) t->start_ns = now;
     double offset[3];
@@ -466,7 +540,7 @@ pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_
     if (!err) err = pal_script_load(&t->script, options->script, 0.01, 0.01, note);
     const pal_link_options link = {.url = options->url,
                                    .name = options->name,
-                                   .role = PAL_WIRE_ROLE_TRAINEE,
+                                   .role = options->orders ? PAL_WIRE_ROLE_INSTRUCTOR : PAL_WIRE_ROLE_TRAINEE,
                                    .tool = t->script.idle ? PAL_WIRE_TOOL_NONE : options->tool,
                                    .patches = true,
                                    .read_bytes_s = options->read_bytes_s,

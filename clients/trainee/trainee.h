@@ -6,12 +6,14 @@
  * nothing malformed. A field that was asked for is of a known part, of its number of vertices, of the kind asked for,
  * in a range of no negative numbers, and no other field comes. A PATCH is of a known part that adapts, its revision
  * grows, it fits the table of triangles that the asset and the patches before it gave, and a frame of the part follows
- * in the same cycle, before any other part's. A wish broken is counted under its name. Measured: pose
+ * in the same cycle, before any other part's. What is of an older epoch is nobody's until the first frame of the newer
+ * one has come. A wish broken is counted under its name. Measured: pose
  * to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
 #ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
 #define PAL_CLIENTS_TRAINEE_TRAINEE_H
 #include "clients/link/asset_store.h"
 #include "clients/link/patch_table.h"
+#include "clients/trainee/orders.h"
 #include "clients/trainee/samples.h"
 #include "clients/trainee/script.h"
 
@@ -46,9 +48,12 @@ typedef struct pal_trainee_options {
     double rate_hz;                  /* of poses                                                */
     double depth_m;                  /* of press and pull; 0: 8 % of the box, at most 10 mm     */
     double up[3];
-    int index, n_client; /* which of several: each touches its own place            */
-    double read_bytes_s; /* > 0: slow reader                                        */
-    double stall_s;      /* > 0: reads nothing for this long, one second after the first cycle */
+    int index, n_client;      /* which of several: each touches its own place            */
+    double read_bytes_s;      /* > 0: slow reader                                        */
+    double stall_s;           /* > 0: reads nothing for this long, one second after the first cycle */
+    const pal_orders *orders; /* to be given, as an instructor; borrowed; NULL: none               */
+    void (*told)(void *user, const pal_order_told *told); /* what came of each; NULL: nobody         */
+    void *user;
 } pal_trainee_options;
 
 typedef struct pal_trainee_result {
@@ -68,6 +73,9 @@ typedef struct pal_trainee_result {
     uint64_t n_patch, patch_bytes;
     uint32_t n_triangle, n_place;              /* drawn now, and places, of all parts that adapt */
     bool field_given;                          /* a part of the session gives what was asked for */
+    uint32_t n_topology;                       /* other topologies that came                   */
+    int n_order, n_refused;                    /* answered, and those of them that might not fail and did */
+    char refused[256];                         /* the first of these                           */
     pal_samples latency_ms, decode_ms, gap_ms; /* owned by the trainee */
 } pal_trainee_result;
 

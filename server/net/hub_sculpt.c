@@ -328,7 +328,7 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
         def->material = c->room->material[body];
         pal_material_painted(def, a.rest_m, &m);
         pal_wire_answer *to = begin_answer(hub, order->verb);
-        snprintf(to->text, sizeof to->text, "E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
+        snprintf(to->text, sizeof to->text, "probe: E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
         add_arg(to, "young_Pa", m.young_Pa);
         add_arg(to, "poisson", m.poisson);
         add_arg(to, "density_kg_m3", m.density_kg_m3);
@@ -398,9 +398,9 @@ static void finish(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
         answer_done(hub, &s->now, sculptor, work);
     } else {
         pal_client *c = find_client(hub, &s->now);
-        if (c)
-            pal_hub_complain(hub, c, "refused", "%s: %s", s->now.order.verb,
-                             work->note.text[0] ? work->note.text : pal_err_text(work->err));
+        const char *verb = s->now.order.verb, *why = work->note.text[0] ? work->note.text : pal_err_text(work->err);
+        bool named = !strncmp(why, verb, strlen(verb)); /* edits of cells say it themselves */
+        if (c) pal_hub_complain(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : verb, why);
     }
     pal_work_free(work);
 }

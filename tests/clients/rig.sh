@@ -52,6 +52,18 @@ make_scene() {
 SCENE
 }
 
+# a block of 100 mm of 2 x 2 x 2 control cells that can be sculpted, held at its lowest part, no gravity
+make_block() {
+    "$bin/palpate" cells block --cells 2,2,2 --size-m 0.1,0.1,0.1 -o "$work/block.palcells" --quiet || exit 1
+    cat >"$work/block.json" <<'SCENE'
+{"name": "block", "title": "Block", "gravity_m_s2": 0,
+ "bodies": [{"name": "block", "cells": "block.palcells", "supports": [{"lowest": 0.2}],
+             "model": {"name": "subdivision_fem", "levels": 1}}],
+ "tools": [{"name": "probe 1", "radius_m": 0.008}, {"name": "probe 2", "radius_m": 0.008}]}
+SCENE
+    scene=$work/block.json
+}
+
 # await SECONDS COMMAND...: until the command succeeds; fails after the time
 await() {
     n=$(($1 * 20))
