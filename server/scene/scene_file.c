@@ -184,7 +184,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     static const char *const known[] = {"name",       "largest", "mesh",      "surface",  "units",
                                         "resolution", "label",   "triangles", "material", "model",
                                         "solver",     "output",  "supports",  "effects",  "regions",
-                                        "cells",      "strokes", "origin_m",  NULL};
+                                        "cells",      "strokes", "origin_m",  "cut",      NULL};
     char path[PAL_JSON_PATH], name[PAL_NAME];
     pal_json_entry(path, "bodies", index);
     PAL_TRY(pal_json_object(json, object, path, known));
@@ -204,6 +204,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     PAL_TRY(read_item_at(json, object, path, "output", &body->output));
     PAL_TRY(read_lists(json, object, path, body));
     PAL_TRY(pal_strokes_read(json, object, path, scene, index));
+    PAL_TRY(pal_cut_read(json, object, path, body));
     if (solid)
         PAL_TRY(pal_solid_read(json, object, path, folder, scene, index));
     else

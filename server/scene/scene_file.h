@@ -31,9 +31,11 @@
  *     "cells": "chair.palcells"                            in place of mesh or surface: control cells, .palcells or
  *                                                          .vtk, in "units" (m), moved so that the middle of their box
  *                                                          is at 0; with "origin_m": [..] they are about it already
- *     "strokes": [                                         painted on the rest shape of such a body, at most 4096; E
- * and density times factor^w, w falling over the outer `soft` part
+ *     "strokes": [                                         painted on the rest shape of such a body, at most 4096;
+ *                                                          E and density times factor^w, w falling over the
+ *                                                          outer `soft` part
  *       {"at_m": [..], "radius_m": 0.02, "soft": 0.5, "young_factor": 10, "density_factor": 1}],
+ *     "cut": {"normal": [1, 0, 0], "offset_m": 0},         of such a body: its cells beyond the plane are not shown
  *     "solver": {"name": "verlet"}, or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
  *     "output": {"name": "skin_out"},
  *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}},

@@ -1,6 +1,6 @@
-/* Bodies of control cells and what is painted on them. A saved scene has the cells about the body's origin and the
- * origin beside them, so that every number comes back with the same bits and boxes, strokes and tools stay where they
- * are, whatever has been cut off or added in between. */
+/* Bodies of control cells, what is painted on them and how they are cut away. A saved scene has the cells about the
+ * body's origin and the origin beside them, so that every number comes back with the same bits and boxes, strokes and
+ * tools stay where they are, whatever has been cut off or added in between. */
 #include "server/scene/solid_file.h"
 
 #include "server/base/vec3.h"
@@ -139,12 +139,41 @@ pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *pa
     return PAL_ERR_OK;
 }
 
+/* ---- the cut ---- */
+
+pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def)
+{
+    static const char *const known[] = {"normal", "offset_m", NULL};
+    char at[PAL_JSON_PATH], inner[PAL_JSON_PATH];
+    const cJSON *cut = cJSON_GetObjectItemCaseSensitive(body, "cut");
+    if (!cut) return PAL_ERR_OK;
+    pal_json_key(at, path, "cut");
+    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
+        return pal_json_bad(json, at, "model \"%s\" cannot be cut away; \"subdivision_fem\" can", def->model.name);
+    PAL_TRY(pal_json_object(json, cut, at, known));
+    pal_json_key(inner, at, known[0]);
+    if (!cJSON_GetObjectItemCaseSensitive(cut, known[0])) return pal_json_bad(json, inner, "is missing");
+    PAL_TRY(pal_json_vector(json, cut, at, known[0], def->cut_normal));
+    PAL_TRY(pal_json_number(json, cut, at, known[1], -1e9, 1e9, &def->cut_m));
+    double length = sqrt(pal_dot3(def->cut_normal, def->cut_normal));
+    if (!(length > 1e-12 && length < 1e12)) return pal_json_bad(json, inner, "has no direction");
+    /* what was saved keeps its bits */
+    if (fabs(length - 1) > 1e-15) pal_scale3(def->cut_normal, 1 / length, def->cut_normal);
+    def->cut = true;
+    return PAL_ERR_OK;
+}
+
 /* ---- writing ---- */
 
 void pal_solid_add(cJSON *object, const pal_body_def *body, const char *file)
 {
     cJSON_AddStringToObject(object, "cells", file);
     cJSON_AddItemToObject(object, "origin_m", pal_json_exact_list(body->mesh->surface.origin_m, 3));
+    if (body->cut) {
+        cJSON *cut = cJSON_AddObjectToObject(object, "cut");
+        cJSON_AddItemToObject(cut, "normal", pal_json_exact_list(body->cut_normal, 3));
+        cJSON_AddItemToObject(cut, "offset_m", pal_json_exact(body->cut_m));
+    }
     if (body->n_stroke == 0) return;
     cJSON *list = cJSON_AddArrayToObject(object, "strokes");
     for (int k = 0; k < body->n_stroke; k++) {

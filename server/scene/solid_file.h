@@ -1,5 +1,5 @@
-/* Bodies of control cells and what is painted on them: JSON <-> pal_body_def.cells, pal_stroke (private to this room).
- * Thread: [load]. */
+/* Bodies of control cells and what is painted on them: JSON <-> pal_body_def.cells, cut, pal_stroke (private to this
+ * room). Thread: [load]. */
 #ifndef PAL_SCENE_SOLID_FILE_H
 #define PAL_SCENE_SOLID_FILE_H
 #include "server/scene/json_reader.h"
@@ -15,8 +15,10 @@ pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path
                        pal_loaded_scene *scene, int index);
 /* the list "strokes" of a body */
 pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index);
+/* the key "cut" of a body: {"normal": [..], "offset_m": 0} */
+pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def);
 /* frees what a body owns of this */
 void pal_solid_unload(pal_loaded_scene *scene, int index);
-/* adds "cells" with this file's name, "origin_m" and "strokes" (unless there are none) to a body's object */
+/* adds "cells" with this file's name, "origin_m", and "cut" and "strokes" where there are such, to a body's object */
 void pal_solid_add(cJSON *object, const pal_body_def *body, const char *file);
 #endif

@@ -115,6 +115,7 @@ static const char whole[] =
     " \"model\": {\"name\": \"subdivision_fem\", \"levels\": 1, \"rule\": \"averaging\"},"
     " \"supports\": [{\"box\": {\"low_m\": [-1, -1, -1], \"high_m\": [-0.03, 1, 1]}}],"
     " \"regions\": [{\"box\": {\"low_m\": [0, 0, 0], \"high_m\": [1, 1, 1]}, \"young_Pa\": 9000}],"
+    " \"cut\": {\"normal\": [1, 2, -0.3], \"offset_m\": 0.012345678901234567},"
     " \"strokes\": [{\"at_m\": [0.01, 0.1, -0.2], \"radius_m\": 0.03, \"young_factor\": 10},"
     "  {\"at_m\": [0.3, 1e-7, 0.1], \"radius_m\": 0.1, \"soft\": 0.123456789012345678, \"young_factor\": 0.3,"
     "   \"density_factor\": 1.1}]}]}";
@@ -149,10 +150,14 @@ static void what_is_saved_loads_to_the_same_bits(void)
         CHECK(!memcmp(p->mesh->surface.origin_m, q->mesh->surface.origin_m, sizeof p->mesh->surface.origin_m));
         CHECK_TEXT(q->model.name, "subdivision_fem");
         CHECK_INT(q->model.n_value, 2);
+        CHECK(q->cut && p->cut && q->cut_m == p->cut_m);
+        CHECK(!memcmp(q->cut_normal, p->cut_normal, sizeof p->cut_normal));
         CHECK_INT(q->n_region, 1);
         CHECK_NEAR(q->support[0].high_m[0], -0.03, 0);
     }
     CHECK_NEAR(a->scene.body[0].stroke[0].soft, 0.5, 0);
+    CHECK_NEAR(a->scene.body[0].cut_normal[1], 2 / sqrt(5.09), 1e-15);
+    CHECK(a->scene.body[0].cut_m == 0.012345678901234567);
     pal_scene_free(a), pal_scene_free(b), pal_scene_free(c);
 }
 
@@ -219,6 +224,14 @@ static void what_does_not_fit_is_refused_in_a_sentence(void)
            "bodies[0].cells: model \"fem\" does not take control cells; \"subdivision_fem\" does");
     expect("\"surface\": \"a.stl\", \"strokes\": [{" STROKE "}]",
            "bodies[0].strokes: model \"tet_springs\" cannot be painted; \"subdivision_fem\" can");
+    expect("\"surface\": \"a.stl\", \"cut\": {\"normal\": [1, 0, 0]}",
+           "bodies[0].cut: model \"tet_springs\" cannot be cut away; \"subdivision_fem\" can");
+    expect(CELLS ", \"cut\": true", "bodies[0].cut: is not an object");
+    expect(CELLS ", \"cut\": {\"offset_m\": 0}", "bodies[0].cut.normal: is missing");
+    expect(CELLS ", \"cut\": {\"normal\": [0, 0, 0]}", "bodies[0].cut.normal: has no direction");
+    expect(CELLS ", \"cut\": {\"normal\": [0, 1e999, 0]}", "bodies[0].cut.normal");
+    expect(CELLS ", \"cut\": {\"normal\": [0, 1, 0], \"offset_m\": 1e10}", "bodies[0].cut.offset_m");
+    expect(CELLS ", \"cut\": {\"normal\": [0, 1, 0], \"depth\": 1}", "bodies[0].cut.depth: unknown key");
     expect(CELLS ", \"strokes\": {}", "bodies[0].strokes: is not a list");
     expect(CELLS ", \"strokes\": [3]", "bodies[0].strokes[0]: is not an object");
     expect(CELLS ", \"strokes\": [{\"radius_m\": 1}]", "bodies[0].strokes[0].at_m: is missing");

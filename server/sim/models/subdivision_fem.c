@@ -80,7 +80,11 @@ static pal_err keep_boundary(const boundary *from, pal_build *build)
     memcpy(x, from->surface.x, 3 * n * sizeof *x);
     memcpy(tri, from->surface.tri, 3 * m * sizeof *tri);
     memcpy(node, from->node, n * sizeof *node);
-    for (size_t t = 0; t < m; t++) face[t] = origin[from->face[t]];
+    /* control faces between two cells are no part of the control cells' boundary, where faces are taken hold of */
+    for (size_t t = 0; t < m; t++) {
+        int32_t control = origin[from->face[t]];
+        face[t] = control >= 0 && pal_cells_face_boundary(build->def->cells, control) ? control : -1;
+    }
     *surface = (pal_surface){.n_vertex = from->surface.n_vertex, .n_tri = from->surface.n_tri, .x = x, .tri = tri};
     memcpy(surface->origin_m, build->def->mesh->surface.origin_m, sizeof surface->origin_m);
     build->body->surface = surface;
