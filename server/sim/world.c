@@ -1,5 +1,5 @@
 /* The world: steps a plan. Reading order: pal_world_step at the end. */
-#include "server/sim/world.h"
+#include "server/sim/world_parts.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -10,29 +10,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-
-/* shown surface of a body as at load */
-typedef struct part {
-    int n_vertex, n_tri;
-    float *rest_m;
-    int32_t *tri;
-    int32_t *parent; /* of midpoints, of a body that adapts; else NULL */
-} part;
-
-struct pal_world {
-    pal_arena *arena, *scratch;
-    pal_plan plan;
-    pal_tools tools;
-    pal_pose asked[PAL_TOOL_MAX];
-    bool has_asked[PAL_TOOL_MAX];
-    uint64_t pose_ns[PAL_TOOL_MAX];
-    pal_material material[PAL_BODY_MAX];
-    part part[PAL_BODY_MAX];
-    double step_s, time_s, limit_s, rest_limit_s;
-    int most_substep, n_substep;
-    uint64_t tick, step_ns, end_ns;
-    pal_field_rows fields; /* put in while the world runs */
-};
 
 /* ---- load ---- */
 
@@ -135,7 +112,7 @@ static pal_err check_budget(pal_world *w, pal_note *note)
 }
 
 /* the two vertices that each midpoint of an adaptive body lies between, for those who code or draw them */
-static pal_err make_parents(pal_world *w, const pal_levels *levels, part *p)
+static pal_err make_parents(pal_world *w, const pal_levels *levels, pal_world_part *p)
 {
     int n_coarse = levels->n_vertex[0];
     p->parent = PAL_NEW(w->arena, int32_t, 2 * (size_t)(p->n_vertex - n_coarse) + 2);
@@ -150,7 +127,7 @@ static pal_err make_parents(pal_world *w, const pal_levels *levels, part *p)
 static pal_err make_part(pal_world *w, int b)
 {
     const pal_body *body = &w->plan.body[b];
-    part *p = &w->part[b];
+    pal_world_part *p = &w->part[b];
     const double *x = body->skin ? body->surface->x : body->node_rest;
     if (body->n_shown == 0) return PAL_ERR_OK;
     const int32_t *tri = body->shell ? body->shell->slot : body->surface->tri;
@@ -513,160 +490,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     return count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
 }
 
-/* ---- what others see ---- */
-
-static void copy_fields(const pal_body *body, pal_frame_part *to)
-{
-    for (int k = 0; k < PAL_FIELD_COUNT; k++) {
-        const pal_shown_field *from = body->field[k];
-        pal_frame_field *field = &to->field[k];
-        if (!from || !field->value || field->revision == from->revision) continue;
-        memcpy(field->value, from->value, sizeof(float) * (size_t)to->n_vertex);
-        field->revision = from->revision;
-        field->time_s = from->time_s;
-    }
-}
-
-/* what of the table of triangles has changed since this frame was filled last, or all of it */
-static void copy_slots(const pal_shell *shell, pal_frame_part *to)
-{
-    size_t one = 3 * sizeof *to->slot;
-    if (to->slot_log > shell->n_log || shell->n_log - to->slot_log > (uint64_t)shell->n_log_room) {
-        memcpy(to->slot, shell->slot, one * (size_t)shell->n_slot);
-    } else {
-        for (uint64_t i = to->slot_log; i < shell->n_log; i++) {
-            size_t place = 3 * (size_t)shell->log[i % (uint64_t)shell->n_log_room];
-            memcpy(to->slot + place, shell->slot + place, one);
-        }
-    }
-    to->slot_log = shell->n_log;
-    to->n_active = shell->n_node;
-    to->n_spring = shell->n_spring;
-}
-
-static void copy_part(const pal_body *body, pal_frame_part *to)
-{
-    copy_fields(body, to);
-    const double *o = body->offset_m;
-    to->revision = body->revision;
-    to->frozen = body->frozen;
-    if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
-    if (to->n_slot > 0) {
-        copy_slots(body->shell, to);
-        for (int k = 0; k < body->n_active; k++) {
-            size_t i = 3 * (size_t)body->active[k];
-            for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->shown[i + c] + o[c]);
-        }
-        return;
-    }
-    if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
-        if (to->n_vertex > 0) memcpy(to->position_m, body->shown, 3 * sizeof(float) * (size_t)to->n_vertex);
-        return;
-    }
-    for (int i = 0; i < to->n_vertex; i++)
-        for (int c = 0; c < 3; c++) to->position_m[3 * i + c] = (float)(body->shown[3 * i + c] + o[c]);
-}
-
-static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
-{
-    const pal_tool *tool = &w->tools.tool[t];
-    to->present = tool->present, to->touching = tool->touching, to->holding = tool->holding;
-    to->pose = tool->last;
-    to->pose_ns = w->pose_ns[t];
-    pal_copy3(to->force_N, tool->mean_force_N);
-    to->radius_m = tool->radius_m;
-    to->n_patch = tool->n_patch;
-    memcpy(to->patch, tool->patch, sizeof to->patch);
-    to->has_grip = tool->has_grip;
-    pal_copy3(to->grip_x0_m, tool->grip_x0_m);
-    pal_copy3(to->grip_f0_N, tool->grip_f0_N);
-    memcpy(to->grip_k_N_m, tool->grip_k_N_m, sizeof to->grip_k_N_m);
-    to->grip_b_Ns_m = tool->grip_b_Ns_m;
-}
-
-void pal_world_frame(const pal_world *world, pal_frame *out)
-{
-    const pal_world *w = world;
-    out->tick = w->tick;
-    out->time_s = w->time_s;
-    out->end_ns = w->end_ns;
-    out->step_ns = w->step_ns;
-    out->n_substep = w->n_substep;
-    for (int b = 0; b < out->n_part; b++) copy_part(&w->plan.body[b], &out->part[b]);
-    out->n_tool = w->tools.n_tool;
-    for (int t = 0; t < w->tools.n_tool; t++) copy_tool(w, t, &out->tool[t]);
-    out->n_row = w->plan.n_row < PAL_FRAME_ROWS ? w->plan.n_row : PAL_FRAME_ROWS;
-    for (int i = 0; i < out->n_row; i++) {
-        uint64_t ns = w->plan.row[i].spent_ns;
-        out->row_name[i] = w->plan.row[i].effect->name;
-        out->row_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
-    }
-}
-
-static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t n_byte)
-{
-    const unsigned char *p = bytes;
-    for (size_t i = 0; i < n_byte; i++) hash = (hash ^ p[i]) * 0x100000001b3u;
-    return hash;
-}
-
-uint64_t pal_world_hash(const pal_world *world)
-{
-    uint64_t hash = hash_bytes(0xcbf29ce484222325u, &world->tick, sizeof world->tick);
-    for (int b = 0; b < world->plan.n_body; b++) {
-        const pal_body *body = &world->plan.body[b];
-        hash = hash_bytes(hash, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
-        hash = hash_bytes(hash, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
-        const pal_levels *levels = body->shell ? &body->shell->levels : NULL;
-        if (levels) hash = hash_bytes(hash, body->shell->face_state, (size_t)levels->first_face[levels->n_level]);
-    }
-    return hash;
-}
-
-int pal_world_rows(const pal_world *world)
-{
-    return world->plan.n_row;
-}
-
-const pal_row *pal_world_effect(const pal_world *world, int row)
-{
-    return &world->plan.row[row];
-}
-
-void pal_world_row(const pal_world *world, int row, pal_row_info *out)
-{
-    const pal_row *r = &world->plan.row[row];
-    *out = (pal_row_info){.name = r->effect->name,
-                          .body = world->plan.body[world->plan.row_body[row]].name,
-                          .stage = pal_stage_name(r->effect->stage),
-                          .n_byte = r->n_byte,
-                          .spent_ns = r->spent_ns};
-}
-
-int pal_world_parts(const pal_world *world)
-{
-    return world->plan.n_body;
-}
-
-void pal_world_shown(const pal_world *world, int index, pal_shown *out)
-{
-    const part *p = &world->part[index];
-    const pal_body *body = &world->plan.body[index];
-    *out = (pal_shown){.name = body->name,
-                       .n_vertex = p->n_vertex,
-                       .n_tri = p->n_tri,
-                       .rest_m = p->rest_m,
-                       .tri = p->tri,
-                       .face = body->shown_face,
-                       .revision = body->revision};
-    if (!body->shell || p->n_vertex == 0) return;
-    const pal_levels *levels = &body->shell->levels;
-    out->adapts = true;
-    out->n_coarse = levels->n_vertex[0];
-    out->parent = p->parent;
-    out->n_coarse_tri = levels->first_face[1];
-    out->coarse_tri = levels->face;
-}
+/* ---- what others see: frames and shown surfaces are in world_show.c ---- */
 
 double pal_world_limit_s(const pal_world *world)
 {

@@ -1,0 +1,31 @@
+/* What world.c and world_show.c share: the world's record. Private to these. */
+#ifndef PAL_SIM_WORLD_PARTS_H
+#define PAL_SIM_WORLD_PARTS_H
+#include "server/sim/field.h"
+#include "server/sim/plan.h"
+#include "server/sim/world.h"
+
+/* shown surface of a body as at load */
+typedef struct pal_world_part {
+    int n_vertex, n_tri;
+    float *rest_m;
+    int32_t *tri;
+    int32_t *parent; /* of midpoints, of a body that adapts; else NULL */
+} pal_world_part;
+
+struct pal_world {
+    pal_arena *arena, *scratch;
+    pal_plan plan;
+    pal_tools tools;
+    pal_pose asked[PAL_TOOL_MAX];
+    bool has_asked[PAL_TOOL_MAX];
+    uint64_t pose_ns[PAL_TOOL_MAX];
+    pal_material material[PAL_BODY_MAX];
+    pal_world_part part[PAL_BODY_MAX];
+    double step_s, time_s, limit_s, rest_limit_s;
+    int most_substep, n_substep;
+    uint64_t tick, step_ns, end_ns;
+    pal_field_rows fields; /* put in while the world runs */
+};
+
+#endif
