@@ -3,21 +3,26 @@
 # usage: deploy/run.sh [INPUT] [palpate serve options...]
 #   INPUT  a scene (.json), a surface (.obj .stl .ply .off) or a label volume (.nii .nii.gz .inr .inr.gz);
 #          stomach, sphere or sheet: a hollow body that refines where it is touched;
+#          soccer, monster, block3, chair, block4, head, bridge, nozzle or kidney: a solid to sculpt (or a .palcells file);
 #          without it: the liver of an abdominal CT, or our own organ when that cannot be had
 # PALPATE_BUILD names another build folder. A rerun starts in seconds.
 set -u
 . "$(dirname "$0")/common.sh"
 case ${1-} in -h | --help)
-    sed -n '2,8s/^# \{0,1\}//p' "$0"
+    sed -n '2,9s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 esac
 start=$(pwd)
-input='' shape=''
+input='' shape='' solid=''
 case ${1-} in
 '' | -*) ;;
 stomach | sphere | sheet)
     shape=$1
+    shift
+    ;;
+soccer | monster | block3 | chair | block4 | head | bridge | nozzle | kidney)
+    solid=$1
     shift
     ;;
 *)
@@ -56,6 +61,13 @@ if [ -n "$shape" ]; then
     input=$build/scene/$shape/scene.json
     if stale "$input"; then
         "$palpate" prepare --shape "$shape" -o "$build/scene/$shape" --quiet || fail "the scene could not be prepared"
+    fi
+fi
+if [ -n "$solid" ]; then
+    input=$build/scene/$solid.palcells
+    mkdir -p "$build/scene"
+    if stale "$input"; then
+        "$palpate" cells "$solid" -o "$input" --quiet || fail "the cells could not be made"
     fi
 fi
 if [ -z "$input" ]; then
