@@ -11,14 +11,15 @@ int command_bench(int argc, char **argv)
     const pal_flag flag[] = {{"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
                               "adaptive: where the pressed vertex is over time (paper C Figs. 10 and 12)"}};
     const pal_flag_table table = {
-        .usage =
-            "bench mesh [SURFACE.ply] | springs | adaptive | fem | calibrate [FOLDER] | protocol | latency [flags]",
+        .usage = "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | calibrate [FOLDER] | protocol | "
+                 "latency [flags]",
         .about = "Measures this machine, medians of several runs:\n"
                  "  mesh      preparation of tetrahedra at several resolutions (of a "
                  "procedural organ without SURFACE)\n"
                  "  springs   forces, integration and skinning against the machine's limits\n"
                  "  adaptive  surfaces that refine where they are touched: coarse, refined, adaptive\n"
                  "  fem       live steps and static solves of finite elements\n"
+                 "  solids    subdivided solids as finite elements (paper A Table 1)\n"
                  "  calibrate springs fitted to finite elements, by gradient and by "
                  "annealing (FOLDER: deploy/problems)\n"
                  "  protocol  encoding and decoding of frames\n"
@@ -47,6 +48,7 @@ int command_bench(int argc, char **argv)
     if (!strcmp(word[0], "springs")) return bench_springs(common.json);
     if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json, picture);
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
+    if (!strcmp(word[0], "solids")) return bench_solids(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);
     fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);
