@@ -10,7 +10,8 @@
 
 #define STAMP_MAX ((uint64_t)1 << 53)
 
-static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none", "displacement", "von_mises", "energy", "stiffness"};
+static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none",      "displacement", "von_mises", "energy",
+                                                          "stiffness", "strain",       "distortion"};
 
 const char *pal_wire_field_name(pal_wire_field field)
 {

@@ -19,10 +19,12 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_VON_MISES_PA,
     PAL_WIRE_FIELD_ENERGY_J_M3,
     PAL_WIRE_FIELD_STIFFNESS_J,
+    PAL_WIRE_FIELD_STRAIN,
+    PAL_WIRE_FIELD_DISTORTION,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
-/* as in `view` and in parts: "none", "displacement", "von_mises", "energy", "stiffness"; never NULL. find: COUNT when
- * unknown */
+/* as in `view` and in parts: "none", "displacement", "von_mises", "energy", "stiffness", "strain", "distortion"; never
+ * NULL. find: COUNT when unknown */
 const char *pal_wire_field_name(pal_wire_field field);
 pal_wire_field pal_wire_field_find(const char *name);
 

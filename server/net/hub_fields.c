@@ -11,6 +11,8 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_VON_MISES_PA == (int)PAL_FIELD_VON_MISES_PA &&
                    (int)PAL_WIRE_FIELD_ENERGY_J_M3 == (int)PAL_FIELD_ENERGY_J_M3 &&
                    (int)PAL_WIRE_FIELD_STIFFNESS_J == (int)PAL_FIELD_STIFFNESS_J &&
+                   (int)PAL_WIRE_FIELD_STRAIN == (int)PAL_FIELD_STRAIN &&
+                   (int)PAL_WIRE_FIELD_DISTORTION == (int)PAL_FIELD_DISTORTION &&
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 

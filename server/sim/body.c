@@ -7,7 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-static const char *const field_name[PAL_FIELD_COUNT] = {"none", "displacement", "von_mises", "energy", "stiffness"};
+static const char *const field_name[PAL_FIELD_COUNT] = {"none",      "displacement", "von_mises", "energy",
+                                                        "stiffness", "strain",       "distortion"};
 
 const char *pal_field_name(pal_field field)
 {
@@ -23,8 +24,9 @@ pal_field pal_field_find(const char *name)
 
 const char *pal_field_title(pal_field field)
 {
-    static const char *const title[PAL_FIELD_COUNT] = {"no field", "displacement", "von Mises stress",
-                                                       "strain energy density", "edge stiffness"};
+    static const char *const title[PAL_FIELD_COUNT] = {
+        "no field",       "displacement",   "von Mises stress", "strain energy density",
+        "edge stiffness", "largest strain", "volume distortion"};
     return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
 }
 

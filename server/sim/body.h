@@ -26,10 +26,12 @@ typedef enum pal_field {
     PAL_FIELD_VON_MISES_PA,
     PAL_FIELD_ENERGY_J_M3,
     PAL_FIELD_STIFFNESS_J, /* constant k_d of the edges around, paper B fig. 13 f */
+    PAL_FIELD_STRAIN,      /* largest principal stretch less 1 (paper A fig. 13)  */
+    PAL_FIELD_DISTORTION,  /* volume now over volume at rest, less 1              */
     PAL_FIELD_COUNT
 } pal_field;
-const char *
-pal_field_name(pal_field field); /* "displacement", "von_mises", "energy", "stiffness", "none"; never NULL [any] */
+const char *pal_field_name(pal_field field);  /* "displacement", "von_mises", "energy", "stiffness", "strain",
+                                                 "distortion", "none"; never NULL [any] */
 pal_field pal_field_find(const char *name);   /* NONE: there is no field of that name [any] */
 const char *pal_field_title(pal_field field); /* for sentences: "von Mises stress" [any] */
 

@@ -86,8 +86,9 @@ typedef struct pal_cell_points {
     double volume_m3[PAL_CELL_POINTS]; /* at rest; their sum is the element's */
     double strain[PAL_CELL_POINTS][6]; /* xx yy zz yz zx xy, not doubled      */
     double von_mises_Pa[PAL_CELL_POINTS], energy_J_m3[PAL_CELL_POINTS];
-    double det_f[PAL_CELL_POINTS]; /* volume now over volume at rest      */
-    double turn[9];                /* Q                                   */
+    double det_f[PAL_CELL_POINTS];   /* volume now over volume at rest      */
+    double stretch[PAL_CELL_POINTS]; /* largest principal stretch less 1 */
+    double turn[9];                  /* Q                                   */
 } pal_cell_points;
 /* the same for both operators */
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,

@@ -94,6 +94,7 @@ void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_c
         double f[9], h[9], stress[9], at[3], mu, lambda, *e = out->strain[p];
         out->volume_m3[p] = pal_cell_point(p, at) * deformation(now[p], rest[p], f);
         out->det_f[p] = pal_det3(f);
+        out->stretch[p] = pal_largest_strain(f);
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) {
                 h[3 * i + j] = -(i == j);

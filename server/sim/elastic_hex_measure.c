@@ -1,5 +1,5 @@
-/* What is shown of voxel hexahedra: von Mises stress and energy density at the Gauss point nearest to each corner,
- * which stands for an eighth of the cube. */
+/* What is shown of voxel hexahedra: von Mises stress, energy density, strain and distortion at the Gauss point nearest
+ * to each corner, which stands for an eighth of the cube. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape.h"
@@ -65,7 +65,7 @@ void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, do
 {
     const double h = row->h_m;
     double grad[8][8][3];
-    if (field != PAL_FIELD_VON_MISES_PA && field != PAL_FIELD_ENERGY_J_M3) return;
+    if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
     for (int e = 0; e < row->n_hex; e++) {
         const int32_t *node = row->hexes->node + 8 * e;
@@ -89,7 +89,10 @@ void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, do
         else
             corot_points(&at, von_mises, density);
         for (int c = 0; c < 8; c++) {
-            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA ? von_mises[c] : density[c]);
+            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA  ? von_mises[c]
+                                      : field == PAL_FIELD_ENERGY_J_M3 ? density[c]
+                                      : field == PAL_FIELD_STRAIN      ? pal_largest_strain(at.f[c])
+                                                                       : pal_det3(at.f[c]) - 1);
             volume_m3[node[c]] += volume;
         }
     }

@@ -73,6 +73,21 @@ double pal_corotational_stress(double mu, double lambda, const double f[9], cons
     return 0.5 * sum;
 }
 
+/* from the largest eigenvalue of E = (F'F - I)/2, whose small numbers keep their digits */
+double pal_largest_strain(const double f[9])
+{
+    double e[9], mean = 0, square = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            e[3 * i + j] = 0.5 * (f[i] * f[j] + f[3 + i] * f[3 + j] + f[6 + i] * f[6 + j] - (i == j));
+    mean = (e[0] + e[4] + e[8]) / 3;
+    for (int i = 0; i < 3; i++) e[4 * i] -= mean;
+    for (int i = 0; i < 9; i++) square += e[i] * e[i];
+    double p = sqrt(square / 6), turn = p > 0 ? 0.5 * pal_det3(e) / (p * p * p) : 1;
+    double most = mean + 2 * p * cos(acos(fmax(-1, fmin(1, turn))) / 3), stretch2 = fmax(0, 1 + 2 * most);
+    return (stretch2 - 1) / (sqrt(stretch2) + 1);
+}
+
 double pal_von_mises(const double s[9])
 {
     double a = s[0] - s[4], b = s[4] - s[8], c = s[8] - s[0];

@@ -9,6 +9,12 @@
 #define PAL_SIM_ELASTIC_LAW_H
 #include "server/sim/effect.h"
 
+/* what rows of elements measure */
+enum {
+    PAL_ELASTIC_FIELDS =
+        1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN | 1 << PAL_FIELD_DISTORTION
+};
+
 typedef enum pal_elastic_law { PAL_LAW_COROTATIONAL, PAL_LAW_LINEAR, PAL_LAW_NEO_HOOKEAN } pal_elastic_law;
 
 /* key "law": corotational (default), linear or neo_hookean; REFUSED names another. [load] */
@@ -22,6 +28,8 @@ void pal_linear_stress(double mu, double lambda, const double a[9], double p[9])
 /* P of the corotational law with rotation r (polar part of F): r (2 mu e + lambda tr e I), e = sym(r'F) - I; returns
  * the energy mu e:e + lambda/2 (tr e)^2 */
 double pal_corotational_stress(double mu, double lambda, const double f[9], const double r[9], double p[9]);
+/* largest principal stretch of F less 1, whatever way F is turned */
+double pal_largest_strain(const double f[9]);
 /* sqrt(3/2) of the length of the deviator of a symmetric stress */
 double pal_von_mises(const double stress[9]);
 

@@ -310,13 +310,15 @@ void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
 }
 
 /* von Mises of the Cauchy stress P F'/J (neo-Hookean) or of the small-strain stress in current axes, which has the same
- * von Mises as that in the element's; energy density. At one Gauss point */
+ * von Mises as that in the element's; energy density; strain and distortion. At one Gauss point */
 static double field_at(const pal_elastic_tets *t, int e, int point, const double *d, pal_field field)
 {
     double volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
     double mu = *lane_at(t->stiff, 2, t->place[e], 0) / volume, lambda = *lane_at(t->stiff, 2, t->place[e], 1) / volume;
     double f[9], r[9], p[9], s[9];
     pal_elastic_tets_gradient(t, e, point, d, f);
+    if (field == PAL_FIELD_STRAIN) return pal_largest_strain(f);
+    if (field == PAL_FIELD_DISTORTION) return pal_det3(f) - 1;
     if (t->wish.law == PAL_LAW_NEO_HOOKEAN) {
         if (field == PAL_FIELD_ENERGY_J_M3) return pal_neo_energy(mu, mu + lambda, f);
         pal_neo_stress(mu, mu + lambda, 0, f, p);
@@ -334,7 +336,7 @@ static double field_at(const pal_elastic_tets *t, int e, int point, const double
 
 void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field field, double *sum, double *volume_m3)
 {
-    if (field != PAL_FIELD_VON_MISES_PA && field != PAL_FIELD_ENERGY_J_M3) return;
+    if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
     int n = t->wish.n_corner;
     for (int e = 0; e < t->wish.n_tet; e++) {
         double share = *lane_at(t->volume_m3, 1, t->place[e], 0) / n, value = 0;

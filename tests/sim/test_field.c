@@ -1,5 +1,7 @@
 /* Fields in colour: rows that come and go in a running world, their values, their rate; nothing where nobody looks. */
 #include "server/sim/effect_list.h"
+#include "server/sim/elastic_law.h"
+#include "tests/mesh/solids.h"
 #include "tests/sim/tool_scene.h"
 
 /* ---- heap calls, counted by the linker's --wrap ---- */
@@ -117,7 +119,8 @@ static void nobody_looks_nothing_is_there_and_looking_changes_no_bit(void)
     for (int i = 0; i < 60; i++) {
         if (i == 5) {
             for (int k = 1; k < PAL_FIELD_COUNT; k++)
-                CHECK_INT(pal_world_field(b.world, 0, (pal_field)k, true, &note), 0);
+                CHECK_INT(pal_world_field(b.world, 0, (pal_field)k, true, &note),
+                          pal_world_gives(b.world, 0, (pal_field)k) ? 0 : PAL_ERR_REFUSED);
             CHECK_INT(pal_world_rows(b.world), rows + 4);
             CHECK_INT(rows_named(b.world, "field_out"), 4);
             CHECK(pal_world_bytes(b.world) > n_byte);
@@ -463,6 +466,72 @@ static void stress_and_energy_of_a_stretched_block_are_those_of_uniaxial_tension
         }
 }
 
+/* its largest strain is that of x, its volume (1 + e) (1 - nu e)^2 of what it was, whatever law and turn */
+static void strain_and_distortion_of_a_stretched_block_are_exact(void)
+{
+    static const char *const element[] = {"tet4", "tet10", "hex8", "hex8_bbar"}, *const law[] = {"linear",
+                                                                                                 "corotational",
+                                                                                                 "neo_hookean"};
+    for (int k = 0; k < 12; k++) {
+        const double strain = 0.03, angle = k % 3 == 0 ? 0 : 0.7;
+        tool_scene s;
+        REQUIRE(stretched(&s, element[k / 3], law[k % 3], strain, angle));
+        double across = 1 - s.scene->body[0].material.poisson * strain;
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISTORTION, true, NULL));
+        CHECK_LE(worst_error(s.body, PAL_FIELD_STRAIN, strain), 2e-6);
+        CHECK_LE(worst_error(s.body, PAL_FIELD_DISTORTION, (1 + strain) * across * across - 1), 2e-5);
+        close_fem(&s);
+    }
+}
+
+/* a block of control cells whose points are moved by F, which its nodes follow to the digit: one stretch out and one
+ * in, then pressed from all sides; turned */
+static void strain_and_distortion_of_a_solid_are_exact(void)
+{
+    const double stretch[2][3] = {{1.05, 0.97, 1.01}, {0.98, 0.98, 0.98}}, wanted[2] = {0.05, -0.02};
+    for (int k = 0; k < 2; k++) {
+        const double c = cos(0.9), n = sin(0.9), turn[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
+        pal_cells cells = solid_bricks(2, 2, 2, 0.05, 0.05, 0.05);
+        pal_surface surface = {0};
+        tool_scene s = {.scene = calloc(1, sizeof *s.scene)};
+        REQUIRE(s.scene && !pal_cells_boundary(&cells, &surface, NULL, NULL));
+        REQUIRE(!pal_prepared_surface(&surface, &s.mesh));
+        pal_surface_free(&surface);
+        pal_scene_default(s.scene);
+        s.scene->n_body = 1;
+        pal_body_default_cells(&s.scene->body[0], "clay", &s.mesh, &cells);
+        pal_item_put_number(&s.scene->body[0].model, "levels", 1, NULL);
+        REQUIRE(tool_scene_open(&s));
+        for (int i = 0; i < s.body->n_dof; i++) {
+            double at[3];
+            for (int a = 0; a < 3; a++) at[a] = s.body->x_rest[3 * i + a] * stretch[k][a];
+            pal_mul33(s.body->x + 3 * (size_t)i, turn, at);
+        }
+        pal_world_moved(s.world, 0);
+        CHECK(!pal_world_gives(s.world, 0, PAL_FIELD_STIFFNESS_J));
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISTORTION, true, NULL));
+        CHECK_LE(worst_error(s.body, PAL_FIELD_STRAIN, wanted[k]), 1e-6);
+        CHECK_LE(worst_error(s.body, PAL_FIELD_DISTORTION, stretch[k][0] * stretch[k][1] * stretch[k][2] - 1), 1e-6);
+        tool_scene_close(&s);
+        pal_cells_free(&cells);
+    }
+}
+
+/* rest, collapsed, flat, turned over, sheared */
+static void the_largest_strain_is_that_of_the_largest_stretch(void)
+{
+    const double rest[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, zero[9] = {0}, flat[9] = {1.5, 0, 0, 0, 0, 0, 0, 0, 1},
+                 over[9] = {-1, 0, 0, 0, 2, 0, 0, 0, 1}, shear[9] = {1, 1, 0, 0, 1, 0, 0, 0, 1};
+    CHECK_NEAR(pal_largest_strain(rest), 0, 0);
+    CHECK_NEAR(pal_largest_strain(zero), -1, 1e-15);
+    CHECK_NEAR(pal_largest_strain(flat), 0.5, 1e-8);
+    CHECK_NEAR(pal_largest_strain(over), 1, 1e-8);
+    /* simple shear by 1: the golden ratio */
+    CHECK_NEAR(pal_largest_strain(shear), 0.5 * (sqrt(5) - 1), 1e-12);
+}
+
 static void looking_at_a_live_body_of_elements_changes_no_bit(void)
 {
     static const char *const element[] = {"tet4", "hex8_bbar"}, *const law[] = {"corotational", "neo_hookean"};
@@ -504,6 +573,9 @@ int main(void)
     RUN(an_entry_of_the_scene_keeps_its_row);
     RUN(rows_of_other_bodies_stay_theirs);
     RUN(stress_and_energy_of_a_stretched_block_are_those_of_uniaxial_tension);
+    RUN(strain_and_distortion_of_a_stretched_block_are_exact);
+    RUN(strain_and_distortion_of_a_solid_are_exact);
+    RUN(the_largest_strain_is_that_of_the_largest_stretch);
     RUN(looking_at_a_live_body_of_elements_changes_no_bit);
     return check_report();
 }

@@ -4,7 +4,7 @@ import { KIND, PART_MAX, readHead, VERTEX_MAX, WireError } from "./wire.js";
 
 const HEAD_BYTES = 40;
 /** names by their number on the wire, as in `view` */
-export const FIELD_NAMES = Object.freeze(["none", "displacement", "von_mises", "energy", "stiffness"]);
+export const FIELD_NAMES = Object.freeze(["none", "displacement", "von_mises", "energy", "stiffness", "strain", "distortion"]);
 
 /** @param {boolean} good @param {string} code @param {string} text */
 function need(good, code, text) {

@@ -54,6 +54,17 @@ test("a range begins at 0 unless all values lie in its upper half", () => {
   }
 });
 
+test("a signed field has 0 in the middle, whichever sign is the larger", () => {
+  assert.deepEqual(rangeOf("distortion", -0.013, 0.002, null), { low: -0.015, high: 0.015 });
+  assert.deepEqual(rangeOf("distortion", -0.001, 0.19, null), { low: -0.2, high: 0.2 });
+  assert.deepEqual(rangeOf("distortion", 0, 0, null), { low: -1e-3, high: 1e-3 });
+  let range = rangeOf("distortion", -0.009, 0.004, null);
+  range = rangeOf("distortion", -0.005, 0.006, range);
+  assert.deepEqual(range, { low: -0.01, high: 0.01 });
+  assert.deepEqual(labels("distortion", range), { low: "−1", high: "+1", unit: "%" });
+  assert.deepEqual(labels("strain", { low: 0, high: 0.12 }), { low: "0", high: "12", unit: "%" });
+});
+
 test("both ends are said in one unit that suits the larger", () => {
   assert.deepEqual(labels("displacement", { low: 0, high: 0.012 }), { low: "0", high: "12", unit: "mm" });
   assert.deepEqual(labels("displacement", { low: 0, high: 2.5e-4 }), { low: "0", high: "250", unit: "µm" });

@@ -10,6 +10,7 @@
  * of forces. For the same reason the tangent is given by products only. */
 #include "server/sim/cell_kernel.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/elastic_law.h"
 
 #include <string.h>
 
@@ -85,10 +86,22 @@ static double density(const pal_cell_points *points, int p)
     return points->energy_J_m3[p];
 }
 
+static double strain(const pal_cell_points *points, int p)
+{
+    return points->stretch[p];
+}
+static double distortion(const pal_cell_points *points, int p)
+{
+    return points->det_f[p] - 1;
+}
+
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    if (field == PAL_FIELD_VON_MISES_PA) pal_cells_elastic_measure(self, body->d, von_mises, sum, volume_m3);
-    if (field == PAL_FIELD_ENERGY_J_M3) pal_cells_elastic_measure(self, body->d, density, sum, volume_m3);
+    static pal_cell_value *const value[PAL_FIELD_COUNT] = {[PAL_FIELD_VON_MISES_PA] = von_mises,
+                                                           [PAL_FIELD_ENERGY_J_M3] = density,
+                                                           [PAL_FIELD_STRAIN] = strain,
+                                                           [PAL_FIELD_DISTORTION] = distortion};
+    if (value[field]) pal_cells_elastic_measure(self, body->d, value[field], sum, volume_m3);
 }
 
 static const pal_tangent tangent = {.couple = couple, .linearise = linearise, .multiply = multiply, .rotate = rotate};
@@ -102,4 +115,4 @@ const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
                                             .reset = reset,
                                             .tangent = &tangent,
                                             .measure = measure,
-                                            .fields = 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3};
+                                            .fields = PAL_ELASTIC_FIELDS};

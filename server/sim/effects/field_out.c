@@ -1,7 +1,6 @@
-/* A field shown in colour: displacement, von Mises stress, strain energy density or edge stiffness at the shown
- * vertices. The row is
- * there while somebody looks: pal_world_field adds it to a running world, or the scene has an entry for it. It takes no
- * part in the simulation: nothing that moves reads it.
+/* A field shown in colour: displacement, von Mises stress, strain energy density, edge stiffness, largest strain
+ * or volume distortion at the shown vertices. The row is there while somebody looks: pal_world_field adds it to a
+ * running world, or the scene has an entry for it. It takes no part in the simulation: nothing that moves reads it.
  *
  * All but displacement: every FORCE row that can measure adds its value times volume to the nodes of its elements, and
  * the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of
@@ -11,8 +10,8 @@
  *
  * A body that adapts (sim/shell.h) shows 0 at vertices out of use.
  *
- * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness"), rate_hz (10): so often in simulated time it is
- * taken anew. */
+ * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10): so often
+ * in simulated time it is taken anew. */
 #include "server/sim/effect_list.h"
 
 #include <math.h>
@@ -37,9 +36,10 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     PAL_TRY(pal_item_done(item, build->note));
     pal_field kind = pal_field_find(name);
     if (kind == PAL_FIELD_NONE)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness)", item->path,
-                            name);
+        return pal_note_set(
+            build->note, PAL_ERR_REFUSED,
+            "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, distortion)", item->path,
+            name);
     if (body->n_shown == 0 || !body->surface)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: the body shows nothing that could be coloured",
                             item->path);

@@ -167,4 +167,4 @@ const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
                                            .reset = reset,
                                            .tangent = &tangent,
                                            .measure = measure,
-                                           .fields = 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3};
+                                           .fields = PAL_ELASTIC_FIELDS};

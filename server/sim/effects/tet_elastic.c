@@ -230,4 +230,4 @@ const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
                                            .reset = reset,
                                            .tangent = &tangent,
                                            .measure = measure,
-                                           .fields = 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3};
+                                           .fields = PAL_ELASTIC_FIELDS};
