@@ -207,6 +207,7 @@ void pal_world_destroy(pal_world *world)
     if (!world) return;
     pal_plan_free(&world->plan);
     pal_field_free(&world->fields);
+    pal_brush_rows_free(&world->brushes);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -222,6 +223,8 @@ pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
     if (pose) {
         world->asked[tool] = *pose;
         world->pose_ns[tool] = pal_clock_ns();
+    } else {
+        pal_brush_rows_end(&world->brushes, tool);
     }
     return PAL_ERR_OK;
 }
@@ -336,6 +339,16 @@ pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted
     if (wanted) return pal_field_add(&world->fields, &world->plan, body, field, &step, note);
     pal_field_drop(&world->fields, &world->plan, body, field);
     return PAL_ERR_OK;
+}
+
+pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note)
+{
+    return pal_brush_rows_set(&world->brushes, &world->plan, body, slot, brush, note);
+}
+
+void pal_world_tidy(pal_world *world)
+{
+    pal_brush_rows_tidy(&world->brushes, &world->plan);
 }
 
 /* ---- a step ---- */
@@ -516,7 +529,7 @@ double pal_world_energy_J(const pal_world *world)
 size_t pal_world_bytes(const pal_world *world)
 {
     return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte + pal_field_bytes(&world->fields) +
-           pal_plan_bytes(&world->plan);
+           pal_brush_rows_bytes(&world->brushes) + pal_plan_bytes(&world->plan);
 }
 
 int pal_world_bodies(const pal_world *world)

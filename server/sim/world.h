@@ -5,6 +5,7 @@
  * meshes' origin_m. Poses and frames use it. */
 #ifndef PAL_SIM_WORLD_H
 #define PAL_SIM_WORLD_H
+#include "server/sim/brush.h"
 #include "server/sim/effect.h"
 #include "server/sim/frame.h"
 
@@ -64,9 +65,19 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note);
 bool pal_world_gives(const pal_world *world, int body, pal_field field); /* would it be refused? */
 
+/* What the hand of a tool does to a body (brush.h): begins, changes, or with kind NONE or NULL ends the brush of slot
+ * 0..PAL_TOOL_MAX-1. The first brush of a body puts the row `brush` into the running plan. Letting a tool go ends the
+ * brushes of its slot, a reset ends all at once. REFUSED (one sentence): no such body or slot, a body without brushes,
+ * a bad number, nothing within reach; MEMORY; both change nothing. Between steps; takes heap memory. [sim] */
+pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note);
+/* rows whose last brush has gone out are taken out of the plan. After every step of a world that shall be repeatable to
+ * the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
+void pal_world_tidy(pal_world *world);
+
 /* A world made from an edited scene goes on where another is: its time, tools and poses, and x and v of all bodies that
  * have as many points (bodies that adapt begin at rest). x, v [n_dof][3] are the state of body `edited` in their place
- * (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more. Both stand still. [sim] */
+ * (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are over. Both stand
+ * still. [sim] */
 void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */

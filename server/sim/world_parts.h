@@ -1,6 +1,7 @@
 /* What world.c and world_show.c share: the world's record. Private to these. */
 #ifndef PAL_SIM_WORLD_PARTS_H
 #define PAL_SIM_WORLD_PARTS_H
+#include "server/sim/brush_rows.h"
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
 #include "server/sim/world.h"
@@ -26,6 +27,7 @@ struct pal_world {
     int most_substep, n_substep;
     uint64_t tick, step_ns, end_ns;
     pal_field_rows fields; /* put in while the world runs */
+    pal_brush_rows brushes;
 };
 
 #endif

@@ -1,0 +1,362 @@
+/* Row brush (brush.h): what sculpting hands do to a body, at its shown nodes.
+ *
+ * INFLATE: a triangle with corners x and weight w gives each corner p w / 6 (x1 - x0) x (x2 - x0). With w = 1 over a
+ * closed surface that is p times the gradient of its volume: no net force, no net moment. A pressure that follows
+ * normals has no energy, and its stiffness, which is not symmetric, is left out of the tangent.
+ * CURVE: f_i = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
+#include "server/sim/brush.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { RAMP = 10 };
+
+/* a brush that acts; `now` is what it does now, on its way to `to` */
+typedef struct slot {
+    pal_brush brush;
+    pal_arena *arena; /* of what follows; NULL: no brush here */
+    int n;
+    int32_t *item;  /* triangles (INFLATE) or nodes (CURVE)      [n]    */
+    double *weight; /* of triangles; of nodes their share k_i / k [n]    */
+    double *begin;  /* CURVE: places of the nodes when it began  [n][3] */
+    double *bow;    /* CURVE: 4 t (1 - t)                        [n]    */
+    double now[3];  /* pressure_Pa, or lift_m */
+    int n_left;     /* steps until now is what the brush says */
+    int n_in;       /* steps of RAMP that it has come in      */
+    bool ending;
+} slot;
+
+typedef struct brush_row {
+    const pal_body *body;
+    slot slot[PAL_TOOL_MAX];
+} brush_row;
+
+/* ---- numbers ---- */
+
+static bool within(double value, double low, double high)
+{
+    return value >= low && value <= high;
+}
+
+static bool same3(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+pal_err pal_brush_check(const pal_brush *b, pal_note *note)
+{
+    if (b->kind != PAL_BRUSH_INFLATE && b->kind != PAL_BRUSH_CURVE)
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: there is no kind %d", (int)b->kind);
+    bool curve = b->kind == PAL_BRUSH_CURVE;
+    if (!pal_finite3(b->at_m) || (curve && (!pal_finite3(b->to_m) || !pal_finite3(b->lift_m))))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: a place or lift_m is no number");
+    if (!within(b->radius_m, 1e-9, 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: radius_m %g, wanted 1e-9 to 1e9", b->radius_m);
+    if (!within(b->soft, 0, 1)) return pal_note_set(note, PAL_ERR_REFUSED, "brush: soft %g, wanted 0 to 1", b->soft);
+    if (!curve && !within(b->pressure_Pa, -1e9, 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: pressure_Pa %g, wanted -1e9 to 1e9", b->pressure_Pa);
+    if (curve && !within(b->stiffness_N_m, 1e-9, 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: stiffness_N_m %g, wanted 1e-9 to 1e9", b->stiffness_N_m);
+    if (curve && same3(b->at_m, b->to_m))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: both ends of the curve are at %g %g %g m", b->at_m[0],
+                            b->at_m[1], b->at_m[2]);
+    return PAL_ERR_OK;
+}
+
+/* ---- what it reaches ---- */
+
+static double weight_at(const pal_brush *b, const double middle[3], const double x[3])
+{
+    pal_stroke stroke = {.radius_m = b->radius_m, .soft = b->soft};
+    pal_copy3(stroke.at_m, middle);
+    return pal_stroke_weight(&stroke, x);
+}
+
+/* the nearest place of the handle to x, as t = 0..1 */
+static double along(const pal_brush *b, const double x[3], double at[3])
+{
+    double way[3], off[3];
+    pal_sub3(way, b->to_m, b->at_m);
+    pal_sub3(off, x, b->at_m);
+    double t = fmin(1, fmax(0, pal_dot3(off, way) / pal_dot3(way, way)));
+    pal_copy3(at, b->at_m);
+    pal_axpy3(at, t, way);
+    return t;
+}
+
+static const double *corner_at(const pal_body *body, const double *x, int t, int c)
+{
+    return x + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]];
+}
+
+/* weight of triangle or shown vertex i, and what a node of a handle needs */
+static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
+{
+    double at[3] = {0, 0, 0};
+    if (b->kind == PAL_BRUSH_INFLATE) {
+        for (int c = 0; c < 3; c++) pal_axpy3(at, 1.0 / 3, corner_at(body, body->node_rest, i, c));
+        return weight_at(b, b->at_m, at);
+    }
+    const double *x = body->node_rest + 3 * (size_t)body->shown_node[i];
+    *t = along(b, x, at);
+    return weight_at(b, at, x);
+}
+
+/* arrays of a slot for what the brush reaches; weights of a handle sum up to 1 */
+static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_note *note)
+{
+    const bool curve = b->kind == PAL_BRUSH_CURVE;
+    const int n = curve ? body->n_shown : body->surface->n_tri;
+    double t = 0, sum = 0, most = 0;
+    for (int i = 0; i < n; i++) s->n += reach(body, b, i, &t) > 0;
+    if (s->n == 0)
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: nothing of body \"%s\" is within radius_m %g of it",
+                            body->name, b->radius_m);
+    s->item = PAL_NEW(s->arena, int32_t, s->n);
+    s->weight = PAL_NEW(s->arena, double, s->n);
+    s->begin = PAL_NEW(s->arena, double, curve ? 3 * (size_t)s->n : 1);
+    s->bow = PAL_NEW(s->arena, double, curve ? s->n : 1);
+    if (!s->item || !s->weight || !s->begin || !s->bow) return PAL_ERR_MEMORY;
+    for (int i = 0, k = 0; i < n; i++) {
+        double w = reach(body, b, i, &t);
+        if (!(w > 0)) continue;
+        s->weight[k] = w, sum += w, most = fmax(most, w);
+        s->item[k] = curve ? body->shown_node[i] : i;
+        if (curve) pal_copy3(s->begin + 3 * (size_t)k, body->d + 3 * (size_t)s->item[k]), s->bow[k] = 4 * t * (1 - t);
+        k++;
+    }
+    if (!curve) return PAL_ERR_OK;
+    for (int k = 0; k < s->n; k++) s->weight[k] /= sum;
+    double limit = body->load_cap_N / body->h_m * sum / most;
+    if (b->stiffness_N_m > limit)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes", b->stiffness_N_m,
+                            body->name, limit, s->n);
+    return PAL_ERR_OK;
+}
+
+/* ---- set and end ---- */
+
+static void goal(const pal_brush *b, double out[3])
+{
+    pal_set3(out, b->pressure_Pa, 0, 0);
+    if (b->kind == PAL_BRUSH_CURVE) pal_copy3(out, b->lift_m);
+}
+
+static bool goes_on(const slot *s, const pal_brush *b)
+{
+    if (!s->arena || s->ending || s->brush.kind != b->kind || !same3(s->brush.at_m, b->at_m)) return false;
+    if (s->brush.radius_m != b->radius_m || s->brush.soft != b->soft) return false;
+    return b->kind == PAL_BRUSH_INFLATE ||
+           (same3(s->brush.to_m, b->to_m) && s->brush.stiffness_N_m == b->stiffness_N_m);
+}
+
+pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, void **self)
+{
+    if (body->shell || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
+                            body->shell  ? "its surface adapts"
+                            : body->skin ? "it is shown by a skin; take output \"surface_out\""
+                                         : "it shows nothing");
+    brush_row *row = PAL_NEW(arena, brush_row, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    row->body = body;
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pal_brush *b, pal_note *note)
+{
+    slot *s = &((brush_row *)self)->slot[slot_index], fresh = {.brush = *b};
+    PAL_TRY(pal_brush_check(b, note));
+    if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->size_m))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
+                            pal_norm3(b->lift_m), body->name, 10 * body->size_m);
+    if (goes_on(s, b)) {
+        s->brush = *b;
+        s->n_left = RAMP;
+        return PAL_ERR_OK;
+    }
+    fresh.arena = pal_arena_create(4096, true);
+    pal_err err = fresh.arena ? fill(body, b, &fresh, note) : PAL_ERR_MEMORY;
+    if (err) {
+        pal_arena_destroy(fresh.arena);
+        return err == PAL_ERR_MEMORY ? pal_note_set(note, err, "no memory for a brush on body \"%s\"", body->name)
+                                     : err;
+    }
+    goal(b, fresh.now);
+    pal_arena_destroy(s->arena);
+    *s = fresh;
+    return PAL_ERR_OK;
+}
+
+void pal_brush_end(void *self, int slot_index)
+{
+    ((brush_row *)self)->slot[slot_index].ending = true;
+}
+
+static bool acts(const slot *s)
+{
+    return s->arena && !(s->ending && s->n_in == 0);
+}
+
+bool pal_brush_gone(const void *self)
+{
+    const brush_row *row = self;
+    bool any = false;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) any = any || acts(&row->slot[i]);
+    return !any;
+}
+
+size_t pal_brush_bytes(const void *self)
+{
+    const brush_row *row = self;
+    size_t n_byte = 0;
+    for (int i = 0; i < PAL_TOOL_MAX; i++)
+        if (row->slot[i].arena) n_byte += pal_arena_used(row->slot[i].arena);
+    return n_byte;
+}
+
+static void destroy(void *self)
+{
+    brush_row *row = self;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) pal_arena_destroy(row->slot[i].arena);
+}
+
+/* ---- a step ---- */
+
+/* once a step */
+static void advance(slot *s)
+{
+    double to[3], rest[3];
+    s->n_in = s->ending ? s->n_in - (s->n_in > 0) : s->n_in + (s->n_in < RAMP);
+    if (s->n_left == 0) return;
+    goal(&s->brush, to);
+    pal_sub3(rest, to, s->now);
+    pal_axpy3(s->now, 1.0 / s->n_left, rest);
+    if (--s->n_left == 0) pal_copy3(s->now, to);
+}
+
+static double share(const slot *s)
+{
+    return (double)s->n_in / RAMP;
+}
+
+static void inflate(const slot *s, const pal_body *body, double *load)
+{
+    for (int k = 0; k < s->n; k++) {
+        const int t = s->item[k];
+        const double *a = corner_at(body, body->d, t, 0);
+        double p[3], q[3], n[3], force = share(s) * s->now[0] * s->weight[k] / 6;
+        pal_sub3(p, corner_at(body, body->d, t, 1), a);
+        pal_sub3(q, corner_at(body, body->d, t, 2), a);
+        pal_cross3(n, p, q);
+        for (int c = 0; c < 3; c++)
+            pal_axpy3(load + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]], force, n);
+    }
+}
+
+/* from a node of the handle to where it is pulled */
+static void pull(const slot *s, const pal_body *body, int k, double out[3])
+{
+    pal_sub3(out, s->begin + 3 * (size_t)k, body->d + 3 * (size_t)s->item[k]);
+    pal_axpy3(out, s->bow[k], s->now);
+}
+
+static double spring(const slot *s, int k)
+{
+    return share(s) * s->brush.stiffness_N_m * s->weight[k];
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    brush_row *row = self;
+    pal_body *body = step->body;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) {
+        slot *s = &row->slot[i];
+        if (!acts(s)) continue;
+        if (step->sub == 0) advance(s);
+        if (s->brush.kind == PAL_BRUSH_INFLATE) inflate(s, body, body->load);
+        for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++) {
+            double off[3];
+            pull(s, body, k, off);
+            pal_axpy3(body->load + 3 * (size_t)s->item[k], spring(s, k), off);
+        }
+    }
+    return PAL_ERR_OK;
+}
+
+/* of handles alone */
+static double energy(void *self, const pal_body *body)
+{
+    const brush_row *row = self;
+    double sum = 0;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) {
+        const slot *s = &row->slot[i];
+        for (int k = 0; k < s->n && acts(s) && s->brush.kind == PAL_BRUSH_CURVE; k++) {
+            double off[3];
+            pull(s, body, k, off);
+            sum += 0.5 * spring(s, k) * pal_dot3(off, off);
+        }
+    }
+    return sum;
+}
+
+/* an edge opposite to corner c couples its ends by p w |way from c to its middle| / 6, as in row inflate; what has come
+ * in at the end of the step that follows */
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    const brush_row *row = self;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) {
+        const slot *s = &row->slot[i];
+        if (!acts(s)) continue;
+        const double soon = fmin(1, share(s) + 1.0 / RAMP);
+        for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
+            bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
+        const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
+        for (int k = 0; k < 3 * s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
+            const int32_t *tri = body->surface->tri + 3 * (size_t)s->item[k / 3];
+            const int32_t a = body->shown_node[tri[(k + 1) % 3]], b = body->shown_node[tri[(k + 2) % 3]];
+            double middle[3];
+            pal_add3(middle, body->d + 3 * (size_t)a, body->d + 3 * (size_t)b);
+            pal_scale3(middle, 0.5, middle);
+            double bound = p * s->weight[k / 3] * pal_dist3(corner_at(body, body->d, s->item[k / 3], k % 3), middle);
+            bound_N_m[a] += bound, bound_N_m[b] += bound;
+        }
+    }
+}
+
+static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+{
+    const brush_row *row = self;
+    (void)body, (void)c;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) {
+        const slot *s = &row->slot[i];
+        if (!acts(s) || s->brush.kind != PAL_BRUSH_CURVE) continue;
+        for (int n = 0; n < s->n; n++) {
+            const size_t at = 3 * (size_t)s->item[n];
+            pal_axpy3(out + at, k * spring(s, n), p + at);
+        }
+    }
+}
+
+/* the body is back at rest: no hand is on it */
+static void reset(void *self, const pal_body *body)
+{
+    brush_row *row = self;
+    (void)body;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].n_in = 0;
+}
+
+static const pal_tangent tangent = {.multiply = multiply};
+
+const pal_effect pal_effect_brush = {.name = "brush",
+                                     .stage = PAL_STAGE_CONTACT,
+                                     .run = run,
+                                     .energy = energy,
+                                     .stiffness = stiffness,
+                                     .reset = reset,
+                                     .tangent = &tangent,
+                                     .destroy = destroy};
