@@ -108,6 +108,7 @@ if [ -z "$fast" ]; then
     step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
     step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
+    step "a solid is sculpted in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
     # all but what is left out below

@@ -164,6 +164,20 @@ static void corner_at(const float *x, int32_t vertex, double out[3])
     for (int c = 0; c < 3; c++) out[c] = (double)x[3 * (size_t)vertex + (size_t)c];
 }
 
+/* of a body's frame in the scene's */
+static void body_origin(const pal_scene *scene, int body, double out[3])
+{
+    pal_sub3(out, scene->body[body].mesh->surface.origin_m, scene->body[0].mesh->surface.origin_m);
+}
+
+/* how far a body's origin lies along a direction of any length but 0, m */
+static double frame_offset(const pal_hub_room *room, int body, const double direction[3])
+{
+    double origin[3], length = pal_norm3(direction);
+    body_origin(pal_session_scene(room->session), body, origin);
+    return length > 0 ? pal_dot3(origin, direction) / length : 0;
+}
+
 /* the surface as it is shown nearest to a place, if that is within a tenth of the scene's box; false: nothing there */
 static bool point_at(const pal_hub_room *room, int body, const double at[3], pick *out)
 {
@@ -183,14 +197,13 @@ static bool point_at(const pal_hub_room *room, int body, const double at[3], pic
     }
     if (found < 0 || !(sqrt(best) <= 0.1 * side)) return false;
     const pal_scene *scene = pal_session_scene(room->session);
+    double r[3];
     for (int k = 0; k < 3; k++) {
-        double r[3];
         corner_at(shown.rest_m, shown.tri[3 * found + k], r);
         pal_axpy3(rest, w[k], r);
     }
-    /* scene frame to body frame */
-    for (int c = 0; c < 3; c++)
-        rest[c] -= scene->body[body].mesh->surface.origin_m[c] - scene->body[0].mesh->surface.origin_m[c];
+    body_origin(scene, body, r);
+    pal_axpy3(rest, -1, r);
     out->face = shown.face[found];
     pal_copy3(out->rest_m, rest);
     return true;
@@ -256,7 +269,7 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_ord
         to->kind = PAL_SCULPT_CUT;
         to->cut = v->name[0] == 'c';
         pal_set3(to->cut_normal, arg(order, "nx", 0), arg(order, "ny", 0), arg(order, "nz", 0));
-        to->cut_m = arg(order, "offset_m", 0);
+        to->cut_m = arg(order, "offset_m", 0) - frame_offset(c->room, body, to->cut_normal);
     }
     if (!strcmp(v->name, "keep")) {
         to->kind = PAL_SCULPT_KEEP;

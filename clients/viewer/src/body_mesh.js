@@ -98,6 +98,7 @@ export class BodyMesh {
     /** @type {{low: number, high: number} | null} of the values shown */
     this.values = null;
     this.valuesAt = 0;
+    this.epoch = 0; // of its asset
     this.shown = false; // a frame has been taken: normals are there
     this.geometry = new THREE.BufferGeometry();
     this.position = new THREE.BufferAttribute(rest.slice(), 3).setUsage(THREE.DynamicDrawUsage);
@@ -258,6 +259,18 @@ export class BodyMesh {
     if (!this.values || this.uniforms.blend.value >= 1) return false;
     this.uniforms.blend.value = Math.min(1, (now - this.valuesAt) / BLEND_MS);
     return true;
+  }
+
+  /** before its first frame a body is not looked at @param {boolean} on */
+  appear(on) {
+    this.mesh.visible = on;
+    if (this.lines && !on) this.lines.visible = false;
+  }
+
+  /** what is drawn, to be written to a file @returns {import("./exporters.js").Piece} */
+  piece() {
+    const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
+    return { positions: this.position.array, triangles: index.array.subarray(0, this.nCorner) };
   }
 
   /** lines of the triangles over the body @param {boolean} on */

@@ -216,7 +216,7 @@ export class Link {
       this.tries = 0;
       const n = asset.rest.length / 3, shown = shownOf(asset.triangles, n);
       this.parts.set(index, { decoder: new FrameDecoder(asset), table: asset.triangles, shown, patched: false, epoch: info.epoch, n, spare: [] });
-      this.around.post({ type: "part", part: index, rest: asset.rest.slice(), ...shown });
+      this.around.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
       this.laterMessages(index);
     } catch (error) {
       if (generation === this.generation && this.wanted.get(index) === info.epoch) this.socket?.close(4900, reason(error));

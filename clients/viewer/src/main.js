@@ -1,9 +1,11 @@
 // The page: joins the worker's messages to stage, tools and panel. The socket lives in the worker; what it sends is kept
 // here and applied once per drawn picture.
 import { BodyMesh } from "./body_mesh.js";
+import { WRITERS } from "./exporters.js";
 import { keyMap } from "./keys.js";
 import { FIELDS, labels, missing, offered, rangeOf } from "./legend.js";
 import { PlanPanel } from "./plan_panel.js";
+import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { ToolInput } from "./tool_input.js";
 import { sameTools, ToolMarks } from "./tool_marks.js";
@@ -21,12 +23,15 @@ let told = 0;
 const stage = makeStage();
 const marks = new ToolMarks(stage, byId("labels"));
 const panel = new PlanPanel(document);
+const sculpt = new SculptPanel(document, ({ verb, args }) => worker.postMessage({ type: "control", message: { type: "command", verb, target: "", args } }), save);
 const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
 
 const state = {
   /** @type {any} */ hello: null,
   /** @type {any} */ status: null,
   /** @type {Map<number, BodyMesh>} */ bodies: new Map(),
+  /** @type {Map<number, BodyMesh>} bodies of another topology, until their first frame */ coming: new Map(),
+  /** @type {BodyMesh[]} whose place was taken, until the next picture: what they share with the renderer is kept */ going: [],
   /** @type {Map<number, {positions: Float32Array, normals: Float32Array, shown: import("./patch_decoder.js").Shown | null}>} newest undrawn frame of
    * each part, with the triangles that came since the last drawn one */ frames: new Map(),
   /** @type {import("./wire.js").Tool[]} */ tools: [],
@@ -61,6 +66,7 @@ const input = new ToolInput(
     sendPose(true);
   },
 );
+input.onClick = (/** @type {number[]} */ at) => sculpt.click(at);
 input.touchedOnce = () => byId("hint").classList.add("gone");
 
 /**
@@ -126,10 +132,28 @@ function keepParts(n) {
   for (const [part, body] of state.bodies) {
     if (part < n) continue;
     body.dispose();
+    state.coming.get(part)?.dispose();
     state.bodies.delete(part);
+    state.coming.delete(part);
     state.frames.delete(part);
   }
   stage.dirty = true;
+}
+
+/** what is shown, as a file of that ending @param {string} ending of WRITERS */
+function save(ending) {
+  const pieces = [...state.bodies.values()].map((body) => body.piece());
+  const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([WRITERS[ending](pieces)])), download: `${name}.${ending}` });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/** sculpting is offered when a part takes it */
+function offerSculpt() {
+  sculpt.offered = state.hello.parts.some((/** @type {any} */ part) => part.sculpts);
+  byId("mode-sculpt").hidden = !sculpt.offered;
+  if (!sculpt.offered && input.mode === "sculpt") setMode("pull");
 }
 
 function showTitle() {
@@ -223,12 +247,19 @@ const control = {
     keepParts(m.parts.length);
     state.rows = m.rows;
     panel.plan(m.rows);
+    sculpt.begin(m.box_min_m, m.box_max_m);
+    offerSculpt();
     offerFields();
     showTitle();
     showTool();
   },
   topology(m) {
+    state.hello.parts = m.parts;
     keepParts(m.parts.length);
+    offerSculpt();
+  },
+  answer(m) {
+    sculpt.answer(m);
   },
   status(m) {
     state.status = m;
@@ -255,6 +286,7 @@ const control = {
   },
   error(m) {
     if (m.code === "tool_taken") return;
+    if (["refused", "args", "role", "busy", "target"].includes(m.code) && sculpt.refused(m.text)) return;
     if (m.code === "field" && state.field !== "none") chooseField("none");
     notice(m.text, TOLD_MS);
   },
@@ -276,13 +308,16 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
       control[data.message.type]?.(data.message);
       break;
     case "part": {
-      state.bodies.get(data.part)?.dispose();
-      const body = new BodyMesh(stage.scene, data.rest, data.triangles, data.visible);
-      body.wireframe(state.wires);
-      state.bodies.set(data.part, body);
+      // a body that is shown stays until the first frame of the new one
+      state.coming.get(data.part)?.dispose();
+      const body = new BodyMesh(stage.scene, data.rest, data.triangles, data.visible), waits = state.bodies.has(data.part);
       state.frames.delete(data.part); // of the body before
-      countVertices();
-      stage.dirty = true;
+      sculpt.grow(data.rest);
+      body.epoch = data.epoch;
+      body.appear(!waits);
+      state.coming.delete(data.part);
+      if (waits) state.coming.set(data.part, body);
+      else showBody(data.part, body);
       break;
     }
     case "frame": {
@@ -326,10 +361,29 @@ function countVertices() {
   state.here.vertices = [...state.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
 }
 
+/** in the place of the body before, if there was one @param {number} part @param {BodyMesh} body */
+function showBody(part, body) {
+  const before = state.bodies.get(part);
+  if (before) {
+    before.appear(false);
+    state.going.push(before);
+  }
+  body.appear(true);
+  body.wireframe(state.wires);
+  state.bodies.set(part, body);
+  countVertices();
+  stage.dirty = true;
+}
+
 /** the newest frames, where they differ from what is shown @returns {boolean} some do */
 function takeFrames() {
   let fresh = false;
   for (const [part, frame] of state.frames) {
+    const next = state.coming.get(part);
+    if (next) {
+      state.coming.delete(part);
+      showBody(part, next);
+    }
     const body = state.bodies.get(part);
     if (!body || body.rest.length !== frame.positions.length) continue;
     state.frames.delete(part);
@@ -359,6 +413,7 @@ function picture() {
     if (stage.dirty) {
       marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.myTool, 0.006 * stage.size);
       stage.draw();
+      for (const body of state.going.splice(0)) body.dispose();
       marks.placeLabels();
       showForce();
     }
@@ -370,10 +425,17 @@ function picture() {
   }
 }
 
-/** @param {"pull" | "press"} mode */
+/** what dragging may do now @returns {("pull" | "press" | "sculpt")[]} */
+const modes = () => (sculpt.offered ? ["pull", "press", "sculpt"] : ["pull", "press"]);
+
+/** @param {"pull" | "press" | "sculpt"} mode */
 function setMode(mode) {
+  if (!modes().includes(mode) && mode === "sculpt") return;
   input.mode = mode;
-  for (const name of ["pull", "press"]) {
+  input.letGo();
+  byId("sculpt").hidden = mode !== "sculpt";
+  byId("hint").classList.toggle("gone", mode === "sculpt" || byId("hint").classList.contains("gone"));
+  for (const name of ["pull", "press", "sculpt"]) {
     const button = byId("mode-" + name);
     button.setAttribute("aria-checked", String(mode === name));
     button.tabIndex = mode === name ? 0 : -1;
@@ -390,12 +452,14 @@ const togglePanel = () => {
 };
 byId("mode-pull").onclick = () => setMode("pull");
 byId("mode-press").onclick = () => setMode("press");
+byId("mode-sculpt").onclick = () => setMode("sculpt");
 // within a radio group the arrow keys choose
 byId("modes").addEventListener("keydown", (/** @type {KeyboardEvent} */ e) => {
   if (!e.key.startsWith("Arrow")) return;
   e.preventDefault();
   e.stopPropagation();
-  setMode(input.mode === "pull" ? "press" : "pull");
+  const all = modes(), step = e.key === "ArrowLeft" || e.key === "ArrowUp" ? all.length - 1 : 1;
+  setMode(all[(all.indexOf(input.mode) + step) % all.length]);
   byId("mode-" + input.mode).focus();
 });
 byId("pause").onclick = togglePause;
@@ -415,9 +479,9 @@ const toggleWires = () => {
   stage.dirty = true;
 };
 byId("mesh").onclick = toggleWires;
-const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
+const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), "3": () => setMode("sculpt"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
 window.addEventListener("keydown", (e) => {
-  const action = actionOf(e);
+  const action = sculpt.key(e) ? () => {} : actionOf(e);
   if (action) {
     e.preventDefault();
     action();

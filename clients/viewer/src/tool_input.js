@@ -6,6 +6,7 @@ import * as THREE from "./three.js";
  * @typedef {{position: number[], grab: boolean} | null} ToolWish
  */
 
+const CLICK_PX = 6; // a button that is let go farther away has turned the view
 const PRESS_S = 0.35; // time in which a press goes in
 
 export class ToolInput {
@@ -18,8 +19,12 @@ export class ToolInput {
     this.stage = stage;
     this.pick = pick;
     this.onTool = onTool;
-    /** @type {"pull" | "press"} */
+    /** @type {"pull" | "press" | "sculpt"} */
     this.mode = "pull";
+    /** @type {(at: number[]) => void} called with the place that is clicked while sculpting */
+    this.onClick = () => {};
+    /** @type {{id: number, at: number[], x: number, y: number} | null} where a press of the button began */
+    this.clicked = null;
     this.enabled = false;
     this.radius = 0.01;
     /** @type {Map<number, {x: number, y: number}>} */
@@ -47,6 +52,14 @@ export class ToolInput {
     this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
     if (this.pointers.size > 1) {
       this.letGo();
+      this.clicked = null;
+      return;
+    }
+    this.clicked = null;
+    if (this.mode === "sculpt") {
+      const at = e.button === 0 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
+      if (at) this.clicked = { id: e.pointerId, at: at.point.toArray(), x: e.clientX, y: e.clientY };
+      c.classList.add("busy");
       return;
     }
     const hit = this.enabled && e.button !== 1 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
@@ -66,7 +79,7 @@ export class ToolInput {
   move(e) {
     const last = this.pointers.get(e.pointerId);
     if (!last) {
-      if (e.pointerType === "mouse") this.stage.canvas.classList.toggle("over", this.enabled && this.hover(e));
+      if (e.pointerType === "mouse") this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
       return;
     }
     const dx = e.clientX - last.x, dy = e.clientY - last.y;
@@ -100,6 +113,11 @@ export class ToolInput {
   /** @param {PointerEvent} e */
   up(e) {
     this.pointers.delete(e.pointerId);
+    const clicked = this.clicked;
+    if (clicked?.id === e.pointerId) {
+      this.clicked = null;
+      if (e.type === "pointerup" && Math.hypot(e.clientX - clicked.x, e.clientY - clicked.y) < CLICK_PX) this.onClick(clicked.at);
+    }
     if (this.drag && this.drag.id === e.pointerId) this.letGo();
     if (this.pointers.size === 0) this.stage.canvas.classList.remove("busy");
   }
