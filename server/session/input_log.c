@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { VERSION = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
+enum { VERSION = 2, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -62,6 +62,8 @@ static int payload_of(pal_input_kind kind)
         return 88;
     case PAL_INPUT_MATERIAL:
         return 32;
+    case PAL_INPUT_BRUSH:
+        return 112;
     case PAL_INPUT_HASH:
         return 8;
     case PAL_INPUT_END:
@@ -131,6 +133,9 @@ static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
     for (int32_t i = 0; i < c->n_edge_use; i++) h = mix_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
     for (int32_t i = 0; i < c->n_edge; i++) h = mix_bytes(h, &c->edge[i].sharp, sizeof(float));
     for (int32_t i = 0; i < c->n_face; i++) h = mix_bytes(h, &c->face[i].sharp, sizeof(float));
+    /* what is cut away cannot be touched */
+    const double cut[4] = {def->cut_normal[0], def->cut_normal[1], def->cut_normal[2], def->cut_m};
+    if (def->cut) h = mix_bytes(h, cut, sizeof cut);
     for (int i = 0; i < def->n_stroke; i++) {
         const pal_stroke *s = &def->stroke[i];
         double number[7] = {s->at_m[0], s->at_m[1],      s->at_m[2],       s->radius_m,
@@ -268,6 +273,15 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
     } else if (record->kind == PAL_INPUT_MATERIAL) {
         const pal_material *m = &record->material;
         put_f(&at, (double[4]){m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s}, 4);
+    } else if (record->kind == PAL_INPUT_BRUSH) {
+        const pal_brush *b = &record->brush;
+        put_u(&at, (uint64_t)record->slot, 4);
+        put_u(&at, (uint64_t)b->kind, 4);
+        put_f(&at, b->at_m, 3);
+        put_f(&at, b->to_m, 3);
+        put_f(&at, (double[3]){b->radius_m, b->soft, b->pressure_Pa}, 3);
+        put_f(&at, b->lift_m, 3);
+        put_f(&at, &b->stiffness_N_m, 1);
     } else if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
         put_u(&at, record->hash, 8);
         if (record->kind == PAL_INPUT_END) put_u(&at, record->n_dropped, 8);
@@ -320,9 +334,9 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
     if (n_byte < PAL_INPUT_HEADER)
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in its header", name, n_byte);
     uint64_t version = get_u(&from, 4);
-    if (version != VERSION)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d", name,
-                            (unsigned long long)version, VERSION);
+    if (version < OLDEST || version > VERSION)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d to %d", name,
+                            (unsigned long long)version, OLDEST, VERSION);
     pal_input_header header = {.hash_steps = (uint32_t)get_u(&from, 4)};
     get_f(&from, &header.step_s, 1);
     header.fingerprint = get_u(&from, 8);
@@ -362,6 +376,20 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
         double number[4];
         get_f(&from, number, 4);
         record.material = (pal_material){number[0], number[1], number[2], number[3]};
+    } else if (record.kind == PAL_INPUT_BRUSH) {
+        pal_brush *b = &record.brush;
+        uint32_t slot = (uint32_t)get_u(&from, 4), kind = (uint32_t)get_u(&from, 4);
+        if (slot >= PAL_TOOL_MAX || kind >= PAL_BRUSH_COUNT)
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: there is no brush of kind %u on tool %u", name,
+                                *at, kind, slot);
+        record.slot = (int)slot, b->kind = (pal_brush_kind)kind;
+        get_f(&from, b->at_m, 3);
+        get_f(&from, b->to_m, 3);
+        get_f(&from, &b->radius_m, 1);
+        get_f(&from, &b->soft, 1);
+        get_f(&from, &b->pressure_Pa, 1);
+        get_f(&from, b->lift_m, 3);
+        get_f(&from, &b->stiffness_N_m, 1);
     } else if (record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END) {
         record.hash = get_u(&from, 8);
         if (record.kind == PAL_INPUT_END) record.n_dropped = get_u(&from, 8);

@@ -1,14 +1,16 @@
 /* The input log's bytes (private to this room): writer and reader of the records that replay.h speaks of.
  *
- * Little-endian. Header 40 bytes: "palinlog", u32 version 1, u32 hash interval in steps, f64 step_s, u64 fingerprint of
- * the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or body), u16 payload bytes, u32 zero, u64
- * steps taken since open, payload. A record takes effect before the next step. The last record is END; a file without
- * it is cut.
+ * Little-endian. Header 40 bytes: "palinlog", u32 version 2 (1 has no BRUSH), u32 hash interval in steps, f64 step_s,
+ * u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or body), u16 payload
+ * bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the next step. The last record is
+ * END; a file without it is cut.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
  *   LET_GO    tool    0
  *   RESET     0       0
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
+ *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, soft, pressure_Pa, lift_m[3],
+ *                        stiffness_N_m (version 2)
  *   HASH      0       8  u64 world hash, at least every `hash interval` steps
  *   END       0      16  u64 world hash, u64 records that were dropped (0: the log is whole)
  *
@@ -16,12 +18,13 @@
  * writes it out. What does not fit is dropped and counted, and the log says that it is not whole. */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
+#include "server/sim/brush.h"
 #include "server/sim/def.h"
 
 enum {
     PAL_INPUT_HEADER = 40,
     PAL_INPUT_HEAD = 16,
-    PAL_INPUT_PAYLOAD = 88,
+    PAL_INPUT_PAYLOAD = 112,
     PAL_INPUT_HASH_STEPS = 60,
     PAL_INPUT_HASH_MOST = 3600
 };
@@ -32,7 +35,8 @@ typedef enum pal_input_kind {
     PAL_INPUT_RESET,
     PAL_INPUT_MATERIAL,
     PAL_INPUT_HASH,
-    PAL_INPUT_END
+    PAL_INPUT_END,
+    PAL_INPUT_BRUSH
 } pal_input_kind;
 
 typedef struct pal_input_record {
@@ -42,6 +46,8 @@ typedef struct pal_input_record {
     pal_pose pose;
     pal_material material;
     uint64_t hash, n_dropped;
+    int slot; /* BRUSH: tool */
+    pal_brush brush;
 } pal_input_record;
 
 /* a number for everything of a scene that decides the simulation: steps, meshes, materials, entries; not its texts */

@@ -28,7 +28,8 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
         if (record.kind == PAL_INPUT_HASH) hash_step = step;
         bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_LET_GO;
         if ((tool && record.index >= (int)header->n_tool) ||
-            (record.kind == PAL_INPUT_MATERIAL && record.index >= (int)header->n_body))
+            ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH) &&
+             record.index >= (int)header->n_body))
             return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
                                 tool ? "tool" : "body", record.index);
         if (record.kind != PAL_INPUT_END) continue;
@@ -58,6 +59,9 @@ static pal_err apply(pal_world *world, const pal_input_record *record, pal_repla
     case PAL_INPUT_MATERIAL:
         report->n_command++;
         return pal_world_material(world, record->index, &record->material, note);
+    case PAL_INPUT_BRUSH:
+        report->n_command++;
+        return pal_world_brush(world, record->index, record->slot, &record->brush, note);
     case PAL_INPUT_HASH:
     case PAL_INPUT_END:
         hash = pal_world_hash(world);
@@ -83,6 +87,7 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const 
         PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, note));
         for (; report->n_tick < record.step; report->n_tick++) {
             pal_err err = pal_world_step(world, scene->step_s);
+            pal_world_tidy(world);
             if (err && err != PAL_ERR_FROZEN)
                 return pal_note_set(note, err, "%s: step %llu: %s", name, (unsigned long long)report->n_tick,
                                     pal_err_text(err));

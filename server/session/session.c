@@ -36,7 +36,7 @@ typedef struct tool_place {
     /* the rest is the simulation thread's */
     pal_pose pose;
     uint64_t arrived_ns;
-    bool present;
+    bool present, brushes; /* brushes: a brush began since it was let go */
 } tool_place;
 
 /* a moment and the steps taken until then */
@@ -164,9 +164,9 @@ static bool take_poses(pal_session *s, uint64_t now)
             place->present = true;
             record.kind = PAL_INPUT_POSE;
             record.pose = slot->pose;
-        } else if (place->present && (slot || gone)) {
+        } else if ((place->present && (slot || gone)) || (place->brushes && slot && !slot->present)) {
             pal_world_pose(s->world, t, NULL);
-            place->present = false;
+            place->present = place->brushes = false;
             record.kind = PAL_INPUT_LET_GO;
         } else {
             continue;
@@ -192,6 +192,23 @@ static void look(pal_session *s, const pal_command *command)
     }
 }
 
+static void brush(pal_session *s, const pal_command *command)
+{
+    pal_note note = {""};
+    if (pal_world_brush(s->world, command->body, command->slot, &command->brush, &note)) {
+        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+    } else {
+        s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
+        pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_BRUSH,
+                                                      .index = command->body,
+                                                      .step = s->step,
+                                                      .slot = command->slot,
+                                                      .brush = command->brush});
+        note.text[0] = 0;
+    }
+    say(s, &note);
+}
+
 static void obey(pal_session *s, const pal_command *command)
 {
     pal_note note = {""};
@@ -208,7 +225,7 @@ static void obey(pal_session *s, const pal_command *command)
     case PAL_COMMAND_RESET:
         pal_world_reset(s->world);
         say(s, &note);
-        for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = false;
+        for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
         pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
         break;
     case PAL_COMMAND_MATERIAL:
@@ -225,6 +242,9 @@ static void obey(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_FIELD:
         look(s, command);
+        break;
+    case PAL_COMMAND_BRUSH:
+        brush(s, command);
         break;
     case PAL_COMMAND_COUNT:
         break;
@@ -246,6 +266,7 @@ static void step(pal_session *s)
     if (s->n_marks == 0) mark_pace(s, pal_clock_ns());
     uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(s->world, s->scene->step_s);
+    pal_world_tidy(s->world);
     s->work_ns = pal_clock_thread_ns() - before;
     s->end_ns = pal_clock_ns();
     s->step++;
@@ -510,6 +531,11 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
         (command->body < 0 || command->body >= s->scene->n_body || !material_ok(&command->material)))
         return refuse(s);
     if (command->kind == PAL_COMMAND_FIELD && !pal_session_gives(s, command->body, command->field)) return refuse(s);
+    if (command->kind == PAL_COMMAND_BRUSH &&
+        (command->body < 0 || command->body >= s->scene->n_body || command->slot < 0 ||
+         command->slot >= s->scene->n_tool ||
+         (command->brush.kind != PAL_BRUSH_NONE && pal_brush_check(&command->brush, NULL))))
+        return refuse(s);
     return pal_ring_put(s->command, command);
 }
 

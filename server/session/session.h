@@ -8,8 +8,8 @@
  * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
  * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback; a lock guards only
  * the sentence of pal_session_last_note. No heap or file call after open until close, but when somebody begins or ends
- * to look at a field: then its row and its place in frames come and go, between two steps. Fields are no input: they
- * are not in the input log and change no hash. */
+ * to look at a field, or a brush begins or has gone out: then its row (and a field's place in frames) comes and goes,
+ * between two steps. Fields are no input: they are not in the input log and change no hash. Brushes are. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/sim/effect.h"
@@ -24,6 +24,8 @@ typedef enum pal_command_kind {
     PAL_COMMAND_RESET,
     PAL_COMMAND_MATERIAL, /* body, material        */
     PAL_COMMAND_FIELD,    /* body, field, wanted: one more or one less who looks; the row is there while anybody does */
+    PAL_COMMAND_BRUSH,    /* body, slot, brush: what the hand of tool `slot` does (world.h); letting the tool go or its
+                             lease ends it, a reset or a session that follows as well */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 
@@ -33,6 +35,8 @@ typedef struct pal_command {
     pal_material material;
     pal_field field;
     bool wanted;
+    int slot;
+    pal_brush brush;
 } pal_command;
 
 typedef struct pal_session_options {
@@ -72,12 +76,13 @@ bool pal_session_gives(const pal_session *session, int body, pal_field field); /
 /* newest pose of a tool; latest wins, never waits; NULL lets go. REFUSED: not finite, out of reach, no such tool.
  * One thread at a time per tool. [net] */
 pal_err pal_session_put_pose(pal_session *session, int tool, const pal_pose *pose);
-/* taken between two steps. FULL when 64 are waiting; REFUSED for an unknown kind, body, material or field. [any] */
+/* taken between two steps. FULL when 64 are waiting; REFUSED for an unknown kind, body, material, field,
+ * tool or brush. What only the world can tell (nothing within a brush's reach) is in pal_session_last_note. [any] */
 pal_err pal_session_command(pal_session *session, const pal_command *command);
 /* newest unseen frame or NULL; valid until the next call. One reader. [net] */
 const pal_frame *pal_session_take_frame(pal_session *session);
 /* did the thread tick in the last second (or is it paused)? for /healthz [any] */
 bool pal_session_alive(const pal_session *session);
-/* last thing that went wrong in a command (a refused material), "" when nothing; copies. [any] */
+/* last thing that went wrong in a command (a refused material or brush), "" when nothing; copies. [any] */
 void pal_session_last_note(pal_session *session, pal_note *out);
 #endif

@@ -6,6 +6,7 @@
 #include "tests/check.h"
 #include "tests/session/small_scene.h"
 
+#include <stddef.h>
 #include <sys/stat.h>
 
 static pal_scene scene;
@@ -22,9 +23,18 @@ static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
     return n;
 }
 
-/* a few hundred steps with presses, a grab, a material edit, a reset and a tool that falls silent */
+/* a few hundred steps with presses, a grab, a material edit, a reset, a tool that falls silent, brushes: one of a tool
+ * that is let go without ever having been there, one of the tool that falls silent, one that ends by itself */
 static bool record(void)
 {
+    const pal_brush blow = {.kind = PAL_BRUSH_INFLATE, .at_m = {0, 0, 0.05}, .radius_m = 0.03, .pressure_Pa = 400};
+    const pal_brush lift = {.kind = PAL_BRUSH_CURVE,
+                            .at_m = {-0.02, 0, 0.045},
+                            .to_m = {0.02, 0, 0.045},
+                            .radius_m = 0.02,
+                            .soft = 0.5,
+                            .lift_m = {0, 0, 0.005},
+                            .stiffness_N_m = 20};
     pal_session *s;
     pal_note note = {""};
     pal_session_options options = {.record_path = path, .lease_s = 0.1};
@@ -46,7 +56,12 @@ static bool record(void)
         if (seq == 40)
             pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_MATERIAL, .material = {3000, 0.4, 900, 2}});
         if (seq == 70) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET}), tick = 0;
-        if (seq < 80) tick = 0;
+        if (seq == 82) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = blow});
+        if (seq == 90) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 0, .brush = lift});
+        if (seq == 96) pal_session_put_pose(s, 1, NULL);
+        if (seq == 130) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift});
+        if (seq == 140) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1});
+        if (seq < 150) tick = 0;
     }
     pal_session_close(s);
     return true;
@@ -63,7 +78,7 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     if (err) CHECK_FAIL("%s", note.text);
     CHECK(report.n_tick > 200);
     CHECK(report.n_pose > 10);
-    CHECK_INT(report.n_command, 2);
+    CHECK_INT(report.n_command, 6);
     CHECK(report.n_hash > 3);
     CHECK_INT(report.n_hash_equal, report.n_hash);
     CHECK(report.first_difference == UINT64_MAX);
@@ -92,9 +107,9 @@ static void changed_poses_and_materials_are_found_at_the_next_hash(void)
     const struct {
         pal_input_kind kind;
         size_t byte;
-    } what[] = {{PAL_INPUT_POSE, 2 * 8 + 6}, {PAL_INPUT_MATERIAL, 0}};
+    } what[] = {{PAL_INPUT_POSE, 2 * 8 + 6}, {PAL_INPUT_MATERIAL, 0}, {PAL_INPUT_BRUSH, 8 + 8 * 8 + 6}};
     REQUIRE(n_whole > 0);
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 3; k++) {
         pal_replay_report report;
         pal_note note = {""};
         memcpy(bytes, whole, n_whole);
@@ -137,7 +152,7 @@ static void broken_logs_are_refused_with_one_sentence(void)
         uint8_t value;
         const char *part;
     } fault[] = {{0, 'x', "not an input log"},
-                 {8, 2, "version 2"},
+                 {8, 3, "version 3"},
                  {13, 0xff, "steps between hashes"},
                  {24, (uint8_t)(whole[24] ^ 1), "another scene"},
                  {PAL_INPUT_HEADER, 77, "no record of kind 77"},
@@ -216,6 +231,11 @@ static void records_survive_the_round_trip_bit_by_bit(void)
         {.kind = PAL_INPUT_LET_GO, .step = 1ull << 40},
         {.kind = PAL_INPUT_RESET, .step = 1ull << 41},
         {.kind = PAL_INPUT_MATERIAL, .step = 1ull << 41, .material = {1234.5, 0.3, 999, 0.25}},
+        {.kind = PAL_INPUT_BRUSH,
+         .index = 3,
+         .step = 1ull << 42,
+         .slot = 5,
+         .brush = {PAL_BRUSH_CURVE, {1, 2, 3}, {4, 5, -0.0}, 0.1, 0.5, -7e200, {1e-300, 8, 9}, 10}},
         {.kind = PAL_INPUT_HASH, .step = 1ull << 63, .hash = 0xfedcba9876543210u}};
     const int n_in = sizeof in / sizeof in[0];
     for (int k = 0; k < n_in; k++) pal_input_log_put(log, &in[k]);
@@ -232,6 +252,8 @@ static void records_survive_the_round_trip_bit_by_bit(void)
         CHECK(out.index == in[k].index && out.step == in[k].step && out.hash == in[k].hash);
         CHECK(!memcmp(&out.pose, &in[k].pose, sizeof out.pose));
         CHECK(!memcmp(&out.material, &in[k].material, sizeof out.material));
+        CHECK(out.slot == in[k].slot && out.brush.kind == in[k].brush.kind);
+        CHECK(!memcmp(out.brush.at_m, in[k].brush.at_m, sizeof(pal_brush) - offsetof(pal_brush, at_m)));
     }
     REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &note));
     CHECK(out.kind == PAL_INPUT_END && out.hash == 42 && out.n_dropped == 0 && at == n);
@@ -242,6 +264,8 @@ int main(void)
     int file = mkstemp(path);
     if (file < 0 || !small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     close(file);
+    /* bodies with a skin have no brushes */
+    pal_item_init(&scene.body[0].output, "output", "surface_out");
     RUN(a_recorded_session_gives_the_same_hashes_again);
     RUN(changed_poses_and_materials_are_found_at_the_next_hash);
     RUN(every_cut_is_refused_with_its_byte);
