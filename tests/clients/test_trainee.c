@@ -2,6 +2,7 @@
 #include "clients/link/asset_store.h"
 #include "clients/link/client_flags.h"
 #include "clients/link/link.h"
+#include "clients/trainee/orders.h"
 #include "clients/trainee/samples.h"
 #include "clients/trainee/script.h"
 #include "tests/check.h"
@@ -209,6 +210,78 @@ static void touched_point_is_the_outermost_along_up(void)
     CHECK(!pal_asset_furthest(&asset, up, point));
 }
 
+static bool orders_of(const char *text, pal_orders *out, pal_note *note)
+{
+    char path[] = "/tmp/palpate_orders_XXXXXX";
+    int fd = mkstemp(path);
+    FILE *file = fd < 0 ? NULL : fdopen(fd, "w");
+    CHECK(file && fputs(text, file) >= 0 && fclose(file) == 0);
+    pal_err err = pal_orders_load(out, path, note);
+    unlink(path);
+    return !err;
+}
+
+static void orders_are_read_or_refused_with_their_line(void)
+{
+    static const struct {
+        const char *text, *word;
+    } bad[] = {{"", "has no order"},
+               {"# nothing\n\n", "has no order"},
+               {"0 undo\nsoon redo\n", ":2: wants"},
+               {"-1 undo\n", ":1: wants"},
+               {"nan undo\n", ":1: wants"},
+               {"1\n", ":1: has no verb"},
+               {"1 undo\n0.5 redo\n", ":2: time 0.5 s is before"},
+               {"1 cut nx=\n", "\"nx=\" is no number"},
+               {"1 cut nx=1e999\n", "\"nx=1e999\" is no number"},
+               {"1 cut =3\n", "is not key=value"},
+               {"1 delete at=none\n", "is no side"},
+               {"1 x a=1 b=1 c=1 d=1 e=1 f=1 g=1 h=1 i=1 j=1 k=1 l=1 m=1 n=1 o=1 p=1 q=1\n", "one number too many"},
+               {"1 cut nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn=1\n", "too long a name"}};
+    pal_orders orders;
+    pal_note note = {""};
+    REQUIRE(
+        orders_of("# all\n 0.5 undo # back\n? 1 extrude at=top distance_m=0.02 target=liver\n1 bridge at=left at2=back",
+                  &orders, &note));
+    CHECK_INT(orders.n_line, 3);
+    CHECK_TEXT(orders.line[0].order.verb, "undo");
+    CHECK(!orders.line[0].may_fail && orders.line[1].may_fail);
+    CHECK_INT(orders.line[1].number, 3);
+    CHECK_TEXT(orders.line[1].order.target, "liver");
+    CHECK(orders.line[1].at[0] == PAL_SIDE_TOP && orders.line[2].at[1] == PAL_SIDE_BACK);
+    CHECK_INT(orders.line[1].order.n_arg, 1);
+    CHECK_NEAR(orders.line[1].order.arg[0].value, 0.02, 0);
+    pal_orders_free(&orders);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        CHECK(!orders_of(bad[i].text, &orders, &note));
+        CHECK(strstr(note.text, bad[i].word) != NULL);
+        CHECK(orders.line == NULL);
+    }
+    CHECK_INT(pal_orders_load(&orders, "/nowhere/orders", &note), PAL_ERR_IO);
+}
+
+/* corners and face centres of a cube of 2 m: a side's place is in the middle of its face */
+static void a_side_is_the_middle_of_what_lies_furthest(void)
+{
+    static const float x[][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1}, {-1, -1, 1},
+                                 {1, -1, 1},   {-1, 1, 1},  {1, 1, 1},   {0, 0, 1},  {0, 0, -1},
+                                 {0, -1, 0},   {0, 1, 0},   {-1, 0, 0},  {1, 0, 0}};
+    const pal_order_line line = {.at = {PAL_SIDE_TOP, PAL_SIDE_LEFT}, .order = {.verb = "bridge", .n_arg = 0}};
+    pal_wire_order order;
+    double at[3];
+    for (int side = PAL_SIDE_TOP; side < PAL_SIDE_COUNT; side++) {
+        REQUIRE(pal_side_point(x[0], sizeof x / sizeof *x, (pal_side)side, at));
+        const float *wanted = x[8 + side - PAL_SIDE_TOP];
+        for (int c = 0; c < 3; c++) CHECK_NEAR(at[c], (double)wanted[c], 0);
+    }
+    CHECK(!pal_side_point(x[0], 0, PAL_SIDE_TOP, at));
+    REQUIRE(pal_order_fill(&line, x[0], sizeof x / sizeof *x, &order));
+    CHECK_INT(order.n_arg, 6);
+    CHECK_TEXT(order.arg[3].key, "x2_m");
+    CHECK_NEAR(order.arg[2].value, 1, 0);
+    CHECK_NEAR(order.arg[3].value, -1, 0);
+}
+
 int main(void)
 {
     RUN(addresses_are_understood_or_refused_by_name);
@@ -219,5 +292,7 @@ int main(void)
     RUN(samples_give_percentiles_and_merge);
     RUN(touched_point_is_the_outermost_along_up);
     RUN(flags_are_taken_from_the_table_and_the_rest_refused);
+    RUN(orders_are_read_or_refused_with_their_line);
+    RUN(a_side_is_the_middle_of_what_lies_furthest);
     return check_report();
 }
