@@ -30,6 +30,13 @@ typedef struct place {
     pal_sculpt_turn *turn; /* whose scene the body's arrays are in; NULL: still the scene of the start */
 } place;
 
+/* the brush that a tool's holder asked for last */
+typedef struct hand {
+    int member, body;
+    double asked_m[6]; /* places as they came */
+    pal_brush brush;   /* kind NONE: none     */
+} hand;
+
 struct pal_hub_sculpt {
     pal_workshop *workshop;
     waiting list[MOST_WAITING]; /* oldest first; that under way is no longer in it */
@@ -37,6 +44,7 @@ struct pal_hub_sculpt {
     waiting now;                  /* under way */
     int body;                     /* of now    */
     place (*place)[PAL_BODY_MAX]; /* [n_room] */
+    hand (*hand)[PAL_TOOL_MAX];   /* [n_room] */
 };
 
 /* ---- what is meant ---- */
@@ -59,6 +67,9 @@ static const struct verb {
              {"undo", "", -1},
              {"redo", "", -1},
              {"probe", "x_m y_m z_m", -1},
+             {"inflate", "x_m y_m z_m radius_m pressure_Pa | soft", -1},
+             {"curve", "x_m y_m z_m x2_m y2_m z2_m radius_m stiffness_N_m dx_m dy_m dz_m | soft", -1},
+             {"release", "", -1},
              {NULL, NULL, -1}};
 
 static const struct verb *find_verb(const char *name)
@@ -351,6 +362,61 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
     free(def);
 }
 
+/* ---- brushes: at once, no edit of the solid ---- */
+
+/* places of a brush at rest. One whose places are those of the brush that the hand holds stays where that is, however
+ * far the surface has moved since; false: complained */
+static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, hand *h, pal_brush *to)
+{
+    static const char *const key[6] = {"x_m", "y_m", "z_m", "x2_m", "y2_m", "z2_m"};
+    bool same = h->brush.kind == to->kind && h->member == c->id && h->body == body;
+    double asked_m[6];
+    pick a, b = {.face = -1};
+    for (int k = 0; k < 6; k++) {
+        asked_m[k] = arg(order, key[k], 0);
+        same = same && asked_m[k] == h->asked_m[k];
+    }
+    if (same) {
+        pal_copy3(to->at_m, h->brush.at_m), pal_copy3(to->to_m, h->brush.to_m);
+    } else {
+        if (!pick_first(hub, c, body, order, false, &a)) return false;
+        if (to->kind == PAL_BRUSH_CURVE && !pick_first(hub, c, body, order, true, &b)) return false;
+        pal_copy3(to->at_m, a.rest_m);
+        if (b.face >= 0) pal_copy3(to->to_m, b.rest_m);
+    }
+    h->member = c->id, h->body = body;
+    memcpy(h->asked_m, asked_m, sizeof asked_m);
+    return true;
+}
+
+static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pal_wire_order *order)
+{
+    hand *h = &hub->sculpt->hand[c->room - hub->room][tool], next = *h;
+    pal_note note = {""};
+    pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = body, .slot = tool};
+    pal_brush *b = &command.brush;
+    const char *verb = order->verb;
+    b->kind = verb[0] == 'i' ? PAL_BRUSH_INFLATE : verb[0] == 'c' ? PAL_BRUSH_CURVE : PAL_BRUSH_NONE;
+    b->radius_m = arg(order, "radius_m", 0), b->soft = arg(order, "soft", 0.5);
+    b->pressure_Pa = arg(order, "pressure_Pa", 0), b->stiffness_N_m = arg(order, "stiffness_N_m", 0);
+    pal_set3(b->lift_m, arg(order, "dx_m", 0), arg(order, "dy_m", 0), arg(order, "dz_m", 0));
+    if (b->kind != PAL_BRUSH_NONE && !place_brush(hub, c, body, order, &next, b)) return;
+    /* one hand is on one body */
+    pal_command before = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = tool};
+    if (h->brush.kind != PAL_BRUSH_NONE && h->body != body) (void)pal_session_command(c->room->session, &before);
+    pal_err err = b->kind == PAL_BRUSH_NONE ? PAL_ERR_OK : pal_brush_check(b, &note);
+    if (!err) err = pal_session_command(c->room->session, &command);
+    if (err) {
+        pal_hub_complain(hub, c, "refused", "%s: %s", verb, note.text[0] ? note.text : pal_err_text(err));
+        return;
+    }
+    *h = next;
+    h->brush = *b;
+    pal_wire_answer *a = begin_answer(hub, verb);
+    snprintf(a->text, sizeof a->text, b->kind == PAL_BRUSH_NONE ? "%s: tool %d" : "%s: with tool %d", verb, tool);
+    pal_hub_say(hub, c, hub->control);
+}
+
 /* ---- one after the other ---- */
 
 /* assets that go are kept for a while: a client may be on its way to fetch one */
@@ -484,8 +550,9 @@ static bool make_sculpt(pal_hub *hub)
     if (hub->sculpt) return true;
     pal_hub_sculpt *s = calloc(1, sizeof *s);
     if (s) s->place = calloc((size_t)hub->n_room, sizeof *s->place);
-    if (!s || !s->place || pal_workshop_open(wake_loop, hub->loop, &s->workshop)) {
-        if (s) free(s->place);
+    if (s) s->hand = calloc((size_t)hub->n_room, sizeof *s->hand);
+    if (!s || !s->place || !s->hand || pal_workshop_open(wake_loop, hub->loop, &s->workshop)) {
+        if (s) free(s->place), free(s->hand);
         free(s);
         return false;
     }
@@ -512,6 +579,12 @@ bool pal_hub_sculpt_order(pal_hub *hub, pal_client *c, const pal_wire_order *ord
         pal_hub_complain(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
         return true;
     }
+    bool brush = !strcmp(v->name, "inflate") || !strcmp(v->name, "curve") || !strcmp(v->name, "release");
+    if (brush && m->tool < 0)
+        pal_hub_complain(hub, c, "tool", "%s: take a tool first, its hand does it", v->name);
+    else if (brush)
+        give_brush(hub, c, body, m->tool, order);
+    if (brush) return true;
     pal_hub_sculpt *s = hub->sculpt;
     if (s->n == MOST_WAITING) {
         pal_hub_complain(hub, c, "busy", "%s: %d commands wait already", v->name, MOST_WAITING);
@@ -540,6 +613,7 @@ void pal_hub_sculpt_end(pal_hub *hub)
         }
     }
     free(s->place);
+    free(s->hand);
     free(s);
     hub->sculpt = NULL;
 }

@@ -277,6 +277,62 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
     end();
 }
 
+/* the highest of what is shown */
+static double height(const mem_client *c)
+{
+    double most = -1;
+    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) most = fmax(most, (double)c->position_m[3 * i + 2]);
+    return most;
+}
+
+/* frames until the height is beyond a number, or below it */
+static bool until_height(mem_client *c, bool above, double wanted)
+{
+    for (int i = 0; i < 20000 && above != (height(c) > wanted); i++) turn(c, NULL);
+    return above == (height(c) > wanted);
+}
+
+static void hands_blow_up_and_pull_until_they_let_go(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    for (int i = 0; i < 400; i++) turn(&c, NULL);
+    const double rest = height(&c);
+    CHECK(order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":600"));
+    CHECK(until_height(&c, true, rest + 0.002));
+    CHECK_INT(part(&c)->epoch, 1); /* no edit */
+    CHECK(order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":-600"));
+    CHECK(until_height(&c, false, rest + 0.0005));
+    CHECK(order(&c, "release", ""));
+    CHECK(order(&c, "curve",
+                "\"x_m\":-0.04,\"y_m\":0,\"z_m\":0.05,\"x2_m\":0.04,\"y2_m\":0,\"z2_m\":0.05,\"radius_m\":0.02,"
+                "\"stiffness_N_m\":100,\"dx_m\":0,\"dy_m\":0,\"dz_m\":0.02"));
+    CHECK(until_height(&c, true, rest + 0.003));
+    /* who lets the tool go lets go */
+    mem_text(&c, "{\"type\":\"leave\"}");
+    CHECK(until_height(&c, false, rest + 0.001));
+    CHECK(!order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":600"));
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+
+    join(&c, "Bob", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    CHECK(!order(&c, "release", ""));
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool");
+    mem_text(&c, "{\"type\":\"take\",\"tool\":1}");
+    for (int i = 0; i < 20; i++) turn(&c, NULL);
+    CHECK(!order(&c, "inflate", TOP ",\"radius_m\":0,\"pressure_Pa\":600"));
+    CHECK_TEXT(trouble(&c), "inflate: brush: radius_m 0, wanted 1e-9 to 1e9");
+    CHECK(!order(&c, "inflate", FAR ",\"radius_m\":0.1,\"pressure_Pa\":600"));
+    CHECK(strstr(trouble(&c), "inflate: nothing of ") != NULL);
+    CHECK(!order(&c, "curve", TOP));
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "args");
+    CHECK(order(&c, "release", ""));
+    mem_end(&c);
+    end();
+}
+
 static void who_holds_no_tool_and_teaches_nobody_sculpts_nothing(void)
 {
     mem_client looks, bare, holds;
@@ -429,6 +485,7 @@ int main(void)
     RUN(paint_is_what_a_probe_finds);
     RUN(a_cut_shows_the_inside_and_goes_again);
     RUN(what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing);
+    RUN(hands_blow_up_and_pull_until_they_let_go);
     RUN(who_holds_no_tool_and_teaches_nobody_sculpts_nothing);
     RUN(sixteen_wait_and_the_next_one_is_told);
     RUN(everybody_is_told_and_who_comes_late_begins_at_the_new_asset);
