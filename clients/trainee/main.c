@@ -288,7 +288,7 @@ int main(int argc, char **argv)
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL,
-         "ask for displacement | von_mises | energy | stiffness, check it"},
+         "ask for displacement | von_mises | energy | stiffness | strain | distortion, check it"},
         {"--sculpt", "FILE", PAL_CLIENT_TEXT, &sculpt, 0, 0, NULL,
          "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
         {"--slow", "BYTES_S", PAL_CLIENT_NUMBER, &slow, 1, 1e9, NULL, "read no faster than this"},
@@ -323,7 +323,9 @@ int main(int argc, char **argv)
         return 2;
     }
     if (field && (pal_wire_field_find(field) == PAL_WIRE_FIELD_COUNT || !strcmp(field, "none"))) {
-        fprintf(stderr, "palpate-trainee: --field wants displacement, von_mises, energy or stiffness, not \"%s\"\n",
+        fprintf(stderr,
+                "palpate-trainee: --field wants displacement, von_mises, energy, stiffness, strain or distortion, not "
+                "\"%s\"\n",
                 field);
         return 2;
     }

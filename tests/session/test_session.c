@@ -584,6 +584,73 @@ static void a_field_is_there_while_anybody_looks(void)
     pal_session_close(s);
 }
 
+static bool has_brush(const pal_frame *frame, uint64_t wanted)
+{
+    bool found = false;
+    for (int i = 0; i < frame->n_row; i++) found = found || !strcmp(frame->row_name[i], "brush");
+    return found == (wanted != 0);
+}
+
+/* a tool without poses keeps its brush; one that falls silent loses it with its lease; a reset ends all */
+static void a_brush_lasts_until_its_tool_is_let_go(void)
+{
+    static pal_scene bare;
+    watch *w = make_watch();
+    pal_session *s;
+    pal_note note = {""};
+    pal_command brush = {
+        .kind = PAL_COMMAND_BRUSH,
+        .brush = {.kind = PAL_BRUSH_INFLATE, .at_m = {0, 0, 0.05}, .radius_m = 0.04, .pressure_Pa = 200}};
+    bare = scene;
+    pal_item_init(&bare.body[0].output, "output", "surface_out");
+    REQUIRE(!pal_session_open(&bare, &(pal_session_options){.lease_s = 0.25, .wake = wake, .user = w}, &note, &s));
+    for (int way = 0; way < 3; way++) {
+        const pal_pose pose = pose_at(0.2, 0, 1);
+        const pal_frame *f = frame_where(s, w, has_brush, 0);
+        REQUIRE(f != NULL);
+        if (way == 1) CHECK_INT(pal_session_put_pose(s, 0, &pose), 0);
+        CHECK_INT(pal_session_command(s, &brush), 0);
+        f = frame_where(s, w, has_brush, 1);
+        REQUIRE(f != NULL);
+        const uint64_t began = f->tick;
+        if (way == 0) {
+            while (f && f->tick < began + 100) f = next_frame(s, w);
+            REQUIRE(f && has_brush(f, 1));
+            CHECK_INT(pal_session_put_pose(s, 0, NULL), 0);
+        }
+        if (way == 2) CHECK_INT(order(s, PAL_COMMAND_RESET), 0);
+        CHECK(frame_where(s, w, has_brush, 0) != NULL);
+    }
+    pal_session_close(s);
+}
+
+static void a_brush_that_cannot_be_is_refused_at_the_door_or_with_a_sentence(void)
+{
+    watch *w = make_watch();
+    pal_session *s = open_with((pal_session_options){0}, w);
+    REQUIRE(s != NULL);
+    const pal_command good = {.kind = PAL_COMMAND_BRUSH,
+                              .brush = {.kind = PAL_BRUSH_INFLATE, .radius_m = 1, .pressure_Pa = 1}};
+    pal_command bad = good;
+    bad.body = 1;
+    CHECK_INT(pal_session_command(s, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.slot = 2;
+    CHECK_INT(pal_session_command(s, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.slot = -1;
+    CHECK_INT(pal_session_command(s, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.brush.radius_m = NAN;
+    CHECK_INT(pal_session_command(s, &bad), PAL_ERR_REFUSED);
+    bad = good, bad.brush.kind = PAL_BRUSH_COUNT;
+    CHECK_INT(pal_session_command(s, &bad), PAL_ERR_REFUSED);
+    CHECK_INT(pal_session_command(s, &good), 0);
+    const pal_frame *f = next_frame(s, w);
+    while (f && f->n_refused < 6) f = next_frame(s, w);
+    pal_note note;
+    pal_session_last_note(s, &note);
+    CHECK(strstr(note.text, "has no brushes: it is shown by a skin") != NULL);
+    pal_session_close(s);
+}
+
 /* readers of fields and those who ask for them are different threads, all while the world runs */
 static _Atomic bool enough;
 static void *look_in_and_out(void *user)
@@ -642,6 +709,8 @@ int main(void)
     RUN(another_session_goes_on_where_one_was);
     RUN(a_scene_that_cannot_run_opens_no_session);
     RUN(rows_and_parts_are_known_to_every_thread);
+    RUN(a_brush_lasts_until_its_tool_is_let_go);
+    RUN(a_brush_that_cannot_be_is_refused_at_the_door_or_with_a_sentence);
     RUN(a_field_is_there_while_anybody_looks);
     RUN(fields_come_and_go_under_a_reader);
     pal_prepared_free(&mesh);
