@@ -255,6 +255,7 @@ const control = {
   },
   topology(m) {
     state.hello.parts = m.parts;
+    sculpt.changed();
     keepParts(m.parts.length);
     offerSculpt();
   },

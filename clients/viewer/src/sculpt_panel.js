@@ -168,6 +168,12 @@ export class SculptPanel {
     else this.give(order);
   }
 
+  /** another topology came: whoever made it, there may be something to undo and redo, and what was clicked means another face */
+  changed() {
+    this.places = [];
+    this.button("sculpt-undo").disabled = this.button("sculpt-redo").disabled = false;
+  }
+
   /** @param {{verb: string, text: string, args: Record<string, number>}} answer */
   answer(answer) {
     this.done(said(answer));

@@ -214,6 +214,29 @@ test("a server whose asset cannot be read is asked again ever more slowly", asyn
   assert.deepEqual(pauses, [500, 1000, 2000, 4000]);
 });
 
+test("another topology: the old part goes on until the new asset is here, then frames of the old epoch are dropped", async () => {
+  const { s, part } = await joined();
+  s.giveAsset(load("asset.bin").buffer);
+  await turn();
+  await turn();
+  const old = load("frame_bend.bin"), fresh = load("frame_bend.bin"), view = new DataView(fresh.buffer, fresh.byteOffset);
+  const epoch = view.getUint32(8, true) + 1, frames = () => s.of("frame").filter((m) => m.part === part).length;
+  view.setUint32(8, epoch, true);
+  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/cd" })) });
+  s.sockets[0].say(old); // was on its way
+  assert.equal(frames(), 1);
+  s.sockets[0].say(fresh);
+  assert.equal(frames(), 1); // waits for its asset
+  s.giveAsset(load("asset.bin").buffer);
+  await turn();
+  await turn();
+  assert.deepEqual(s.of("part").filter((m) => m.part === part).map((m) => m.epoch), [epoch - 1, epoch]);
+  assert.equal(frames(), 2);
+  s.sockets[0].say(old);
+  assert.equal(frames(), 2);
+  assert.equal(s.sockets[0].closed, 0);
+});
+
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
   const { s, part } = await joined();
   const first = s.giveAsset, epoch = s.link.wanted.get(part);
