@@ -19,103 +19,100 @@ double pal_solid_jacobian(const double *x, const int32_t *node, int n_node, doub
     return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
 }
 
-/* calls back at every Gauss point of every element: place and volume of the point at rest */
-typedef bool on_point(void *user, pal_cell_kind kind, int element, int p, const double x[3], double volume);
+/* shape functions of a kind at the 64 points */
+typedef struct shapes {
+    double n[PAL_CELL_POINTS][PAL_CELL_NODES_MOST], g[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3];
+    double weight[PAL_CELL_POINTS];
+} shapes;
 
-static bool each_point(const pal_solid *s, on_point *on, void *user)
+static void find_shapes(pal_cell_kind kind, shapes *out)
 {
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        const int n_node = pal_cell_kind_nodes(kind);
-        double n[PAL_CELL_POINTS][PAL_CELL_NODES_MOST], g[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3];
-        double weight[PAL_CELL_POINTS];
-        for (int p = 0; p < PAL_CELL_POINTS; p++) {
-            double at[3];
-            weight[p] = pal_cell_point(p, at);
-            pal_cell_shape(n_node, at, n[p], g[p]);
-        }
-        for (int e = 0; e < s->elements.n[kind]; e++) {
-            const int32_t *node = pal_solid_nodes(s, kind, e);
-            for (int p = 0; p < PAL_CELL_POINTS; p++) {
-                double J[9], x[3] = {0, 0, 0};
-                double volume = weight[p] * pal_solid_jacobian(s->node_rest, node, n_node, g[p], J);
-                for (int m = 0; m < n_node; m++) pal_axpy3(x, n[p][m], s->node_rest + 3 * (size_t)node[m]);
-                if (!on(user, kind, e, p, x, volume)) return false;
-            }
-        }
+    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        double at[3];
+        out->weight[p] = pal_cell_point(p, at);
+        pal_cell_shape(pal_cell_kind_nodes(kind), at, out->n[p], out->g[p]);
     }
-    return true;
 }
 
 /* ---- samples ---- */
 
-typedef struct sampler {
-    pal_solid *solid;
-    const pal_body_def *def;
-} sampler;
-
-static bool take_sample(void *user, pal_cell_kind kind, int element, int p, const double x[3], double volume)
+static void put_sample(pal_solid_samples *to, size_t i, const pal_material *m)
 {
-    const sampler *s = user;
-    pal_solid_samples *to = &s->solid->samples[kind];
-    size_t i = (size_t)element * PAL_CELL_POINTS + (size_t)p;
-    pal_material m;
-    (void)volume;
-    pal_material_painted(s->def, x, &m);
-    to->young_Pa[i] = (float)m.young_Pa;
-    to->poisson[i] = (float)m.poisson;
-    to->density_kg_m3[i] = (float)m.density_kg_m3;
-    to->damping_1_s[i] = (float)m.damping_1_s;
-    return true;
+    to->young_Pa[i] = (float)m->young_Pa;
+    to->poisson[i] = (float)m->poisson;
+    to->density_kg_m3[i] = (float)m->density_kg_m3;
+    to->damping_1_s[i] = (float)m->damping_1_s;
+}
+
+/* the same everywhere, or by the place of every point */
+static void sample_kind(pal_solid *s, pal_cell_kind kind, const pal_body_def *def)
+{
+    const int n_node = pal_cell_kind_nodes(kind);
+    const bool varies = def->n_region > 0 || def->n_stroke > 0;
+    size_t i = 0;
+    shapes f;
+    find_shapes(kind, &f);
+    for (int e = 0; e < s->elements.n[kind]; e++) {
+        const int32_t *node = pal_solid_nodes(s, kind, e);
+        for (int p = 0; p < PAL_CELL_POINTS; p++, i++) {
+            double x[3] = {0, 0, 0};
+            pal_material m;
+            for (int k = 0; k < n_node && varies; k++) pal_axpy3(x, f.n[p][k], s->node_rest + 3 * (size_t)node[k]);
+            pal_material_painted(def, x, &m);
+            put_sample(&s->samples[kind], i, &m);
+        }
+    }
 }
 
 void pal_solid_sample(pal_solid *solid, const pal_body_def *def)
 {
-    sampler s = {solid, def};
     if (def != &solid->def) solid->def = *def;
-    each_point(solid, take_sample, &s);
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) sample_kind(solid, kind, def);
     solid->sampled++;
 }
 
 /* ---- measures ---- */
 
-typedef struct measure {
-    const pal_solid *solid;
-    double volume, mass;
-    int32_t folded; /* cell of an element that is folded over, -1: none */
-    double det;
-} measure;
-
-static bool take_measure(void *user, pal_cell_kind kind, int element, int p, const double x[3], double volume)
+/* volumes of all points; the cell of the first element that is folded over, -1: none. A pyramid has no volume in its
+ * apex, but at every point */
+static int32_t find_volumes(pal_solid *s, double *folded_m3)
 {
-    measure *m = user;
-    (void)x;
-    m->volume += volume;
-    m->mass += volume * (double)m->solid->samples[kind].density_kg_m3[(size_t)element * PAL_CELL_POINTS + (size_t)p];
-    return true;
-}
-
-/* a pyramid has no volume in its apex, but at every Gauss point */
-static bool find_fold(void *user, pal_cell_kind kind, int element, int p, const double x[3], double volume)
-{
-    measure *m = user;
-    (void)p, (void)x;
-    if (volume > 0) return true;
-    m->folded = m->solid->elements.cell[kind][element], m->det = volume;
-    return false;
+    shapes f;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        double *volume = s->samples[kind].volume_m3;
+        find_shapes(kind, &f);
+        for (int e = 0; e < s->elements.n[kind]; e++) {
+            const int32_t *node = pal_solid_nodes(s, kind, e);
+            for (int p = 0; p < PAL_CELL_POINTS; p++, volume++) {
+                double J[9];
+                *volume = f.weight[p] * pal_solid_jacobian(s->node_rest, node, pal_cell_kind_nodes(kind), f.g[p], J);
+                if (*volume > 0) continue;
+                *folded_m3 = *volume;
+                return s->elements.cell[kind][e];
+            }
+        }
+    }
+    return -1;
 }
 
 double pal_solid_volume_m3(const pal_solid *solid)
 {
-    measure m = {.solid = solid};
-    each_point(solid, take_measure, &m);
-    return m.volume;
+    double sum = 0;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (size_t i = 0; i < (size_t)solid->elements.n[kind] * PAL_CELL_POINTS; i++)
+            sum += solid->samples[kind].volume_m3[i];
+    return sum;
 }
 
 double pal_solid_mass_kg(const pal_solid *solid)
 {
-    measure m = {.solid = solid};
-    each_point(solid, take_measure, &m);
-    return m.mass;
+    double sum = 0;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_solid_samples *s = &solid->samples[kind];
+        for (size_t i = 0; i < (size_t)solid->elements.n[kind] * PAL_CELL_POINTS; i++)
+            sum += s->volume_m3[i] * (double)s->density_kg_m3[i];
+    }
+    return sum;
 }
 
 /* ---- making ---- */
@@ -129,7 +126,8 @@ static pal_err allocate(pal_solid *s)
                          &s->samples[kind].damping_1_s};
         for (int i = 0; i < 4; i++)
             if (!(*to[i] = calloc(n ? n : 1, sizeof(float)))) return PAL_ERR_MEMORY;
-        s->n_byte += 4 * n * sizeof(float);
+        if (!(s->samples[kind].volume_m3 = calloc(n ? n : 1, sizeof(double)))) return PAL_ERR_MEMORY;
+        s->n_byte += n * (4 * sizeof(float) + sizeof(double));
     }
     s->node_rest = malloc(3 * sizeof(double) * (size_t)s->rows.n_row);
     s->n_byte += 3 * sizeof(double) * (size_t)s->rows.n_row;
@@ -143,13 +141,13 @@ static pal_err make(const pal_body_def *def, const pal_subdivision_options *opti
     PAL_TRY(pal_cell_elements_rows(&s->elements, &s->subdivision.rows, &s->rows));
     PAL_TRY(allocate(s));
     pal_point_rows_place(&s->rows, def->cells->x, s->node_rest);
-    measure m = {.solid = s, .folded = -1};
-    each_point(s, find_fold, &m);
-    if (m.folded >= 0)
+    double folded_m3 = 0;
+    int32_t folded = find_volumes(s, &folded_m3);
+    if (folded >= 0)
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "body \"%s\": control cell %d: its part %d is folded over after %d levels (a point of it "
                             "has volume %g m^3)",
-                            def->name, s->subdivision.cell_origin[m.folded], m.folded, options->n_level, m.det);
+                            def->name, s->subdivision.cell_origin[folded], folded, options->n_level, folded_m3);
     pal_solid_sample(s, def);
     return PAL_ERR_OK;
 }
@@ -170,7 +168,7 @@ void pal_solid_free(pal_solid *solid)
     if (!solid) return;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         pal_solid_samples *s = &solid->samples[kind];
-        free(s->young_Pa), free(s->poisson), free(s->density_kg_m3), free(s->damping_1_s);
+        free(s->young_Pa), free(s->poisson), free(s->density_kg_m3), free(s->damping_1_s), free(s->volume_m3);
     }
     pal_subdivision_free(&solid->subdivision);
     pal_cell_elements_free(&solid->elements);

@@ -16,6 +16,7 @@
 typedef struct pal_solid_samples {
     float *young_Pa, *poisson, *density_kg_m3;
     float *damping_1_s; /* gamma of A eq. 3 over density; 0: none there */
+    double *volume_m3;  /* that the point stands for at rest: weight det J, above 0 */
 } pal_solid_samples;
 
 typedef struct pal_solid {

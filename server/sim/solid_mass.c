@@ -8,13 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* shape functions of the nodes of one kind of element at its Gauss points, [node][point], and what its Jacobian needs
- */
+/* shape functions of the nodes of one kind of element at its Gauss points, [node][point] */
 typedef struct kind_table {
     int n_node;
     double n[PAL_CELL_NODES_MOST][PAL_CELL_POINTS];
-    double g[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3];
-    double weight[PAL_CELL_POINTS];
 } kind_table;
 
 static void fill_table(kind_table *t, pal_cell_kind kind)
@@ -22,22 +19,21 @@ static void fill_table(kind_table *t, pal_cell_kind kind)
     t->n_node = pal_cell_kind_nodes(kind);
     for (int p = 0; p < PAL_CELL_POINTS; p++) {
         double at[3], n[PAL_CELL_NODES_MOST];
-        t->weight[p] = pal_cell_point(p, at);
-        pal_cell_shape(t->n_node, at, n, t->g[p]);
+        pal_cell_point(p, at);
+        pal_cell_shape(t->n_node, at, n, NULL);
         for (int m = 0; m < t->n_node; m++) t->n[m][p] = n[m];
     }
 }
 
 /* mass at the Gauss points of an element, kg, and damping there, kg/s */
-static void weigh(const pal_solid *solid, kind_table *t, pal_cell_kind kind, int element, double mass[PAL_CELL_POINTS],
+static void weigh(const pal_solid *solid, pal_cell_kind kind, int element, double mass[PAL_CELL_POINTS],
                   double damping[PAL_CELL_POINTS])
 {
-    const int32_t *node = pal_solid_nodes(solid, kind, element);
+    const pal_solid_samples *s = &solid->samples[kind];
     const size_t first = (size_t)element * PAL_CELL_POINTS;
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double J[9], volume = t->weight[p] * pal_solid_jacobian(solid->node_rest, node, t->n_node, t->g[p], J);
-        mass[p] = volume * (double)solid->samples[kind].density_kg_m3[first + (size_t)p];
-        damping[p] = mass[p] * (double)solid->samples[kind].damping_1_s[first + (size_t)p];
+    for (size_t p = 0; p < PAL_CELL_POINTS; p++) {
+        mass[p] = s->volume_m3[first + p] * (double)s->density_kg_m3[first + p];
+        damping[p] = mass[p] * (double)s->damping_1_s[first + p];
     }
 }
 
@@ -251,7 +247,7 @@ void pal_solid_mass_fill(const pal_solid *solid, pal_solid_mass *mass)
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             double at[PAL_CELL_POINTS], damping[PAL_CELL_POINTS];
             int n = find_shapes(solid, &table, kind, e, mass);
-            weigh(solid, &table, kind, e, at, damping);
+            weigh(solid, kind, e, at, damping);
             scale_shapes(mass, n, at, NULL);
             add_products(mass, n, mass->mass_kg);
             if (mass->damping_kg_s) {
@@ -289,7 +285,7 @@ void pal_solid_mass_lump(const pal_solid *solid, double *point_kg, double *node_
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             const int32_t *node = pal_solid_nodes(solid, kind, e);
             double at[PAL_CELL_POINTS], damping[PAL_CELL_POINTS];
-            weigh(solid, &table, kind, e, at, damping);
+            weigh(solid, kind, e, at, damping);
             for (int m = 0; m < table.n_node; m++) {
                 double kg = pal_sum_products(PAL_CELL_POINTS, table.n[m], at);
                 if (node_kg) node_kg[node[m]] += kg;
