@@ -217,23 +217,28 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
     return weight * det;
 }
 
-/* K_ab = int lambda g_a g_b' + mu (g_b g_a' + g_a.g_b I) dV of half a block */
-static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn, int block,
-                      int lane)
+/* K_ab = int mu (g_b g_a' + g_a.g_b I - 2/3 g_a g_b') dV + k_a k_b' / int kappa dV, k_a = int kappa g_a dV, kappa =
+ * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
+ * `mean`: K of A 3.2, int B' C B dV */
+static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn, bool mean,
+                      int block, int lane)
 {
     const int n_node = group->n_node, n_pair = pal_cell_pairs(n_node);
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
     float *to = group->k + (size_t)block * 9 * (size_t)n_pair * PAL_LANES + lane;
-    pal_wide k[28][9], g[8][3], mu, lambda;
+    pal_wide k[28][9], g[8][3], swell[8][3], mu, lambda, all = {0};
     for (int i = 0; i < 9 * n_pair; i++) k[i / 9][i % 9] = (pal_wide){0};
+    for (int i = 0; i < 3 * n_node; i++) swell[i / 3][i % 3] = (pal_wide){0};
     for (int p = 0; p < PAL_CELL_POINTS; p++) {
         double at[3], weight = pal_cell_point(p, at);
         pal_wide volume = rest_gradients(rest, n_node, dn[p], weight, g);
         lame_lanes(&solid->samples[kind], group, block, lane, p, &mu, &lambda);
-        mu *= volume, lambda *= volume;
+        mu *= volume;
+        pal_wide kappa = lambda * volume + mu * (2.0 / 3), outer = mean ? mu * (-2.0 / 3) : lambda * volume;
+        all += kappa;
         for (int a = 1, pair = 0; a < n_node; a++) {
             pal_wide m[3], la[3];
-            for (int i = 0; i < 3; i++) m[i] = mu * g[a][i], la[i] = lambda * g[a][i];
+            for (int i = 0; i < 3; i++) m[i] = mu * g[a][i], la[i] = outer * g[a][i], swell[a][i] += kappa * g[a][i];
             for (int b = 1; b <= a; b++, pair++) {
                 pal_wide dot = m[0] * g[b][0] + m[1] * g[b][1] + m[2] * g[b][2];
                 for (int i = 0; i < 3; i++)
@@ -242,18 +247,21 @@ static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
             }
         }
     }
+    for (int a = 1, pair = 0; a < n_node && mean; a++)
+        for (int b = 1; b <= a; b++, pair++)
+            for (int i = 0; i < 9; i++) k[pair][i] += swell[a][i / 3] * swell[b][i % 3] / all;
     for (int a = 1, pair = 0; a < n_node; pair += a++) /* the same bits on both sides of the diagonal */
         k[pair + a - 1][3] = k[pair + a - 1][1], k[pair + a - 1][6] = k[pair + a - 1][2],
                      k[pair + a - 1][7] = k[pair + a - 1][5];
     for (int i = 0; i < 9 * n_pair; i++) cell_store_float(to + (size_t)i * PAL_LANES, k[i / 9][i % 9]);
 }
 
-static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group)
+static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean)
 {
     point_gradients dn;
     trilinear_gradients(group->n_node, dn);
     for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, b, l);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, mean, b, l);
 }
 
 void pal_cells_elastic_refresh(pal_cells_elastic *c)
@@ -261,8 +269,9 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
     if (c->sampled == c->solid->sampled) return;
     c->sampled = c->solid->sampled;
     fill_cubic(c->solid, &c->group[PAL_CELL_CUBIC]);
-    fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX]);
-    fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID]);
+    const bool mean = c->op == PAL_CELL_POLAR;
+    fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean);
+    fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean);
 }
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)

@@ -2,8 +2,9 @@
  *
  * With Q the polar rotation of F at an element's middle, y = x - x_0 its nodes from one of them, X the same at rest:
  *     d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, by 64 Gauss points,
- * with gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. The force is the whole
- * gradient of E: with g = K d^, the turning of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE = t.w with
+ * with gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. Departure: of trilinear
+ * elements and pyramids under operator polar the change of volume in K is the element's mean (B-bar). The force is the
+ * whole gradient of E: with g = K d^, the turning of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE = t.w with
  * t = -sum (Q'y) x g, and (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF bears Q [z], z = (tr S I - S)^-1 t, at
  * the middle. E does not change when the body is turned, and so the forces have no net force and no net torque.
  * Near a flat or collapsed middle, where det(tr S I - S) is below 1e-3 of (tr)^3, z fades to 0 with it.

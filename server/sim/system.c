@@ -242,6 +242,8 @@ static void assemble_embedded(const pal_system *system, pal_blocks *to)
         }
         for (int c = 0; c < 3 && !m; c++)
             to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] += system->mass * body->mass_kg[i];
+        /* points may move so that no node does, as corners of one smooth cube by turns: there is no mass against it */
+        for (int c = 0; c < 3 && system->mass > 0; c++) to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] *= 1 + 1e-9;
     }
 }
 

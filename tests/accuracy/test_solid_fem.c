@@ -67,32 +67,32 @@ static void deflection_of_the_end_is_within_5_percent_of_model_fem(void)
             double off[2];
             for (int op = POLAR; op <= EDGES; op++)
                 off[op] = fabs(deflection_m(beam[k][0], beam[k][1], 0, load, op) / fem_m[0][load] - 1);
-            CHECK_LE(off[POLAR], 0.035);
+            CHECK_LE(off[POLAR], 0.03);
             CHECK_LE(off[EDGES], 0.04);
             CHECK_LE(off[POLAR], off[EDGES]);
         }
 }
 
-/* with two cells across and one level operator polar is within 5 %, edges is not: the angles of a hexahedron's corners
- * change where it bends, which R takes for shear of its nodes */
+/* with two cells across and one level operator polar is within 3 %, edges, which has K of the paper, 6 to 8 % off: the
+ * angles of a hexahedron's corners change where it bends, which R takes for shear of its nodes */
 static void few_elements_are_enough_for_operator_polar(void)
 {
     for (int load = SMALL; load <= LARGE; load++) {
         double off[2];
         for (int op = POLAR; op <= EDGES; op++) off[op] = fabs(deflection_m(2, 1, 0, load, op) / fem_m[0][load] - 1);
-        CHECK_LE(off[POLAR], 0.05);
+        CHECK_LE(off[POLAR], 0.03);
         CHECK_LE(off[EDGES], 0.09);
         CHECK_LE(off[POLAR], off[EDGES]);
     }
 }
 
-/* all points of an element are integrated: hardly compressible tissue is somewhat too stiff, as hex8 of model fem */
-static void nearly_incompressible_beams_are_stiffer(void)
+/* the ratio of the default tissue */
+static void nearly_incompressible_beams_are_within_4_percent(void)
 {
     for (int load = SMALL; load <= LARGE; load++) {
         double ratio = deflection_m(3, 1, 1, load, POLAR) / fem_m[1][load];
         CHECK_LE(ratio, 1);
-        CHECK_LE(1 - ratio, 0.07);
+        CHECK_LE(1 - ratio, 0.04);
     }
 }
 
@@ -101,11 +101,11 @@ static void order_of_convergence_is_two(void)
 {
     double end[4], off[3];
     for (int level = 0; level < 4; level++) end[level] = deflection_m(1, level, 0, SMALL, POLAR);
-    double first = log2((end[1] - end[0]) / (end[2] - end[1])), last = log2((end[2] - end[1]) / (end[3] - end[2]));
+    double levels = log2((end[2] - end[1]) / (end[3] - end[2]));
     for (int n = 1; n <= 3; n++) off[n - 1] = 1 - deflection_m(n, 1, 0, SMALL, POLAR) / printed_m[0][SMALL];
     double cells = log(off[0] / off[2]) / log(3);
-    printf("  order with levels %.2f, then %.2f; with cells %.2f\n", first, last, cells);
-    CHECK(first > 1.2 && last > 1.8 && last < 3);
+    printf("  order with levels %.2f, with cells %.2f\n", levels, cells);
+    CHECK(levels > 1.8 && levels < 3);
     CHECK_NEAR(cells, 2, 0.3);
 }
 
@@ -114,7 +114,7 @@ int main(void)
     RUN(model_fem_is_where_the_reference_is);
     RUN(deflection_of_the_end_is_within_5_percent_of_model_fem);
     RUN(few_elements_are_enough_for_operator_polar);
-    RUN(nearly_incompressible_beams_are_stiffer);
+    RUN(nearly_incompressible_beams_are_within_4_percent);
     RUN_LONG(order_of_convergence_is_two);
     return check_report();
 }

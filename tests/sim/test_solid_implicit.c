@@ -70,7 +70,7 @@ static pal_solve_report report_of(const tool_scene *s)
     return out;
 }
 
-/* without subdivision the elements are plain hexahedra, as those of model fem with full integration */
+/* without subdivision the elements are plain hexahedra, as those of model fem with mean dilatation */
 static void bends_as_the_same_elements_of_model_fem(void)
 {
     double end[2];
@@ -84,7 +84,7 @@ static void bends_as_the_same_elements_of_model_fem(void)
             pal_note note = {""};
             REQUIRE(!pal_hexes_find(&s.mesh.tets, &s.mesh.hexes, &note));
             pal_item_init(&s.scene->body[0].model, "model", "fem");
-            pal_item_put_text(&s.scene->body[0].model, "element", "hex8", NULL);
+            pal_item_put_text(&s.scene->body[0].model, "element", "hex8_bbar", NULL);
             s.scene->body[0].material.young_Pa = 1e4, s.scene->body[0].material.poisson = 0.3;
         } else
             REQUIRE(clay_scene(&s, &cells, (const int32_t[3]){8, 2, 2}, 0.01, 0, 0));

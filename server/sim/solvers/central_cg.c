@@ -19,7 +19,9 @@
  * have moved a fifth of a control cell against one another, but at most once in 12 sub-steps, and once in up to 96 as
  * long as that changes it by less than 2 %. Stiffness and damping that CONTACT rows say or want at nodes add their own
  * largest eigenvalues at the begin of every step. Held points' rows are dropped, led ones (held 2) keep their velocity
- * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3). Where the
+ * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3); where
+ * one would have moved farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three
+ * times and grow again by 2 % of what was halved a sub-step. Where the
  * world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
@@ -53,6 +55,7 @@ typedef struct central {
     double way_m;                 /* no point has moved farther against the others since it was taken */
     int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
+    double wild;                  /* divides the limit: 1, more after points were clamped */
     double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
     pal_step *step;               /* that asks for the limit                                  */
     const double *x;              /* the body's own                                                       */
@@ -62,6 +65,8 @@ typedef struct central {
 } central;
 
 static const double most_way = 0.2, most_move_S = 0.2;
+/* of wild, and what is left of it after a sub-step without clamps */
+static const double most_wild = 8, calm = 0.98;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
 enum { PAUSE = 12, MOST_PAUSE = 96 };
@@ -120,7 +125,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     central *row = PAL_NEW(build->arena, central, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->solid = body->solid, row->mass = body->solid_mass;
-    row->safety = safety, row->tolerance = tolerance;
+    row->safety = safety, row->tolerance = tolerance, row->wild = 1;
     row->cell_m = cbrt(pal_solid_volume_m3(body->solid) / build->def->cells->n_cell);
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
@@ -344,7 +349,7 @@ static double limit(void *self, pal_step *step)
     if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
     if (step->sub == 0) find_contact(row, step);
     const double lambda = row->rows2 + row->contact2, c = row->contact_1_s;
-    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda));
+    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->wild;
     return row->limit_s;
 }
 
@@ -415,6 +420,7 @@ static void find_change(central *row, const pal_step *step)
 static double move(central *row, pal_body *body, double dt)
 {
     const double most_m = most_move_S * body->size_m;
+    const uint64_t n_clamped = body->n_clamped;
     double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
@@ -433,6 +439,7 @@ static double move(central *row, pal_body *body, double dt)
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
         most2 = fmax(most2, pal_dot3(from, from));
     }
+    row->wild = body->n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
     return dt * sqrt(most2) + poison;
 }
 
@@ -454,6 +461,7 @@ static void reset(void *self, const pal_body *body)
     central *row = self;
     (void)body;
     row->dt_s = 0;
+    row->wild = 1;
     row->known = false;
 }
 
