@@ -4,7 +4,8 @@
 #define PAL_COMMANDS_SCENE_ARG_H
 #include "server/scene/scene_file.h"
 
-/* options are for cells, a surface or scan; NULL: defaults. is_surface out may be NULL; report (of a surface) may be NULL */
+/* options are for cells, a surface or scan; NULL: defaults. is_surface out may be NULL; report (of a surface) may be
+ * NULL */
 pal_err pal_scene_arg(const char *word, const pal_surface_scene *options, pal_loaded_scene **out, bool *is_surface,
                       pal_surface_scene_report *report, pal_note *note);
 #endif
