@@ -16,6 +16,7 @@
     X(hex_elastic)                                                                                                     \
     X(cell_elastic)                                                                                                    \
     X(moving_support)                                                                                                  \
+    X(penalty)                                                                                                         \
     X(edge_spring)                                                                                                     \
     X(shape_spring)                                                                                                    \
     X(inflate)                                                                                                         \
