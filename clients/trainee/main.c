@@ -102,6 +102,7 @@ static void main_told(void *user, const pal_order_told *told)
         if (told->frame_ms > 0)
             printf("; epoch %u, %u vertices, seen after %.0f ms, longest gap %.0f ms", told->epoch, told->n_vertex,
                    told->frame_ms, told->gap_ms);
+        if (told->moved_m > 0) printf("; moved %.1f mm", told->moved_m * 1e3);
         printf("\n");
         fflush(stdout);
         return;
@@ -114,6 +115,7 @@ static void main_told(void *user, const pal_order_told *told)
     cJSON_AddNumberToObject(o, "answer_ms", told->answer_ms);
     cJSON_AddNumberToObject(o, "frame_ms", told->frame_ms);
     cJSON_AddNumberToObject(o, "gap_ms", told->gap_ms);
+    cJSON_AddNumberToObject(o, "moved_mm", told->moved_m * 1e3);
     cJSON_AddNumberToObject(o, "epoch", told->epoch);
     cJSON_AddNumberToObject(o, "vertices", told->n_vertex);
     for (uint32_t i = 0; told->answer && i < told->answer->n_arg; i++)

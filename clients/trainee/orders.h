@@ -43,7 +43,8 @@ typedef struct pal_order_told {
     double answer_ms;              /* from sending to the answer  */
     double frame_ms;               /* to the first frame of another topology, 0: there is none */
     double gap_ms;                 /* longest time between two cycles meanwhile */
-    uint32_t epoch, n_vertex;      /* of the first part now       */
+    double moved_m;           /* most that a vertex of its body is now from its place in the topology's first frame */
+    uint32_t epoch, n_vertex; /* of the first part now       */
 } pal_order_told;
 
 pal_err pal_orders_load(pal_orders *orders, const char *path, pal_note *note); /* REFUSED names file and line; IO */

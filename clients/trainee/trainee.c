@@ -18,7 +18,8 @@ typedef struct trainee_part {
     float *now_m, *first_m; /* [n_vertex][3]; first: of the first frame   */
     bool adapts;
     pal_patch_table table; /* its triangles                         */
-    uint8_t *kept;         /* newest frame that came before its asset   */
+    char name[PAL_WIRE_NAME_BYTES];
+    uint8_t *kept; /* newest frame that came before its asset   */
     size_t n_kept;
 } trainee_part;
 
@@ -115,6 +116,20 @@ static void trainee_measure(pal_trainee *t, trainee_part *part)
     }
 }
 
+/* how far a vertex of an order's body, the first part when it names none, is at most from its first place */
+static double trainee_moved(const pal_trainee *t, const char *target)
+{
+    double moved = 0;
+    uint32_t p = 0;
+    while (p < t->n_part && target[0] && strcmp(t->part[p].name, target)) p++;
+    const trainee_part *part = &t->part[p];
+    for (uint32_t i = 0; p < t->n_part && part->seen && i < part->n_vertex; i++) {
+        const float *a = part->now_m + 3 * (size_t)i, *b = part->first_m + 3 * (size_t)i;
+        moved = fmax(moved, pal_dist3((const double[]){a[0], a[1], a[2]}, (const double[]){b[0], b[1], b[2]}));
+    }
+    return moved;
+}
+
 /* what came of the order under way, once it is answered and what it changed is seen */
 static void trainee_tell(pal_trainee *t)
 {
@@ -127,6 +142,7 @@ static void trainee_tell(pal_trainee *t)
                                  .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
                                  .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
                                  .gap_ms = t->gap_ms,
+                                 .moved_m = trainee_moved(t, line->order.target),
                                  .epoch = t->part[0].epoch,
                                  .n_vertex = t->part[0].n_vertex};
     t->asked = false;
@@ -309,7 +325,7 @@ static void trainee_field(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     if (!refusal && t->options.field && head.field != pal_wire_field_find(t->options.field)) refusal = PAL_REFUSAL_KIND;
     if (!refusal && head.epoch < t->part[head.part].epoch) return;
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
-    if (!refusal && head.low < 0) refusal = PAL_REFUSAL_RANGE;
+    if (!refusal && head.low < 0 && head.field < PAL_WIRE_FIELD_STRAIN) refusal = PAL_REFUSAL_RANGE;
     uint8_t *level = refusal ? NULL : malloc((size_t)t->part[head.part].n_vertex + 1);
     if (level) refusal = pal_field_get(bytes, n_byte, t->part[head.part].n_vertex, &head, level);
     free(level);
@@ -376,6 +392,7 @@ static void trainee_parts(pal_trainee *t, const pal_wire_part_info *info, uint32
     for (uint32_t i = 0; i < n_part; i++) {
         trainee_part *part = &t->part[i];
         t->error_m[i] = info[i].error_m;
+        snprintf(part->name, sizeof part->name, "%s", info[i].name);
         part->asset = pal_asset_store_want(t->store, info[i].asset);
         trainee_table(t, &info[i], i);
         if (part->now_m && part->epoch == info[i].epoch && part->n_vertex == info[i].n_vertex) continue;

@@ -1,0 +1,85 @@
+#!/bin/sh
+# Plays a demo: serves its scene on a free port, lets palpate-trainee give its orders, ends what it started.
+# usage: deploy/demos/run.sh NAME [--wait S] [--stay] [--json] [palpate serve options...]
+#   NAME     head, chair, paint, mass, nozzle or bridge; README.md tells what each shows
+#   --wait   seconds before it plays, to open the printed address
+#   --stay   serve on when it has been played, until Ctrl-C
+#   --json   what the trainees report, as JSON lines, each file's after its name
+# PALPATE_BIN names the folder of the programs (build/release/bin). Exit code 1 when an order was refused or a check failed.
+set -u
+here=$(cd "$(dirname "$0")" && pwd) || exit 1
+bin=${PALPATE_BIN:-$here/../../build/release/bin}
+unset PALPATE_BIN # the server takes PALPATE_* for its configuration
+usage() {
+    sed -n '2,8s/^# \{0,1\}//p' "$0"
+    exit "$1"
+}
+case ${1-} in
+-h | --help) usage 0 ;;
+head) cells=head flags="--script pull --up 0,-1,0 --depth 0.025 --seconds 6.5" ;;
+chair) cells=chair flags="--script $here/hover.script --seconds 9" ;;
+paint) cells=chair flags="--script $here/hover.script --seconds 8" ;;
+mass) cells=block flags="--script $here/hover.script --seconds 2" ;;
+nozzle) cells=nozzle flags="--script $here/hover.script --seconds 5 --field strain" ;;
+bridge) cells=bridge flags="--script $here/hover.script --seconds 6 --field displacement" ;;
+*) usage 2 >&2 ;;
+esac
+name=$1
+shift
+pause=0 stay='' json=''
+while :; do
+    case ${1-} in
+    --wait) pause=${2-} && shift 2 || usage 2 >&2 ;;
+    --stay) stay=yes && shift ;;
+    --json) json=--json && shift ;;
+    *) break ;;
+    esac
+done
+[ -x "$bin/palpate" ] || {
+    echo "palpate: no programs in $bin: run deploy/run.sh once, or name their folder in PALPATE_BIN" >&2
+    exit 1
+}
+work=$(mktemp -d) || exit 1
+pids=''
+cleanup() {
+    trap - EXIT INT TERM
+    for pid in $pids; do kill "$pid" 2>/dev/null; done
+    for pid in $pids; do wait "$pid" 2>/dev/null; done
+    rm -rf "$work"
+}
+trap cleanup EXIT
+trap 'exit 1' INT TERM
+
+# the cells are made now, the scene names them
+if [ $cells = block ]; then
+    "$bin/palpate" cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "$work/block.palcells" --quiet || exit 1
+else
+    "$bin/palpate" cells $cells -o "$work/$cells.palcells" --quiet || exit 1
+fi
+cp "$here/$name.json" "$work/" || exit 1
+"$bin/palpate" serve "$work/$name.json" --port 0 --json --quiet "$@" >"$work/serve" &
+server=$!
+pids=$server
+until port=$(sed -n 's/.*"port":\([0-9]*\).*/\1/p' "$work/serve") && [ -n "$port" ]; do
+    kill -0 $server 2>/dev/null || exit 1
+    sleep 0.1
+done
+echo "palpate: $name: http://127.0.0.1:$port/" >&2
+sleep "$pause"
+
+# one trainee, with a tool of its own, for each file of orders
+players='' code=0
+for orders in "$here/$name".orders "$here/$name"_*.orders; do
+    [ -e "$orders" ] || continue
+    file=$(basename "$orders" .orders)
+    "$bin/palpate-trainee" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.told" &
+    players="$players $!"
+    pids="$pids $!"
+done
+for player in $players; do wait "$player" || code=1; done
+for told in "$work"/*.told; do
+    echo "$(basename "$told" .told):"
+    cat "$told"
+done
+[ -z "$stay" ] || wait $server
+exit $code
