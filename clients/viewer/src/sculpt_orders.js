@@ -1,7 +1,8 @@
 // Orders of sculpting from what the panel is set to and where it was clicked; places of a cut; words for people. Pure.
 
 /**
- * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharp: number, sharpWhat: number}} Settings
+ * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharp: number, sharpWhat: number,
+ *            pressure_Pa: number, lift_m: number, stiffness_N_m: number, middle: number[]}} Settings
  * @typedef {{verb: string, args: Record<string, number>}} Order
  * @typedef {{low: number[], high: number[]}} Box
  */
@@ -15,8 +16,14 @@ export const TOOLS = Object.freeze({
   bridge: { title: "Bridge", places: 2, hints: ["Click the first of two faces that a cell joins.", "Now the other face."] },
   sharpen: { title: "Sharpen", places: 1, hints: ["Click near the edge, the vertex or the face."] },
   paint: { title: "Paint", places: 1, hints: ["Click where to paint."] },
+  inflate: { title: "Inflate", places: 1, hints: ["Click what to blow up."] },
+  deflate: { title: "Deflate", places: 1, hints: ["Click what to suck in."] },
+  curve: { title: "Curve", places: 2, hints: ["Click one end of a handle.", "Now the other end: its middle is pulled."] },
   probe: { title: "Probe", places: 1, hints: ["Click where to look up the material."] },
 });
+
+/** tools that are forces: they last until they are released, and follow their slider */
+export const FORCES = Object.freeze(["inflate", "deflate", "curve"]);
 
 /** @type {Record<string, {title: string, young_factor: number, density_factor: number}>} strokes of the brush: factors of stiffness and density */
 export const PAINTS = Object.freeze({
@@ -25,6 +32,18 @@ export const PAINTS = Object.freeze({
   heavier: { title: "Heavier", young_factor: 1, density_factor: 1.5 },
   lighter: { title: "Lighter", young_factor: 1, density_factor: 1 / 1.5 },
 });
+
+/**
+ * The way a handle's middle goes: away from the body's middle, across the handle; below 0: towards it.
+ * @param {number[]} a m @param {number[]} b m, its ends @param {number[]} middle m, of the body @param {number} lift_m
+ */
+export function liftOf(a, b, middle, lift_m) {
+  const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+  const along = b.map((v, i) => v - a[i]), out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
+  const share = dot(along, along) > 0 ? dot(out, along) / dot(along, along) : 0;
+  const across = out.map((v, i) => v - share * along[i]), length = Math.hypot(...across);
+  return length > 1e-9 ? across.map((v) => (lift_m * v) / length) : [0, 0, lift_m];
+}
 
 /**
  * The order of a tool at the places clicked, or null: it wants more of them.
@@ -43,7 +62,13 @@ export function orderOf(tool, settings, places) {
     const { young_factor, density_factor } = PAINTS[settings.paint];
     Object.assign(args, { radius_m: settings.radius_m, young_factor, density_factor });
   }
-  return { verb: tool, args };
+  if (FORCES.includes(tool)) args.radius_m = settings.radius_m;
+  if (tool === "inflate" || tool === "deflate") args.pressure_Pa = tool === "inflate" ? settings.pressure_Pa : -settings.pressure_Pa;
+  if (tool === "curve") {
+    args.stiffness_N_m = settings.stiffness_N_m;
+    [args.dx_m, args.dy_m, args.dz_m] = liftOf(places[0], places[1], settings.middle, settings.lift_m);
+  }
+  return { verb: tool === "deflate" ? "inflate" : tool, args };
 }
 
 /**

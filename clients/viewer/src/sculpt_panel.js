@@ -1,10 +1,12 @@
-// The panel of sculpting: which tool a click uses, its settings, undo, the cut, saving. One order is under way at a time.
-import { boxAround, cutOrder, orderOf, PAINTS, said, TOOLS } from "./sculpt_orders.js";
+// The panel of sculpting: which tool a click uses, its settings, forces that follow their slider until they are released,
+// undo, the cut, saving. One order is under way at a time.
+import { boxAround, cutOrder, FORCES, orderOf, PAINTS, said, TOOLS } from "./sculpt_orders.js";
 
 /** @typedef {import("./sculpt_orders.js").Order} Order */
 
 const WAIT_MS = 20000; // an answer that does not come is not waited for any longer
 const FINEST = 200; // steps of a slider
+const STIFFNESS_N_M = 60; // of the spring that pulls a handle
 
 export class SculptPanel {
   /**
@@ -27,6 +29,9 @@ export class SculptPanel {
     /** @type {import("./sculpt_orders.js").Box} */
     this.box = { low: [0, 0, 0], high: [0, 0, 0] };
     this.size = 0;
+    /** @type {{tool: string, places: number[][], settings: import("./sculpt_orders.js").Settings} | null} the force that acts */
+    this.force = null;
+    this.forceMoved = false; // its slider has moved since it was sent
     this.say = /** @type {HTMLElement} */ (page.getElementById("sculpt-say"));
     this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
     this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
@@ -34,6 +39,8 @@ export class SculptPanel {
     for (const verb of ["keep", "undo", "redo"]) this.button("sculpt-" + verb).onclick = () => this.give({ verb, args: {} });
     for (const ending of ["obj", "stl", "ply"]) this.button("sculpt-" + ending).onclick = () => save(ending);
     for (const id of ["distance", "radius", "sharp"]) this.range(id).oninput = () => this.showValues();
+    for (const id of ["pressure", "lift"]) this.range(id).oninput = () => this.moveForce();
+    this.button("sculpt-release").onclick = () => this.give({ verb: "release", args: {} });
     this.axis = /** @type {HTMLSelectElement} */ (page.getElementById("sculpt-axis"));
     this.axis.onchange = this.range("cut").oninput = () => this.cut();
     this.choose(this.tool);
@@ -92,7 +99,7 @@ export class SculptPanel {
     this.places = [];
     this.mark(this.tools, tool);
     for (const row of this.page.querySelectorAll("#sculpt [data-for]")) {
-      /** @type {HTMLElement} */ (row).hidden = /** @type {HTMLElement} */ (row).dataset.for !== tool;
+      /** @type {HTMLElement} */ (row).hidden = !/** @type {HTMLElement} */ (row).dataset.for?.split(" ").includes(tool);
     }
     this.hint();
   }
@@ -106,6 +113,7 @@ export class SculptPanel {
     this.box = { low, high };
     this.size = Math.hypot(...low.map((v, i) => high[i] - v));
     this.underWay = this.wantsCut = null;
+    this.act(null);
     this.busy();
     this.showValues();
   }
@@ -123,15 +131,19 @@ export class SculptPanel {
     return {
       distance_m: part("distance") * 0.5 * this.size, scale: 1, radius_m: part("radius") * 0.5 * this.size, paint,
       sharp: Math.round(part("sharp") * 10) / 2, sharpWhat: Number(what.value),
+      pressure_Pa: 10 ** (1 + 3 * part("pressure")), lift_m: part("lift") * 0.5 * this.size, stiffness_N_m: STIFFNESS_N_M,
+      middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
     };
   }
 
   showValues() {
-    const { distance_m, radius_m, sharp } = this.settings();
+    const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
     const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-distance-value")).textContent = mm(distance_m);
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-radius-value")).textContent = mm(radius_m);
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-sharp-value")).textContent = String(sharp);
+    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-pressure-value")).textContent = Math.round(pressure_Pa) + " Pa";
+    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-lift-value")).textContent = mm(lift_m);
   }
 
   /** a place of the surface was clicked @param {number[]} at m */
@@ -143,8 +155,33 @@ export class SculptPanel {
       this.hint();
       return;
     }
+    if (FORCES.includes(this.tool)) this.act({ tool: this.tool, places: this.places, settings: this.settings() });
     this.places = [];
     this.give(order);
+  }
+
+  /** the force that acts from now on, null: none @param {SculptPanel["force"]} force */
+  act(force) {
+    this.force = force;
+    this.forceMoved = false;
+    this.button("sculpt-release").disabled = !force;
+  }
+
+  /** its slider moves the force that acts: the same places again are the same brush */
+  moveForce() {
+    this.showValues();
+    if (!this.force) return;
+    const { pressure_Pa, lift_m } = this.settings();
+    Object.assign(this.force.settings, { pressure_Pa, lift_m });
+    this.forceMoved = true;
+    this.sendForce();
+  }
+
+  sendForce() {
+    if (!this.force || !this.forceMoved || this.waits()) return;
+    this.forceMoved = false;
+    const order = orderOf(this.force.tool, this.force.settings, this.force.places);
+    if (order) this.give(order);
   }
 
   /** is an order under way? */
@@ -155,6 +192,7 @@ export class SculptPanel {
   /** @param {Order} order */
   give(order) {
     if (this.waits()) return;
+    if (order.verb === "release") this.act(null);
     this.underWay = order;
     this.sentAt = performance.now();
     this.send(order);
@@ -171,6 +209,7 @@ export class SculptPanel {
   /** another topology came: whoever made it, there may be something to undo and redo, and what was clicked means another face */
   changed() {
     this.places = [];
+    this.act(null);
     this.button("sculpt-undo").disabled = this.button("sculpt-redo").disabled = false;
   }
 
@@ -185,6 +224,7 @@ export class SculptPanel {
   /** an error of the server: was it about the order under way? @param {string} text */
   refused(text) {
     if (!this.underWay) return false;
+    if (FORCES.includes(this.underWay.verb)) this.act(null);
     this.done(text);
     return true;
   }
@@ -197,6 +237,7 @@ export class SculptPanel {
     const cut = this.wantsCut;
     this.wantsCut = null;
     if (cut) this.give(cut);
+    else this.sendForce();
   }
 
   busy() {

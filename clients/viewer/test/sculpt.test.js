@@ -2,9 +2,12 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { joined, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
-import { boxAround, cutOrder, orderOf, PAINTS, said, TOOLS } from "../src/sculpt_orders.js";
+import { boxAround, cutOrder, FORCES, liftOf, orderOf, PAINTS, said, TOOLS } from "../src/sculpt_orders.js";
 
-const SET = { distance_m: 0.02, scale: 1, radius_m: 0.03, paint: "stiffer", sharp: 2.5, sharpWhat: 1 };
+const SET = {
+  distance_m: 0.02, scale: 1, radius_m: 0.03, paint: "stiffer", sharp: 2.5, sharpWhat: 1,
+  pressure_Pa: 200, lift_m: 0.05, stiffness_N_m: 60, middle: [0, 0, 0],
+};
 
 test("a click becomes an order with the place and what the tool is set to", () => {
   assert.deepEqual(orderOf("extrude", SET, [[1, 2, 3]]), { verb: "extrude", args: { x_m: 1, y_m: 2, z_m: 3, distance_m: 0.02, scale: 1 } });
@@ -19,6 +22,28 @@ test("what joins two faces waits for the second click", () => {
     assert.equal(TOOLS[tool].hints.length, 2);
     assert.deepEqual(orderOf(tool, SET, [[1, 2, 3], [4, 5, 6]]), { verb: tool, args: { x_m: 1, y_m: 2, z_m: 3, x2_m: 4, y2_m: 5, z2_m: 6 } });
   }
+});
+
+test("what sucks in is what blows up, with the other sign", () => {
+  const at = { x_m: 1, y_m: 2, z_m: 3, radius_m: 0.03 };
+  assert.deepEqual(orderOf("inflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: 200 } });
+  assert.deepEqual(orderOf("deflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: -200 } });
+});
+
+test("a handle wants two ends and goes outward across itself", () => {
+  assert.equal(orderOf("curve", SET, [[-1, 0, 2]]), null);
+  assert.deepEqual(orderOf("curve", SET, [[-1, 0, 2], [1, 0, 2]]), {
+    verb: "curve",
+    args: { x_m: -1, y_m: 0, z_m: 2, x2_m: 1, y2_m: 0, z2_m: 2, radius_m: 0.03, stiffness_N_m: 60, dx_m: 0, dy_m: 0, dz_m: 0.05 },
+  });
+  for (const lift of [0.05, -0.02]) {
+    const d = liftOf([1, 0, 2], [2, 3, 1], [0.2, 0.1, -0.4], lift);
+    assert.ok(Math.abs(Math.hypot(...d) - Math.abs(lift)) < 1e-12);
+    assert.ok(Math.abs(d[0] * 1 + d[1] * 3 + d[2] * -1) < 1e-12); // across the handle
+    assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward, or inward
+  }
+  assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any way will do
+  for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].places);
 });
 
 test("a stroke and its opposite leave the material as it was", () => {
