@@ -20,7 +20,7 @@ head) cells=head flags="--script pull --up 0,-1,0 --depth 0.025 --seconds 6.5" ;
 chair) cells=chair flags="--script $here/hover.script --seconds 9" ;;
 paint) cells=chair flags="--script $here/hover.script --seconds 8" ;;
 mass) cells=block flags="--script $here/hover.script --seconds 2" ;;
-nozzle) cells=nozzle flags="--script $here/hover.script --seconds 5 --field strain" ;;
+nozzle) cells=nozzle flags="--script $here/hover.script --seconds 6 --field strain" ;;
 bridge) cells=bridge flags="--script $here/hover.script --seconds 6 --field displacement" ;;
 *) usage 2 >&2 ;;
 esac
