@@ -340,8 +340,9 @@ static void close_all(serve_run *run)
 }
 
 static const char about[] =
-    "Runs every scene (.json), surface (.obj .stl .ply .off) or label volume (.nii .nii.gz .inr .inr.gz) as a\n"
-    "session that browsers, haptic bridges and headless clients share. Without any: an organ of our own.\n"
+    "Runs every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid of\n"
+    "control cells (.palcells) as a session that browsers, haptic bridges and headless clients share. Without any:\n"
+    "an organ of our own.\n"
     "Ends on SIGINT or SIGTERM.\n";
 
 int command_serve(int argc, char **argv)
@@ -356,7 +357,7 @@ int command_serve(int argc, char **argv)
         {"--resolution", "N", PAL_FLAG_COUNT, &resolution, 1, 1024,
          "voxels on the longest axis of a surface (about 13,000 tetrahedra)"},
     };
-    const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME]... [flags]",
+    const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof *flag,

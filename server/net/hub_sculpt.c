@@ -444,6 +444,7 @@ static bool take_over(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
     pal_stream_follow(work->stream, old_stream);
     pal_sculptor_accept(at->sculptor, work->turn);
     room->stream = work->stream, room->session = work->next;
+    memset(s->hand[room - hub->room], 0, sizeof *s->hand); /* brushes are over */
     keep_assets(room, old_stream);
     hub->session[room - hub->room] = NULL;
     room->own = true;

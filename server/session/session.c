@@ -462,6 +462,9 @@ pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_c
     hand_over(next, before);
     carry(user, next->world, before->world);
     pal_err err = start(next, note);
+    if (!err && before->log)
+        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
+                before->options.record_path, (unsigned long long)before->step);
     if (!err) return PAL_ERR_OK;
     atomic_store_explicit(&before->stop, false, memory_order_release);
     (void)start(before, NULL);

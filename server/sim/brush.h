@@ -34,8 +34,8 @@ extern const pal_effect pal_effect_brush;
 /* an empty one. REFUSED: the body has no brushes; MEMORY */
 pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, void **self);
 /* A slot's brush; one of the same kind at the same places goes on with its new numbers, another begins in its place.
- * REFUSED: a number, nothing of the body within reach, a handle stiffer than the body's nodes take; MEMORY. Nothing has
- * changed then */
+ * REFUSED: a number, nothing of the body within reach, a handle stiffer than the body's nodes take, a pressure above
+ * 10 E; MEMORY. Nothing has changed then */
 pal_err pal_brush_set(void *self, const pal_body *body, int slot, const pal_brush *brush, pal_note *note);
 void pal_brush_end(void *self, int slot); /* goes out from now on; nothing when there is none */
 bool pal_brush_gone(const void *self);    /* no brush acts any more */

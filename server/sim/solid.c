@@ -145,9 +145,9 @@ static pal_err make(const pal_body_def *def, const pal_subdivision_options *opti
     int32_t folded = find_volumes(s, &folded_m3);
     if (folded >= 0)
         return pal_note_set(note, PAL_ERR_REFUSED,
-                            "body \"%s\": control cell %d: its part %d is folded over after %d levels (a point of it "
-                            "has volume %g m^3)",
-                            def->name, s->subdivision.cell_origin[folded], folded, options->n_level, folded_m3);
+                            "control cell %d: its part %d is folded over after %d levels (a point of it has volume %g "
+                            "m^3)",
+                            s->subdivision.cell_origin[folded], folded, options->n_level, folded_m3);
     pal_solid_sample(s, def);
     return PAL_ERR_OK;
 }

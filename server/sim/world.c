@@ -281,6 +281,9 @@ void pal_world_follow(pal_world *world, const pal_world *before, int edited, con
     for (int b = 0; b < w->plan.n_body && b < before->plan.n_body; b++) {
         pal_body *body = &w->plan.body[b];
         const pal_body *from = &before->plan.body[b];
+        /* changed while this world was made */
+        if (memcmp(&w->material[b], &before->material[b], sizeof w->material[b]) != 0)
+            (void)pal_world_material(w, b, &before->material[b], NULL);
         size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
         const double *to_x = b == edited ? x : from->x, *to_v = b == edited ? v : from->v;
         bool known = b == edited || (body->n_dof == from->n_dof && !body->shell);

@@ -74,10 +74,11 @@ pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *b
  * the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
 void pal_world_tidy(pal_world *world);
 
-/* A world made from an edited scene goes on where another is: its time, tools and poses, and x and v of all bodies that
- * have as many points (bodies that adapt begin at rest). x, v [n_dof][3] are the state of body `edited` in their place
- * (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are over. Both stand
- * still. [sim] */
+/* A world made from an edited scene goes on where another is: its time, tools and poses, materials as they are by now
+ * (but one that the edited body is too stiff or too light for), and x and v of all bodies that have as many points
+ * (bodies that adapt begin at rest). x, v [n_dof][3] are the state of body `edited` in their place (v NULL: at rest;
+ * edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are over. Both stand still. Heap memory
+ * when a material has changed. [sim] */
 void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */

@@ -124,6 +124,45 @@ static void a_body_goes_on_where_it_was_with_a_cell_more(void)
     studio_close(&s);
 }
 
+static void a_material_set_while_an_edit_is_made_is_kept(void)
+{
+    studio s;
+    pal_sculpt_turn *turn = NULL;
+    pal_world *next = NULL, *stiff = NULL;
+    const pal_stroke stroke = {{0.05, 0.05, 0.05}, 0.04, 0.5, 2, 3};
+    REQUIRE(studio_open(&s));
+    pal_scene *scene = malloc(sizeof *scene);
+    REQUIRE(scene != NULL);
+    CHECK_INT(pal_sculptor_prepare(s.sculptor, s.scene, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = stroke},
+                                   &note, &turn),
+              0);
+    CHECK_INT(pal_world_create(pal_sculpt_scene(turn), &note, &next), 0);
+    /* now the slider moves */
+    *scene = *pal_sculpt_scene(turn);
+    scene->body[0].material.young_Pa *= 8, scene->body[0].material.density_kg_m3 *= 2;
+    CHECK_INT(pal_world_material(s.world, 0, &scene->body[0].material, &note), 0);
+    CHECK_INT(pal_world_create(scene, &note, &stiff), 0);
+    pal_sculpt_carry(turn, next, s.world);
+    pal_body *a = pal_world_body(next, 0), *b = pal_world_body(stiff, 0);
+    for (int i = 0; i < a->n_dof; i++) a->v[3 * i] = b->v[3 * i] = a->x_rest[3 * i + 2];
+    for (int k = 0; k < 5; k++) {
+        CHECK_INT(pal_world_step(next, scene->step_s), 0);
+        CHECK_INT(pal_world_step(stiff, scene->step_s), 0);
+    }
+    double off = 0, way = 0;
+    for (int i = 0; i < 3 * a->n_dof; i++) {
+        off = fmax(off, fabs(a->x[i] - b->x[i]));
+        way = fmax(way, fabs(a->x[i] - a->x_rest[i]));
+    }
+    CHECK_LE(1e-6, way);
+    CHECK_LE(off, 1e-6 * way);
+    pal_world_destroy(next);
+    pal_world_destroy(stiff);
+    pal_sculpt_free(turn);
+    free(scene);
+    studio_close(&s);
+}
+
 static void undo_and_redo_bring_back_every_bit(void)
 {
     studio s;
@@ -317,6 +356,7 @@ int main(void)
 {
     clay_make(&clay, 2, 0.1);
     RUN(a_body_goes_on_where_it_was_with_a_cell_more);
+    RUN(a_material_set_while_an_edit_is_made_is_kept);
     RUN(undo_and_redo_bring_back_every_bit);
     RUN(a_shape_that_is_kept_rests_where_it_is);
     RUN(paint_makes_heavier_and_stiffer_where_it_is);

@@ -174,6 +174,11 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->size_m))
         return pal_note_set(note, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
                             pal_norm3(b->lift_m), body->name, 10 * body->size_m);
+    /* 10 E: beyond it loads on nodes are shortened, and sub-steps become too many to be live */
+    const double most_Pa = body->load_cap_N / (body->h_m * body->h_m);
+    if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= most_Pa))
+        return pal_note_set(note, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
+                            b->pressure_Pa, body->name, most_Pa);
     if (goes_on(s, b)) {
         s->brush = *b;
         s->n_left = RAMP;
