@@ -349,7 +349,7 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
     pick a;
     if (def && pick_first(hub, c, body, order, false, &a)) {
         *def = scene->body[body];
-        def->material = c->room->material[body];
+        pal_session_material(c->room->session, body, &def->material);
         pal_material_painted(def, a.rest_m, &m);
         pal_wire_answer *to = begin_answer(hub, order->verb);
         snprintf(to->text, sizeof to->text, "probe: E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
@@ -491,7 +491,7 @@ static pal_scene *scene_now(const pal_hub_room *room)
     pal_scene *scene = malloc(sizeof *scene);
     if (!scene) return NULL;
     *scene = *pal_session_scene(room->session);
-    for (int b = 0; b < scene->n_body; b++) scene->body[b].material = room->material[b];
+    for (int b = 0; b < scene->n_body; b++) pal_session_material(room->session, b, &scene->body[b].material);
     return scene;
 }
 

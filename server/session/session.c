@@ -67,6 +67,7 @@ struct pal_session {
     _Atomic uint64_t beat_ns, n_refused;
     pthread_mutex_t note_lock;
     pal_note note;
+    pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
 
     /* the simulation thread's own */
     pal_input_log *log;
@@ -237,6 +238,9 @@ static void obey(pal_session *s, const pal_command *command)
                                                           .step = s->step,
                                                           .material = command->material});
             note.text[0] = 0;
+            pthread_mutex_lock(&s->note_lock);
+            s->material[command->body] = command->material;
+            pthread_mutex_unlock(&s->note_lock);
         }
         say(s, &note);
         break;
@@ -392,6 +396,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->scene = scene;
     if (options) s->options = *options;
     if (s->options.record_path) s->options.record_path = strdup(s->options.record_path);
+    for (int b = 0; b < scene->n_body && b < PAL_BODY_MAX; b++) s->material[b] = scene->body[b].material;
     s->step_ns = (uint64_t)(scene->step_s * SECOND_NS + 0.5);
     s->lease_ns = (uint64_t)((s->options.lease_s > 0 ? s->options.lease_s : 0.25) * SECOND_NS);
     s->paused = s->options.start_paused;
@@ -447,6 +452,7 @@ static void hand_over(pal_session *to, pal_session *from)
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
                           memory_order_relaxed);
     memcpy(to->n_look, from->n_look, sizeof to->n_look);
+    memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
     for (int b = 0; b < to->scene->n_body; b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++)
             if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
@@ -551,6 +557,13 @@ bool pal_session_alive(const pal_session *s)
 {
     uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = pal_clock_ns();
     return now < beat || now - beat < SECOND_NS;
+}
+
+void pal_session_material(pal_session *s, int body, pal_material *out)
+{
+    pthread_mutex_lock(&s->note_lock);
+    *out = s->material[body];
+    pthread_mutex_unlock(&s->note_lock);
 }
 
 void pal_session_last_note(pal_session *s, pal_note *out)

@@ -83,6 +83,8 @@ pal_err pal_session_command(pal_session *session, const pal_command *command);
 const pal_frame *pal_session_take_frame(pal_session *session);
 /* did the thread tick in the last second (or is it paused)? for /healthz [any] */
 bool pal_session_alive(const pal_session *session);
+/* a body's material as the world has it: of the scene, or the last one that was not refused; copies. [any] */
+void pal_session_material(pal_session *session, int body, pal_material *out);
 /* last thing that went wrong in a command (a refused material or brush), "" when nothing; copies. [any] */
 void pal_session_last_note(pal_session *session, pal_note *out);
 #endif

@@ -211,6 +211,22 @@ static void paint_is_what_a_probe_finds(void)
     end();
 }
 
+/* asked for and refused by the world: neither what a probe finds nor what the next edit is made of */
+static void a_material_that_was_refused_does_not_stick(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    CHECK(order(&c, "probe", TOP));
+    double young = told(&c, "young_Pa");
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"material\",\"args\":{\"young_Pa\":1e12}}");
+    CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
+    CHECK(order(&c, "probe", TOP));
+    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    mem_end(&c);
+    end();
+}
+
 static void a_cut_shows_the_inside_and_goes_again(void)
 {
     mem_client c;
@@ -483,6 +499,7 @@ int main(void)
     RUN(a_cell_grows_and_the_frames_are_of_the_new_epoch);
     RUN(assets_that_have_been_replaced_can_still_be_fetched);
     RUN(paint_is_what_a_probe_finds);
+    RUN(a_material_that_was_refused_does_not_stick);
     RUN(a_cut_shows_the_inside_and_goes_again);
     RUN(what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing);
     RUN(hands_blow_up_and_pull_until_they_let_go);
