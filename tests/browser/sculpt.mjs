@@ -3,7 +3,7 @@
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { check, finish, launch, open, palpate, pictures, scratch, serve, troubles, until } from "./common.mjs";
+import { check, finish, launch, moved, open, palpate, pictures, scratch, serve, troubles, until } from "./common.mjs";
 
 /** what a page shows */
 const shown = (page) => page.evaluate(() => {
@@ -15,6 +15,18 @@ const shown = (page) => page.evaluate(() => {
 const same = (a, b) => a.vertices === b.vertices && a.triangles === b.triangles;
 /** waits for what an order brings: the next epoch, drawn, answered */
 const after = (page, epoch) => until(() => shown(page), (s) => s.epoch > epoch && s.drawn && s.busy === "false");
+/** what has moved, when it hardly moves any more */
+const settled = async (page) => {
+  let before = -1;
+  return until(async () => {
+    await page.waitForTimeout(400);
+    return moved(page);
+  }, (m) => {
+    const still = Math.abs(m - before) < 0.02 * m;
+    before = m;
+    return still;
+  });
+};
 const say = (s) => `${s.vertices} vertices, ${s.triangles} triangles, epoch ${s.epoch}: ${s.said}`;
 
 /** a free pixel of the organ whose face looks most to a side, +z: 2 */
@@ -97,6 +109,22 @@ try {
   check("paint is answered", /^Paint: 77 cells/.test(painted.said), painted.said);
   const stiff = await probe();
   check("and found by the probe", stiff === "10 kPa, 1000 kg/m³", stiff);
+
+  // a force lasts until it is released, and follows its slider
+  await tool(ada, "inflate");
+  check("nothing to release yet", await ada.isDisabled("#sculpt-release"));
+  const still = await moved(ada);
+  await ada.mouse.click(spot.x, spot.y);
+  await until(() => moved(ada), (m) => m > still + 2e-4);
+  const blown = await settled(ada);
+  check("what is inflated moves", blown > still + 2e-4, `${(1e3 * blown).toFixed(2)} mm`);
+  await ada.$eval("#sculpt-pressure", (e) => { e.value = String(Number(e.value) + 30); e.dispatchEvent(new Event("input")); });
+  const more = await until(() => moved(ada), (m) => m > 1.5 * blown);
+  check("farther with more pressure", more > 1.5 * blown, `${(1e3 * more).toFixed(2)} mm`);
+  await until(() => shown(ada), (s) => s.busy === "false");
+  await ada.click("#sculpt-release");
+  const back = await until(() => moved(ada), (m) => m < 0.3 * more);
+  check("and goes back when it is released", back < 0.3 * more && (await ada.isDisabled("#sculpt-release")), `${(1e3 * back).toFixed(2)} mm`);
 
   await ada.selectOption("#sculpt-axis", "x");
   const cut = await after(ada, painted.epoch);
