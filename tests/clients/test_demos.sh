@@ -20,8 +20,8 @@ check "same force, other mass: plays" $code == 0
 check "three hands push and let go" "$(grep -c '"order":"release".*"done":true' "$work/mass")" == 3
 # the files are played in the order of their names: even, heavy, left
 even=$(moved release 1 "$work/mass") heavy=$(moved release 2 "$work/mass") left=$(moved release 3 "$work/mass")
-check "the even bar goes far (mm)" "$even" '>' 5
-check "four times the mass goes a quarter as far, at least" "$(ratio "$even" "$heavy")" '>' 2.3
+check "the even bar goes far (mm)" "$even" '>' 20
+check "four times the mass goes a quarter as far, at least" "$(ratio "$even" "$heavy")" '>' 2.5
 check "and at most" "$(ratio "$even" "$heavy")" '<' 6
 check "heavy at its left end it goes less far than even (mm)" "$left" '<' "$even"
 check "and farther than all heavy" "$left" '>' "$heavy"
@@ -30,7 +30,7 @@ play paint
 check "stiffness is painted: plays" $code == 0
 check "the probe finds it (Pa)" "$(grep '"order":"probe"' "$work/paint" | sed -n 's/.*"young_Pa":\([0-9.e+]*\).*/\1/p')" '>' 30000
 sways=$(moved release 1 "$work/paint") stands=$(moved release 2 "$work/paint")
-check "legs that are soft let the seat sway (mm)" "$sways" '>' 3
+check "legs that are soft let the seat sway (mm)" "$sways" '>' 10
 check "legs ten times as stiff less (share)" "$(ratio "$stands" "$sways")" '<' 0.85
 
 "$demos/run.sh" nothing >"$work/nothing" 2>&1

@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/session/session.h"
 #include "tests/check.h"
+#include "tests/heap_calls.h"
 #include "tests/session/small_scene.h"
 
 #include <pthread.h>
@@ -11,38 +12,6 @@
 
 static pal_scene scene;
 static pal_prepared mesh;
-
-/* ---- heap calls, counted by the linker's --wrap ---- */
-
-void *__real_malloc(size_t n);
-void *__real_calloc(size_t n, size_t m);
-void *__real_realloc(void *p, size_t n);
-void __real_free(void *p);
-void *__wrap_malloc(size_t n);
-void *__wrap_calloc(size_t n, size_t m);
-void *__wrap_realloc(void *p, size_t n);
-void __wrap_free(void *p);
-static _Atomic long n_heap;
-void *__wrap_malloc(size_t n)
-{
-    atomic_fetch_add(&n_heap, 1);
-    return __real_malloc(n);
-}
-void *__wrap_calloc(size_t n, size_t m)
-{
-    atomic_fetch_add(&n_heap, 1);
-    return __real_calloc(n, m);
-}
-void *__wrap_realloc(void *p, size_t n)
-{
-    atomic_fetch_add(&n_heap, 1);
-    return __real_realloc(p, n);
-}
-void __wrap_free(void *p)
-{
-    atomic_fetch_add(&n_heap, 1);
-    __real_free(p);
-}
 
 /* ---- a reader that waits for frames ---- */
 
@@ -382,7 +351,7 @@ static void no_heap_call_after_open(void)
     pal_session *s = open_with((pal_session_options){.lease_s = 0.05, .record_path = path}, w);
     REQUIRE(s != NULL);
     REQUIRE(frame_where(s, w, tick_at_least, 2) != NULL);
-    long before = atomic_load(&n_heap);
+    long before = atomic_load(&n_heap_call);
     for (uint32_t k = 1; k <= CHECK_REPEATS(200, 70); k++) {
         pal_pose pose = pose_at(0.05 - 0.0001 * k, 0, k);
         pal_session_put_pose(s, 0, &pose);
@@ -392,7 +361,7 @@ static void no_heap_call_after_open(void)
                 s, &(pal_command){.kind = PAL_COMMAND_MATERIAL, .material = {k % 60 ? 4000 : 1e12, 0.45, 1000, 4}});
         if (!next_frame(s, w)) break;
     }
-    long after = atomic_load(&n_heap);
+    long after = atomic_load(&n_heap_call);
     CHECK_INT(after - before, 0);
     pal_session_close(s);
     unlink(path);
@@ -692,6 +661,7 @@ static void fields_come_and_go_under_a_reader(void)
 
 int main(void)
 {
+    counting = true;
     /* sanitizers look at where threads meet; the size of the ball is not their matter */
     if (!small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);

@@ -1,46 +1,8 @@
 /* A body that adapts in the world: steps without the heap, tools on the surface as it is now, frames, reset, guard. */
+#include "tests/heap_calls.h"
 #include "tests/sim/shells.h"
 
 #include <stdint.h>
-
-/* heap calls of this process, counted while `counting` */
-static bool counting;
-static int n_heap_call;
-void *__real_malloc(size_t n_byte);
-void *__real_calloc(size_t n, size_t n_byte);
-void *__real_realloc(void *old, size_t n_byte);
-void *__real_aligned_alloc(size_t align, size_t n_byte);
-void __real_free(void *old);
-void *__wrap_malloc(size_t n_byte);
-void *__wrap_calloc(size_t n, size_t n_byte);
-void *__wrap_realloc(void *old, size_t n_byte);
-void *__wrap_aligned_alloc(size_t align, size_t n_byte);
-void __wrap_free(void *old);
-void *__wrap_malloc(size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_malloc(n_byte);
-}
-void *__wrap_calloc(size_t n, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_calloc(n, n_byte);
-}
-void *__wrap_realloc(void *old, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_realloc(old, n_byte);
-}
-void *__wrap_aligned_alloc(size_t align, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_aligned_alloc(align, n_byte);
-}
-void __wrap_free(void *old)
-{
-    if (counting) n_heap_call++;
-    __real_free(old);
-}
 
 enum { STEP_HZ = 60 };
 static const double tool_radius_m = 0.015;

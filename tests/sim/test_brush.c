@@ -1,47 +1,9 @@
 /* Brushes: pressure without net force on closed surfaces, handles as springs, slow in and out, rows that come and go,
  * what is refused; on springs, elements and solids. */
 #include "server/sim/effect_list.h"
+#include "tests/heap_calls.h"
 #include "tests/mesh/solids.h"
 #include "tests/sim/tool_scene.h"
-
-/* ---- heap calls, counted by the linker's --wrap ---- */
-
-void *__real_malloc(size_t n);
-void *__real_calloc(size_t n, size_t m);
-void *__real_realloc(void *p, size_t n);
-void *__real_aligned_alloc(size_t a, size_t n);
-void __real_free(void *p);
-void *__wrap_malloc(size_t n);
-void *__wrap_calloc(size_t n, size_t m);
-void *__wrap_realloc(void *p, size_t n);
-void *__wrap_aligned_alloc(size_t a, size_t n);
-void __wrap_free(void *p);
-static long n_heap;
-void *__wrap_malloc(size_t n)
-{
-    n_heap++;
-    return __real_malloc(n);
-}
-void *__wrap_calloc(size_t n, size_t m)
-{
-    n_heap++;
-    return __real_calloc(n, m);
-}
-void *__wrap_realloc(void *p, size_t n)
-{
-    n_heap++;
-    return __real_realloc(p, n);
-}
-void *__wrap_aligned_alloc(size_t a, size_t n)
-{
-    n_heap++;
-    return __real_aligned_alloc(a, n);
-}
-void __wrap_free(void *p)
-{
-    n_heap++;
-    __real_free(p);
-}
 
 /* ---- bodies ---- */
 
@@ -297,12 +259,12 @@ static void rows_come_with_the_first_brush_and_go_with_the_last(void)
         REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL) && !pal_world_brush(s.world, 0, 1, &c, NULL));
         CHECK_INT(pal_world_rows(s.world), rows + 1);
         CHECK(pal_world_bytes(s.world) > n_byte);
-        const long heap = n_heap;
+        const long heap = n_heap_call;
         for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
         /* letting a tool go ends its brush */
         REQUIRE(!pal_world_pose(s.world, 1, NULL));
         for (int i = 0; i < 12; i++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
-        CHECK_INT(n_heap, heap);
+        CHECK_INT(n_heap_call, heap);
         pal_world_tidy(s.world);
         CHECK_INT(pal_world_rows(s.world), rows + 1);
         REQUIRE(!pal_world_brush(s.world, 0, 0, NULL, NULL));
@@ -448,6 +410,7 @@ static void the_hardest_hands_leave_numbers(void)
 
 int main(void)
 {
+    counting = true;
     RUN(an_even_pressure_on_a_closed_surface_has_no_net_force);
     RUN(a_soft_brush_pushes_only_what_it_reaches_along_the_normals);
     RUN(a_handle_is_a_spring_of_its_stiffness);

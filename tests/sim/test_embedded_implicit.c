@@ -1,45 +1,7 @@
 /* Implicit solvers on bodies whose nodes are carried by control points (body.h, embed): a step against dense algebra,
  * what is conserved, what may only fall, long steps, rest, supports, statics, and edits of the material. */
+#include "tests/heap_calls.h"
 #include "tests/sim/embedded_thing.h"
-
-/* heap calls of this process, counted while `counting` */
-static bool counting;
-static int n_heap_call;
-void *__real_malloc(size_t n_byte);
-void *__real_calloc(size_t n, size_t n_byte);
-void *__real_realloc(void *old, size_t n_byte);
-void *__real_aligned_alloc(size_t align, size_t n_byte);
-void __real_free(void *old);
-void *__wrap_malloc(size_t n_byte);
-void *__wrap_calloc(size_t n, size_t n_byte);
-void *__wrap_realloc(void *old, size_t n_byte);
-void *__wrap_aligned_alloc(size_t align, size_t n_byte);
-void __wrap_free(void *old);
-void *__wrap_malloc(size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_malloc(n_byte);
-}
-void *__wrap_calloc(size_t n, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_calloc(n, n_byte);
-}
-void *__wrap_realloc(void *old, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_realloc(old, n_byte);
-}
-void *__wrap_aligned_alloc(size_t align, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_aligned_alloc(align, n_byte);
-}
-void __wrap_free(void *old)
-{
-    n_heap_call += counting;
-    __real_free(old);
-}
 
 /* ---- dense algebra ---- */
 

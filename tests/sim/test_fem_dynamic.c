@@ -1,47 +1,9 @@
 /* Model fem under implicit_euler and sdirk2: what is conserved, what may only fall, the order of both methods, the
  * beam's own frequency, long steps, and that a step neither touches the heap nor depends on the clock. */
+#include "tests/heap_calls.h"
 #include "tests/sim/fem_beam.h"
 
 static pal_note note;
-
-/* heap calls of this process, counted while `counting` */
-static bool counting;
-static int n_heap_call;
-void *__real_malloc(size_t n_byte);
-void *__real_calloc(size_t n, size_t n_byte);
-void *__real_realloc(void *old, size_t n_byte);
-void *__real_aligned_alloc(size_t align, size_t n_byte);
-void __real_free(void *old);
-void *__wrap_malloc(size_t n_byte);
-void *__wrap_calloc(size_t n, size_t n_byte);
-void *__wrap_realloc(void *old, size_t n_byte);
-void *__wrap_aligned_alloc(size_t align, size_t n_byte);
-void __wrap_free(void *old);
-void *__wrap_malloc(size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_malloc(n_byte);
-}
-void *__wrap_calloc(size_t n, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_calloc(n, n_byte);
-}
-void *__wrap_realloc(void *old, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_realloc(old, n_byte);
-}
-void *__wrap_aligned_alloc(size_t align, size_t n_byte)
-{
-    n_heap_call += counting;
-    return __real_aligned_alloc(align, n_byte);
-}
-void __wrap_free(void *old)
-{
-    n_heap_call += counting;
-    __real_free(old);
-}
 
 static const char *const solvers[] = {"implicit_euler", "sdirk2"};
 static const char *const elements[] = {"hex8_bbar", "hex8", "tet4", "tet10"};

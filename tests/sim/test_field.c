@@ -1,47 +1,9 @@
 /* Fields in colour: rows that come and go in a running world, their values, their rate; nothing where nobody looks. */
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_law.h"
+#include "tests/heap_calls.h"
 #include "tests/mesh/solids.h"
 #include "tests/sim/tool_scene.h"
-
-/* ---- heap calls, counted by the linker's --wrap ---- */
-
-void *__real_malloc(size_t n);
-void *__real_calloc(size_t n, size_t m);
-void *__real_realloc(void *p, size_t n);
-void *__real_aligned_alloc(size_t a, size_t n);
-void __real_free(void *p);
-void *__wrap_malloc(size_t n);
-void *__wrap_calloc(size_t n, size_t m);
-void *__wrap_realloc(void *p, size_t n);
-void *__wrap_aligned_alloc(size_t a, size_t n);
-void __wrap_free(void *p);
-static long n_heap;
-void *__wrap_malloc(size_t n)
-{
-    n_heap++;
-    return __real_malloc(n);
-}
-void *__wrap_calloc(size_t n, size_t m)
-{
-    n_heap++;
-    return __real_calloc(n, m);
-}
-void *__wrap_realloc(void *p, size_t n)
-{
-    n_heap++;
-    return __real_realloc(p, n);
-}
-void *__wrap_aligned_alloc(size_t a, size_t n)
-{
-    n_heap++;
-    return __real_aligned_alloc(a, n);
-}
-void __wrap_free(void *p)
-{
-    n_heap++;
-    __real_free(p);
-}
 
 /* ---- a row that can measure: the first FORCE row of a body is given a `measure` of the test's own ---- */
 
@@ -228,7 +190,7 @@ static void values_are_taken_ten_times_a_second_without_heap_and_at_once_after_r
     const pal_shown_field *field = s.body->field[PAL_FIELD_ENERGY_J_M3];
     uint64_t seen = field->revision;
     int n_new = 0;
-    long heap = n_heap;
+    long heap = n_heap_call;
     for (int i = 0; i < 120; i++) {
         press(&s, i / 2);
         if (pal_world_step(s.world, 1.0 / 60)) break;
@@ -237,7 +199,7 @@ static void values_are_taken_ten_times_a_second_without_heap_and_at_once_after_r
         (void)pal_frame_fit(frame, s.world);
         pal_world_frame(s.world, frame);
     }
-    CHECK_INT(n_heap, heap);
+    CHECK_INT(n_heap_call, heap);
     CHECK_INT(n_new, 20);
     CHECK_NEAR(field->time_s, 2, 1e-9);
     const float *moved = s.body->field[PAL_FIELD_DISPLACEMENT_M]->value;
@@ -258,9 +220,9 @@ static void frames_have_room_for_a_field_while_its_row_is_there(void)
     pal_frame *frame = pal_frame_create(s.world), *other = pal_frame_create(s.world);
     REQUIRE(frame && other);
     pal_frame_field *in = &frame->part[0].field[PAL_FIELD_DISPLACEMENT_M];
-    long heap = n_heap;
+    long heap = n_heap_call;
     CHECK_INT(pal_frame_fit(frame, s.world), 0);
-    CHECK_INT(n_heap, heap);
+    CHECK_INT(n_heap_call, heap);
     CHECK(in->value == NULL);
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL));
     pal_world_frame(s.world, frame); /* no room yet: nothing is written */
@@ -563,6 +525,7 @@ static void looking_at_a_live_body_of_elements_changes_no_bit(void)
 
 int main(void)
 {
+    counting = true;
     RUN(nobody_looks_nothing_is_there_and_looking_changes_no_bit);
     RUN(displacement_is_the_distance_from_rest);
     RUN(measured_values_are_nodal_means_spread_by_the_skin);

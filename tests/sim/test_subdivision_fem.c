@@ -5,45 +5,8 @@
 #include "server/sim/solid.h"
 #include "server/sim/solid_mass.h"
 #include "server/sim/world.h"
+#include "tests/heap_calls.h"
 #include "tests/mesh/solids.h"
-
-void *__real_malloc(size_t n_byte);
-void *__real_calloc(size_t n, size_t n_byte);
-void *__real_realloc(void *old, size_t n_byte);
-void *__real_aligned_alloc(size_t align, size_t n_byte);
-void __real_free(void *old);
-static bool counting;
-static int n_heap_call;
-void *__wrap_malloc(size_t n_byte);
-void *__wrap_calloc(size_t n, size_t n_byte);
-void *__wrap_realloc(void *old, size_t n_byte);
-void *__wrap_aligned_alloc(size_t align, size_t n_byte);
-void __wrap_free(void *old);
-void *__wrap_malloc(size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_malloc(n_byte);
-}
-void *__wrap_calloc(size_t n, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_calloc(n, n_byte);
-}
-void *__wrap_realloc(void *old, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_realloc(old, n_byte);
-}
-void *__wrap_aligned_alloc(size_t align, size_t n_byte)
-{
-    if (counting) n_heap_call++;
-    return __real_aligned_alloc(align, n_byte);
-}
-void __wrap_free(void *old)
-{
-    if (counting) n_heap_call++;
-    __real_free(old);
-}
 
 /* a scene of one solid, its plan or its world */
 typedef struct clay {
