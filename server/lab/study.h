@@ -1,0 +1,79 @@
+/* What accuracy costs: one body under the same loads in many settings, each with its error against a converged
+ * reference and its milliseconds per live step. [load]
+ *
+ * Loads: those of a problem's load case, or of a scene three presses on patches of its surface far from the supports,
+ * each as strong as moves the patch by about 4 % of the body's diagonal (linear estimate). Static: the rest under every
+ * load. Dynamic: the first load put on at once at rest, the way of its patch's middle for `seconds`, with the scene's
+ * own damping. Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept, whose own
+ * error is estimated from its last change (Richardson); its dynamic run with sdirk2 and a quarter of the shortest step;
+ * adaptive_springs: its own finest level, wholly refined; or samples that the caller has.
+ * Deterministic but for the milliseconds. */
+#ifndef PAL_LAB_STUDY_H
+#define PAL_LAB_STUDY_H
+#include "server/lab/sample_points.h"
+#include "server/sim/problem.h"
+#include "server/sim/setting.h"
+
+enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_WAY = 512 };
+
+typedef struct pal_study_point {
+    pal_priced_setting priced; /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
+    pal_err err;               /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
+    char why[PAL_SETTING_TEXT];
+    int n_node, n_substep;
+    double ms_p95;
+    double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
+    double way_rms_m, way_most_m;       /* of the patch's middle over time, dynamic                                */
+    double prepare_s;                   /* mesh and world                                                           */
+    double predicted_ms, predicted_m;   /* by the models of cost and error fitted to the OTHER points of its method;
+                                           NaN: too few of them                                                    */
+} pal_study_point;
+
+typedef struct pal_study {
+    char name[PAL_NAME]; /* of scene or problem                                      */
+    char machine[128];   /* processor and cores, as the system names it               */
+    char reference[160]; /* how the reference was made, for people                    */
+    double reference_m;  /* its own estimated error                                   */
+    double most_m;       /* largest displacement of the reference                     */
+    double size_m;       /* box diagonal of the body                                  */
+    double step_s;       /* of the scene, for "real time"                             */
+    int n_point;
+    pal_study_point point[PAL_STUDY_POINTS];
+} pal_study;
+
+typedef struct pal_study_options {
+    const char *const
+        *method; /* models to sweep [n_method]; 0: all that fit; "tet_springs" is swept calibrated as well */
+    int n_method;
+    int body;                   /* of the scene                                                              */
+    double seconds;             /* of the dynamic run; 0: 0.5                                                */
+    int quick;                  /* 1: few settings and a coarser reference, for tests and CI                 */
+    const pal_samples *samples; /* static reference of the first load; NULL: made here                      */
+    /* points that were measured before (a run that was broken off): taken over, not measured again; NULL: none */
+    const pal_study *before;
+    /* [load] after every point: the study so far, to be kept; may be NULL. False stops with STATE */
+    bool (*done)(const pal_study *study, int n_all, void *user);
+    bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */
+    void *user;
+} pal_study_options;
+
+/* sweeps; out (large: on the heap) is whole up to where it came, also after an error. REFUSED: no such body, no method
+ * fits, a load that meets nothing; STATE: stopped; MEMORY */
+pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_note *note);
+pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
+                          const pal_study_options *options, pal_study *out, pal_note *note);
+/* the scene that a problem's body would be served as: material, supports, tools; *out owns its mesh
+ * (pal_set_scene_free)
+ */
+pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_note *note,
+                                pal_set_scene **out);
+
+/* marks the front anew: points that no other beats in both ms and error_m */
+void pal_study_front(pal_study *study);
+/* the cheapest point with error_m (plus the reference's own error) at most within_m, or the most accurate one with ms
+ * at most budget_ms; the one that is not asked for is NaN; both: cheapest that keeps both. -1: none serves */
+int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
+/* cost and error foreseen for a setting between those measured: ms = a + b n^c, error = d size^-p fitted to the points
+ * of the same method and solver; false: too few of them */
+bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
+#endif

@@ -1,0 +1,25 @@
+/* A live switch of method, resolution, step or tolerance of one body: another world is made beside the running one
+ * (pal_switch_prepare, slow), and takes over between two steps with pal_session_follow and pal_switch_carry, without a
+ * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
+ * within 2 % of what it was, the mismatch of forces let go over 10 steps. Thread: one at a time. */
+#ifndef PAL_SESSION_SWITCHING_H
+#define PAL_SESSION_SWITCHING_H
+#include "server/sim/setting.h"
+#include "server/sim/world.h"
+
+typedef struct pal_switch pal_switch;
+/* what the carry saw, for people and tests */
+typedef struct pal_switch_report {
+    double energy_before_J, energy_after_J; /* of the whole world */
+    double most_move_m;                     /* of a shown vertex, between the frame before and the one after */
+} pal_switch_report;
+
+/* the scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body); borrows
+ * `scene`. Errors as of pal_setting_make */
+pal_err pal_switch_prepare(const pal_scene *scene, int body, const pal_setting *to, pal_note *note, pal_switch **out);
+const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */
+/* pal_session_carry with user a pal_switch */
+void pal_switch_carry(void *change, pal_world *next, const pal_world *before);
+void pal_switch_report_of(const pal_switch *change, pal_switch_report *out); /* after the carry */
+void pal_switch_free(pal_switch *change); /* NULL is fine; not while a world is made from its scene */
+#endif

@@ -1,0 +1,50 @@
+/* A setting: one choice on the knobs of accuracy for one body of a scene: method, resolution, step, tolerance. What a
+ * study sweeps, what a session switches to while it runs, what a scene is written with. Thread: [load] unless said.
+ *
+ * Which models fit a body: with control cells subdivision_fem and fem (on the voxels of the cells' boundary); a surface
+ * without tetrahedra adaptive_springs alone (a hollow organ is another thing than a full one); else tet_springs and
+ * fem. */
+#ifndef PAL_SIM_SETTING_H
+#define PAL_SIM_SETTING_H
+#include "server/sim/def.h"
+
+enum { PAL_SETTING_TEXT = 120 };
+
+typedef struct pal_setting {
+    char model[PAL_NAME];   /* "fem", "tet_springs", "adaptive_springs", "subdivision_fem"                     */
+    char element[PAL_NAME]; /* fem: "hex8_bbar", "hex8", "tet4", "tet10"; "": the model's own choice           */
+    char law[PAL_NAME];     /* fem: "corotational", "neo_hookean", "linear"; "": the model's own choice        */
+    char solver[PAL_NAME];  /* "implicit_euler", "sdirk2", "verlet", "rk4", "central_cg"; "": the model's own  */
+    int size;               /* voxels on the longest axis (fem, tet_springs), levels (the others); 0: as it is */
+    double step_s;          /* of the whole scene; 0: as it is                                                  */
+    double tolerance;       /* of an implicit solver's residual or of CG; 0: the solver's own                   */
+    double k_distance_J, k_area_J, k_volume_J; /* calibrated springs; k_distance_J 0: from the material; k_area_J 0: no
+                                                * such row                                                         */
+} pal_setting;
+
+/* a setting with what it costs and how far off it is, as a study found (lab/study.h) */
+typedef struct pal_priced_setting {
+    pal_setting setting;
+    double ms;      /* median of a step under load, on the machine of the study       */
+    double error_m; /* largest distance from the reference that the study saw         */
+    bool front;     /* nothing else is both cheaper and nearer                         */
+} pal_priced_setting;
+
+/* the setting that a body of a scene has now; size is that of the prepared mesh (0 when it was made elsewhere) */
+void pal_setting_of(const pal_scene *scene, int body, pal_setting *out);
+/* "fem hex8_bbar corotational, 16 voxels, implicit_euler, 16.7 ms": only what is given. Returns text. [any] */
+const char *pal_setting_text(const pal_setting *setting, char text[PAL_SETTING_TEXT]);
+bool pal_setting_same(const pal_setting *a, const pal_setting *b); /* [any] */
+
+/* a scene with one body in another setting, and the mesh made for it */
+typedef struct pal_set_scene {
+    pal_scene scene;   /* borrows what `from` borrows, but for `mesh` */
+    pal_prepared mesh; /* of the changed body; n_node 0: it kept its own */
+    int body;
+} pal_set_scene;
+/* Makes it: keeps material, supports, regions, effects and tools; prepares voxels anew from the body's shown surface
+ * when the size differs. *out heap, pal_set_scene_free; borrows from `from`, which outlives it. REFUSED: a model that
+ * does not fit the body (one sentence why), an unknown word, a size or number out of range; BUDGET, MEMORY */
+pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to, pal_note *note, pal_set_scene **out);
+void pal_set_scene_free(pal_set_scene *scene); /* NULL is fine */
+#endif
