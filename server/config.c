@@ -15,23 +15,23 @@
 enum { FILE_MOST = 1 << 16, VARIABLE = 64 };
 #define PLACE(field) offsetof(pal_config, field), sizeof(((pal_config *)0)->field)
 
-static const pal_setting setting[] = {
-    {"listen", "ADDRESS", PAL_SETTING_TEXT, PLACE(listen), 0, 0, "address to listen on (127.0.0.1)"},
-    {"port", "N", PAL_SETTING_INT, PLACE(port), 0, 65535, "port; 0 takes any free one (8090)"},
-    {"allow_remote", "BOOL", PAL_SETTING_BOOL, PLACE(allow_remote), 0, 1,
+static const pal_config_key setting[] = {
+    {"listen", "ADDRESS", PAL_CONFIG_KEY_TEXT, PLACE(listen), 0, 0, "address to listen on (127.0.0.1)"},
+    {"port", "N", PAL_CONFIG_KEY_INT, PLACE(port), 0, 65535, "port; 0 takes any free one (8090)"},
+    {"allow_remote", "BOOL", PAL_CONFIG_KEY_BOOL, PLACE(allow_remote), 0, 1,
      "let other machines connect: needed for any address but this machine's own"},
-    {"viewer", "FOLDER", PAL_SETTING_TEXT, PLACE(viewer), 0, 0, "files of the page (those beside the program)"},
-    {"error_m", "M", PAL_SETTING_NUMBER, PLACE(error_m), 0, 0.01,
+    {"viewer", "FOLDER", PAL_CONFIG_KEY_TEXT, PLACE(viewer), 0, 0, "files of the page (those beside the program)"},
+    {"error_m", "M", PAL_CONFIG_KEY_NUMBER, PLACE(error_m), 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
-    {"most_clients", "N", PAL_SETTING_INT, PLACE(most_clients), 1, 10000, "clients at once (200)"},
-    {"lcm", "URL", PAL_SETTING_TEXT, PLACE(lcm), 0, 0, "also speak LCM there, in a process of its own (off)"},
-    {"log", "LEVEL", PAL_SETTING_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
-    {"record", "FILE", PAL_SETTING_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
+    {"most_clients", "N", PAL_CONFIG_KEY_INT, PLACE(most_clients), 1, 10000, "clients at once (200)"},
+    {"lcm", "URL", PAL_CONFIG_KEY_TEXT, PLACE(lcm), 0, 0, "also speak LCM there, in a process of its own (off)"},
+    {"log", "LEVEL", PAL_CONFIG_KEY_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
+    {"record", "FILE", PAL_CONFIG_KEY_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
 };
 enum { N_SETTING = sizeof setting / sizeof setting[0] };
 static const char *const level_name[] = {"error", "warn", "info", "debug"};
 
-const pal_setting *pal_config_settings(int *n)
+const pal_config_key *pal_config_settings(int *n)
 {
     *n = N_SETTING;
     return setting;
@@ -49,14 +49,15 @@ pal_log_level pal_config_log_level(const pal_config *config)
     return PAL_LOG_INFO;
 }
 
-static const pal_setting *find(const char *key)
+static const pal_config_key *find(const char *key)
 {
     for (int k = 0; k < N_SETTING; k++)
         if (!strcmp(setting[k].key, key)) return &setting[k];
     return NULL;
 }
 
-static pal_err set_text(pal_config *config, const pal_setting *s, const char *text, const char *where, pal_note *note)
+static pal_err set_text(pal_config *config, const pal_config_key *s, const char *text, const char *where,
+                        pal_note *note)
 {
     uint32_t code;
     size_t n = strlen(text);
@@ -79,14 +80,14 @@ static pal_err set_text(pal_config *config, const pal_setting *s, const char *te
     return PAL_ERR_OK;
 }
 
-static pal_err set_number(pal_config *config, const pal_setting *s, double number, const char *where, pal_note *note)
+static pal_err set_number(pal_config *config, const pal_config_key *s, double number, const char *where, pal_note *note)
 {
     void *place = (char *)config + s->offset;
     if (!(number >= s->low && number <= s->high))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: %g is outside %g .. %g", where, number, s->low, s->high);
-    if (s->kind == PAL_SETTING_INT && number != floor(number))
+    if (s->kind == PAL_CONFIG_KEY_INT && number != floor(number))
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: %g is not a whole number", where, number);
-    if (s->kind == PAL_SETTING_INT)
+    if (s->kind == PAL_CONFIG_KEY_INT)
         *(int *)place = (int)number;
     else
         *(double *)place = number;
@@ -95,10 +96,10 @@ static pal_err set_number(pal_config *config, const pal_setting *s, double numbe
 
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_note *note)
 {
-    const pal_setting *s = find(key);
+    const pal_config_key *s = find(key);
     if (!s) return pal_note_set(note, PAL_ERR_REFUSED, "%s: unknown key", where);
-    if (s->kind == PAL_SETTING_TEXT) return set_text(config, s, text, where, note);
-    if (s->kind == PAL_SETTING_BOOL) {
+    if (s->kind == PAL_CONFIG_KEY_TEXT) return set_text(config, s, text, where, note);
+    if (s->kind == PAL_CONFIG_KEY_BOOL) {
         bool yes = !strcmp(text, "true") || !strcmp(text, "1"), no = !strcmp(text, "false") || !strcmp(text, "0");
         if (!yes && !no) return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.40s\" is not true or false", where, text);
         *(bool *)((char *)config + s->offset) = yes;
@@ -111,18 +112,19 @@ pal_err pal_config_set(pal_config *config, const char *key, const char *text, co
     return set_number(config, s, number, where, note);
 }
 
-static pal_err set_json(pal_config *config, const pal_setting *s, const cJSON *item, const char *where, pal_note *note)
+static pal_err set_json(pal_config *config, const pal_config_key *s, const cJSON *item, const char *where,
+                        pal_note *note)
 {
     switch (s->kind) {
-    case PAL_SETTING_TEXT:
+    case PAL_CONFIG_KEY_TEXT:
         if (!cJSON_IsString(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not a text", where);
         return set_text(config, s, item->valuestring, where, note);
-    case PAL_SETTING_BOOL:
+    case PAL_CONFIG_KEY_BOOL:
         if (!cJSON_IsBool(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not true or false", where);
         *(bool *)((char *)config + s->offset) = cJSON_IsTrue(item);
         return PAL_ERR_OK;
-    case PAL_SETTING_INT:
-    case PAL_SETTING_NUMBER:
+    case PAL_CONFIG_KEY_INT:
+    case PAL_CONFIG_KEY_NUMBER:
         break;
     }
     if (!cJSON_IsNumber(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not a number", where);
@@ -134,7 +136,7 @@ static pal_err read_keys(pal_config *config, const char *name, const cJSON *root
     char where[PAL_CONFIG_TEXT];
     if (!cJSON_IsObject(root)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a JSON object", name);
     for (const cJSON *item = root->child; item; item = item->next) {
-        const pal_setting *s = find(item->string);
+        const pal_config_key *s = find(item->string);
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
         if (!s) return pal_note_set(note, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)

@@ -25,22 +25,22 @@ typedef struct pal_config {
     char record[PAL_CONFIG_TEXT]; /* write the input log there; "": do not                               */
 } pal_config;
 
-typedef enum pal_setting_kind {
-    PAL_SETTING_TEXT,
-    PAL_SETTING_BOOL,
-    PAL_SETTING_INT,
-    PAL_SETTING_NUMBER
-} pal_setting_kind;
+typedef enum pal_config_kind {
+    PAL_CONFIG_KEY_TEXT,
+    PAL_CONFIG_KEY_BOOL,
+    PAL_CONFIG_KEY_INT,
+    PAL_CONFIG_KEY_NUMBER
+} pal_config_kind;
 /* one key, for manuals and checks */
-typedef struct pal_setting {
+typedef struct pal_config_key {
     const char *key, *value; /* "allow_remote"; word for its value in a manual */
-    pal_setting_kind kind;
+    pal_config_kind kind;
     size_t offset, n_byte; /* place in pal_config; bytes of a text */
     double low, high;
     const char *help;
-} pal_setting;
+} pal_config_key;
 
-const pal_setting *pal_config_settings(int *n);
+const pal_config_key *pal_config_settings(int *n);
 void pal_config_default(pal_config *config);
 /* reads a file over what is there; REFUSED names file and key, IO. All or nothing. */
 pal_err pal_config_file(pal_config *config, const char *path, pal_note *note);

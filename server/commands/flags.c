@@ -20,7 +20,7 @@ typedef struct parse {
     bool seen[FLAGS];
     const char *config_file;
     struct {
-        const pal_setting *setting;
+        const pal_config_key *setting;
         const char *text;
     } given[FLAGS];
     int n_given;
@@ -55,10 +55,10 @@ static int manual(const pal_flag_table *table)
     printf("usage: palpate %s\n\n%s\n", table->usage, table->about);
     for (int k = 0; k < table->n_flag; k++) manual_line(table->flag[k].name, table->flag[k].value, table->flag[k].help);
     if (table->config) {
-        const pal_setting *setting = pal_config_settings(&n);
+        const pal_config_key *setting = pal_config_settings(&n);
         for (int k = 0; k < n; k++) {
             flag_name(setting[k].key, name);
-            manual_line(name, setting[k].kind == PAL_SETTING_BOOL ? NULL : setting[k].value, setting[k].help);
+            manual_line(name, setting[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : setting[k].value, setting[k].help);
         }
         manual_line("--config", "FILE", "JSON file of these settings (PALPATE_CONFIG, or none)");
     }
@@ -122,11 +122,11 @@ static int set_flag(parse *p, const pal_flag *flag, const char *text)
 }
 
 /* a flag of the configuration, "--allow-remote" -> allow_remote; NULL: none */
-static const pal_setting *setting_named(const pal_flag_table *table, const char *name)
+static const pal_config_key *setting_named(const pal_flag_table *table, const char *name)
 {
     char known[KEY];
     int n;
-    const pal_setting *setting = pal_config_settings(&n);
+    const pal_config_key *setting = pal_config_settings(&n);
     for (int k = 0; table->config && k < n; k++) {
         flag_name(setting[k].key, known);
         if (!strcmp(known, name)) return &setting[k];
@@ -143,12 +143,12 @@ static int take(parse *p, int argc, char **argv, int *at)
     int found = -1;
     for (int k = 0; k < p->table->n_flag; k++)
         if (!strcmp(p->table->flag[k].name, name)) found = k;
-    const pal_setting *setting = found < 0 ? setting_named(p->table, name) : NULL;
+    const pal_config_key *setting = found < 0 ? setting_named(p->table, name) : NULL;
     bool config_file = p->table->config && !strcmp(name, "--config");
     bool json = !strcmp(name, "--json"), quiet = !strcmp(name, "--quiet");
     if (found < 0 && !setting && !config_file && !json && !quiet) return wrong(p, "unknown flag %.60s", word);
     bool is_switch = json || quiet || (found >= 0 && p->table->flag[found].kind == PAL_FLAG_SWITCH) ||
-                     (setting && setting->kind == PAL_SETTING_BOOL);
+                     (setting && setting->kind == PAL_CONFIG_KEY_BOOL);
     if (is_switch && equal) return wrong(p, "%s takes no value", name);
     if (!is_switch && !equal && *at + 1 >= argc) return wrong(p, "%s needs a value", name);
     const char *text = is_switch ? "true" : equal ? equal + 1 : argv[++*at];

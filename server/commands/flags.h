@@ -45,7 +45,8 @@ typedef struct pal_flag_table {
     int n_flag;
     int least_operand, most_operand;
     /* not NULL: every key of the configuration is a flag as well (allow_remote: --allow-remote), and --config FILE;
-     * on success the struct holds defaults < file < environment < flags. A setting of PAL_SETTING_BOOL is a switch. */
+     * on success the struct holds defaults < file < environment < flags. A setting of PAL_CONFIG_KEY_BOOL is a switch.
+     */
     pal_config *config;
 } pal_flag_table;
 

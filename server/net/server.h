@@ -3,6 +3,7 @@
 #ifndef PAL_NET_SERVER_H
 #define PAL_NET_SERVER_H
 #include "server/session/session.h"
+#include "server/sim/setting.h"
 
 typedef struct pal_server pal_server;
 
@@ -14,6 +15,10 @@ typedef struct pal_server_options {
     double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int most_clients;          /* 0: 200                                                                    */
     const char *road;          /* "ws" (default) or "mem" (tests)                                           */
+    /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
+     * body they are of, in the order of the sessions; borrowed until close. NULL, or n_setting 0: no study */
+    const pal_priced_setting *const *setting; /* [n_session][n_setting] */
+    const int *n_setting, *setting_body;      /* [n_session]            */
 } pal_server_options;
 
 /* REFUSED: address needs allow_remote, port in use (the sentence names it); borrows sessions until close. [load] */

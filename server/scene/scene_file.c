@@ -236,10 +236,33 @@ static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *sc
     return PAL_ERR_OK;
 }
 
+/* what the scene asks of its study: "accuracy" as text or {max_error_mm, text}, "budget" {step_ms} */
+static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *scene)
+{
+    static const char *const accuracy_keys[] = {"max_error_mm", "text", NULL}, *const budget_keys[] = {"step_ms", NULL};
+    const cJSON *accuracy = cJSON_GetObjectItemCaseSensitive(root, "accuracy");
+    const cJSON *budget = cJSON_GetObjectItemCaseSensitive(root, "budget");
+    if (cJSON_IsObject(accuracy)) {
+        double most_mm = 0;
+        PAL_TRY(pal_json_object(json, accuracy, "accuracy", accuracy_keys));
+        PAL_TRY(pal_json_text(json, accuracy, "accuracy", "text", true, scene->accuracy, sizeof scene->accuracy));
+        PAL_TRY(pal_json_number(json, accuracy, "accuracy", "max_error_mm", 1e-6, 1e6, &most_mm));
+        if (most_mm == 0) return pal_json_bad(json, "accuracy", "has no max_error_mm");
+        /* divided: 0.1 mm is 1e-4 m and comes back as 0.1 */
+        scene->max_error_m = most_mm / 1000;
+    } else {
+        PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
+    }
+    if (!budget) return PAL_ERR_OK;
+    PAL_TRY(pal_json_object(json, budget, "budget", budget_keys));
+    PAL_TRY(pal_json_number(json, budget, "budget", "step_ms", 1e-6, 1e6, &scene->budget_ms));
+    return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_bad(json, "budget", "has no step_ms");
+}
+
 static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
 {
-    static const char *const known[] = {"name",         "title",        "source", "accuracy", "step_s", "up",
-                                        "gravity_m_s2", "most_substep", "bodies", "tools",    NULL};
+    static const char *const known[] = {"name", "title",        "source",       "accuracy", "budget", "step_s",
+                                        "up",   "gravity_m_s2", "most_substep", "bodies",   "tools",  NULL};
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
     const cJSON *list;
@@ -250,7 +273,7 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     if (strcmp(plain, scene->name)) return pal_json_bad(json, "name", "has other characters than a-z 0-9 _ -");
     PAL_TRY(pal_json_text(json, root, "", "title", true, scene->title, sizeof scene->title));
     PAL_TRY(pal_json_text(json, root, "", "source", true, scene->source, sizeof scene->source));
-    PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
+    PAL_TRY(read_wish(json, root, scene));
     PAL_TRY(pal_json_number(json, root, "", "step_s", 1e-4, 0.1, &scene->step_s));
     PAL_TRY(pal_json_number(json, root, "", "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
     PAL_TRY(pal_json_count(json, root, "", "most_substep", 1, 1000000, &scene->most_substep));

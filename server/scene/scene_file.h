@@ -3,7 +3,11 @@
  *
  * {
  *   "name": "liver", "title": "Liver, abdominal CT", "source": "...",
- *   "accuracy": "2.1 % RMS of finite elements",           shown beside the title, at most 127 bytes
+ *   "accuracy": "2.1 % RMS of finite elements",           shown beside the title, at most 127 bytes;
+ *               or {"max_error_mm": 1, "text": "..."}      and the cheapest setting of the study beside this file that
+ *                                                          is within so much of its reference (palpate study)
+ *   "budget": {"step_ms": 4},                             the most accurate setting of that study whose step takes at
+ *                                                          most so long; with max_error_mm the cheapest that keeps both
  *   "step_s": 0.0166667,
  *   "up": [0, 0, 1],
  *   "bodies": [{

@@ -10,6 +10,7 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -119,6 +120,27 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     for (int k = 0; k < body->n_effect; k++) add_item(effects, NULL, &body->effect[k]);
 }
 
+/* millimetres that are read as exactly these metres, when they came from millimetres */
+static double in_mm(double metres)
+{
+    double mm = 1000 * metres;
+    for (int k = 0; k < 2 && mm / 1000 != metres; k++) mm = nextafter(mm, mm / 1000 < metres ? INFINITY : 0);
+    return mm;
+}
+
+/* "accuracy" and "budget" as they were asked for */
+static void add_wish(cJSON *root, const pal_scene *scene)
+{
+    if (scene->max_error_m > 0) {
+        cJSON *accuracy = cJSON_AddObjectToObject(root, "accuracy");
+        add_number(accuracy, "max_error_mm", in_mm(scene->max_error_m));
+        if (scene->accuracy[0]) cJSON_AddStringToObject(accuracy, "text", scene->accuracy);
+    } else if (scene->accuracy[0]) {
+        cJSON_AddStringToObject(root, "accuracy", scene->accuracy);
+    }
+    if (scene->budget_ms > 0) add_number(cJSON_AddObjectToObject(root, "budget"), "step_ms", scene->budget_ms);
+}
+
 /* the scene as text, or NULL; the caller frees it */
 static char *scene_text(const pal_scene *scene)
 {
@@ -126,7 +148,7 @@ static char *scene_text(const pal_scene *scene)
     cJSON_AddStringToObject(root, "name", scene->name);
     cJSON_AddStringToObject(root, "title", scene->title);
     cJSON_AddStringToObject(root, "source", scene->source);
-    if (scene->accuracy[0]) cJSON_AddStringToObject(root, "accuracy", scene->accuracy);
+    add_wish(root, scene);
     add_number(root, "step_s", scene->step_s);
     cJSON_AddItemToObject(root, "up", pal_json_exact_list(scene->up, 3));
     add_number(root, "gravity_m_s2", scene->gravity_m_s2);

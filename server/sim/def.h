@@ -95,6 +95,9 @@ typedef struct pal_scene {
     char source[256];    /* where the organ comes from and its licence, shown as well */
     char accuracy[128];  /* how far from its reference, shown beside the title: "2.1 % RMS of finite elements"; may be
                             empty */
+    double max_error_m;  /* setting asked for: the cheapest that a study found within this of its reference; 0: none */
+    double budget_ms;    /* or the most accurate whose step takes at most this; both: the cheapest that keeps both;
+                            0: none. The world itself does not look at either */
     double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
     double up[3];        /* unit, against gravity: (0, 0, 1)                          */
     double gravity_m_s2; /* 9.81 times the item `gravity`'s presence                  */

@@ -94,6 +94,15 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"accuracy\": \"0123456789012345678901234567890123456789012345678901234567890123"
          "0123456789012345678901234567890123456789012345678901234567890123\"}",
          "accuracy: 128 bytes of text, more than 127"},
+        {"{\"accuracy\": {}}", "accuracy: has no max_error_mm"},
+        {"{\"accuracy\": {\"max_error_mm\": 0}}", "accuracy.max_error_mm: 0 is outside"},
+        {"{\"accuracy\": {\"max_error_mm\": \"1\"}}", "accuracy.max_error_mm: is not a number"},
+        {"{\"accuracy\": {\"max_error_mm\": 1, \"text\": 1}}", "accuracy.text: is not a text"},
+        {"{\"accuracy\": {\"max_error_m\": 1}}", "accuracy.max_error_m: unknown key; known are max_error_mm, text"},
+        {"{\"budget\": 4}", "budget: is not an object"},
+        {"{\"budget\": {}}", "budget: has no step_ms"},
+        {"{\"budget\": {\"step_ms\": -4}}", "budget.step_ms: -4 is outside"},
+        {"{\"budget\": {\"step_ms\": 1e999}}", "budget.step_ms: inf is outside"},
         {"{\"step_s\": \"fast\"}", "step_s: is not a number"},
         {"{\"step_s\": 1}", "step_s: 1 is outside 0.0001 .. 0.1"},
         {"{\"step_s\": 1e999}", "step_s: inf is outside"},
@@ -341,6 +350,7 @@ static void constants_of_springs_come_back_bit_for_bit(void)
     pal_item_put_text(&def->model, "weights", "volume", NULL);
     pal_item_put_number(&def->model, "k_area_J", nextafter(0.002, 1), NULL);
     snprintf(in->scene.accuracy, sizeof in->scene.accuracy, "2.1 %% RMS \xc2\xb1 \"0.3\"");
+    in->scene.max_error_m = 0.1 / 1000, in->scene.budget_ms = 1.0 / 3;
     char where[600];
     snprintf(where, sizeof where, "%s/springs", folder);
     CHECK_INT(pal_scene_save(in, where, &note), 0);
@@ -350,6 +360,8 @@ static void constants_of_springs_come_back_bit_for_bit(void)
     REQUIRE(!err);
     const pal_spring_grid *a = &def->spring_grid, *b = &out->scene.body[0].spring_grid;
     CHECK_TEXT(out->scene.accuracy, in->scene.accuracy);
+    CHECK_NEAR(out->scene.max_error_m, 0.1 / 1000, 0);
+    CHECK_NEAR(out->scene.budget_ms, 1.0 / 3, 0);
     CHECK(memcmp(a->n, b->n, sizeof a->n) == 0);
     CHECK(memcmp(a->low_m, b->low_m, sizeof a->low_m) == 0 && memcmp(a->high_m, b->high_m, sizeof a->high_m) == 0);
     REQUIRE(b->k_J[0] && !b->k_J[1] && b->k_J[2]);
