@@ -2,6 +2,7 @@
 #include "server/base/arena.h"
 #include "server/base/clock.h"
 #include "server/base/err.h"
+#include "server/base/machine.h"
 #include "server/base/ring.h"
 #include "server/base/trio.h"
 #include "server/base/vec3.h"
@@ -167,6 +168,14 @@ static void clock_sleeps_until_the_time_asked(void)
     CHECK(pal_clock_ns() >= when);
 }
 
+static void the_machine_has_the_same_name_twice(void)
+{
+    char a[PAL_MACHINE_TEXT], b[PAL_MACHINE_TEXT];
+    CHECK_TEXT(pal_machine_name(a), pal_machine_name(b));
+    CHECK(strlen(a) > 4 && strstr(a, "core") != NULL);
+    for (const char *c = a; *c; c++) CHECK(*c >= 0x20 && *c < 0x7f);
+}
+
 int main(void)
 {
     RUN(every_error_has_name_and_text);
@@ -178,5 +187,6 @@ int main(void)
     RUN(full_ring_refuses);
     RUN(quaternion_turns_like_its_matrix);
     RUN(clock_sleeps_until_the_time_asked);
+    RUN(the_machine_has_the_same_name_twice);
     return check_report();
 }
