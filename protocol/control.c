@@ -1,7 +1,7 @@
 /* Control messages as tables of fields, one table per message, read by one reader and written by one writer, so that
  * both directions agree by construction. The writer needs no memory; the reader hands text to cJSON only after its
  * size, nesting, number of values and UTF-8 were checked, so what cJSON allocates is bounded. */
-#include "protocol/control.h"
+#include "protocol/control_table.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -11,170 +11,6 @@
 
 enum { DEPTH_MAX = 8, VALUES_IN = 256, VALUES_OUT = 4096 };
 #define INTEGER_MAX 9007199254740992.0 /* 2^53 */
-#define FIXED       ((size_t)-1)
-
-typedef enum field_type {
-    U16,
-    U32,
-    U64,
-    F64,
-    BOOL,    /* not required: left out while it is false        */
-    TEXT,    /* char[size]                                      */
-    SAID,    /* the same, left out while it is empty            */
-    ROLE,    /* pal_wire_role as its name                       */
-    TOOL,    /* int: index, -1 any, none as null or absent      */
-    NUMBERS, /* double[max], counted or FIXED                   */
-    TEXTS,   /* char[max][size], counted                        */
-    OBJECT,  /* sub, whose offsets are those of the outer struct */
-    OBJECTS, /* struct[max] of size bytes, counted; not required: left out while there is none */
-    ARGS     /* object of numbers: pal_wire_arg[max], counted   */
-} field_type;
-
-typedef struct field {
-    const char *key; /* NULL ends a table */
-    field_type type;
-    bool required;
-    size_t offset, size;
-    size_t count; /* offset of the uint32_t count, or FIXED */
-    uint32_t max;
-    const struct field *sub;
-} field;
-
-#define AT(type, member)  offsetof(type, member)
-#define LEN(type, member) sizeof(((type *)0)->member)
-#define END                                                                                                            \
-    {                                                                                                                  \
-        0                                                                                                              \
-    }
-
-static const field part_fields[] = {
-    {"name", TEXT, true, AT(pal_wire_part_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"epoch", U32, true, AT(pal_wire_part_info, epoch), 0, 0, 0, NULL},
-    {"n_vertex", U32, true, AT(pal_wire_part_info, n_vertex), 0, 0, 0, NULL},
-    {"n_triangle", U32, true, AT(pal_wire_part_info, n_triangle), 0, 0, 0, NULL},
-    {"asset", TEXT, true, AT(pal_wire_part_info, asset), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
-    {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
-     PAL_WIRE_FIELDS_MAX, NULL},
-    {"adapts", BOOL, false, AT(pal_wire_part_info, adapts), 0, 0, 0, NULL},
-    {"sculpts", BOOL, false, AT(pal_wire_part_info, sculpts), 0, 0, 0, NULL},
-    END};
-static const field tool_fields[] = {{"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-                                    {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
-                                    END};
-static const field you_fields[] = {{"id", U16, true, AT(pal_wire_hello, you_id), 0, 0, 0, NULL},
-                                   {"role", ROLE, true, AT(pal_wire_hello, you_role), 0, 0, 0, NULL},
-                                   {"name", TEXT, true, AT(pal_wire_hello, you_name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-                                   {"tool", TOOL, false, AT(pal_wire_hello, you_tool), 0, 0, 0, NULL},
-                                   END};
-static const field hello_fields[] = {
-    {"version", U32, true, AT(pal_wire_hello, version), 0, 0, 0, NULL},
-    {"session", TEXT, true, AT(pal_wire_hello, session), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"title", TEXT, true, AT(pal_wire_hello, title), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"organ", TEXT, true, AT(pal_wire_hello, organ), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"accuracy", SAID, false, AT(pal_wire_hello, accuracy), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"step_rate_hz", F64, true, AT(pal_wire_hello, step_rate_hz), 0, 0, 0, NULL},
-    {"frame_rate_hz", F64, true, AT(pal_wire_hello, frame_rate_hz), 0, 0, 0, NULL},
-    {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
-    {"box_min_m", NUMBERS, true, AT(pal_wire_hello, box_min_m), 0, FIXED, 3, NULL},
-    {"box_max_m", NUMBERS, true, AT(pal_wire_hello, box_max_m), 0, FIXED, 3, NULL},
-    {"up", NUMBERS, true, AT(pal_wire_hello, up), 0, FIXED, 3, NULL},
-    {"parts", OBJECTS, true, AT(pal_wire_hello, part), sizeof(pal_wire_part_info), AT(pal_wire_hello, n_part),
-     PAL_WIRE_PART_MAX, part_fields},
-    {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),
-     PAL_WIRE_TOOL_MAX, tool_fields},
-    {"rows", TEXTS, true, AT(pal_wire_hello, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_row), PAL_WIRE_ROW_MAX,
-     NULL},
-    {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
-    END};
-static const field topology_fields[] = {{"parts", OBJECTS, true, AT(pal_wire_topology, part),
-                                         sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part), PAL_WIRE_PART_MAX,
-                                         part_fields},
-                                        END};
-static const field active_fields[] = {{"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},
-                                      {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
-                                      {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
-                                      {"of_nodes", U32, true, AT(pal_wire_active, n_all_node), 0, 0, 0, NULL},
-                                      {"of_springs", U32, true, AT(pal_wire_active, n_all_spring), 0, 0, 0, NULL},
-                                      END};
-static const field status_fields[] = {
-    {"tick", U64, true, AT(pal_wire_status, tick), 0, 0, 0, NULL},
-    {"sim_time_s", F64, true, AT(pal_wire_status, sim_time_s), 0, 0, 0, NULL},
-    {"paused", BOOL, true, AT(pal_wire_status, paused), 0, 0, 0, NULL},
-    {"frozen", BOOL, true, AT(pal_wire_status, frozen), 0, 0, 0, NULL},
-    {"step_rate_hz", F64, true, AT(pal_wire_status, step_rate_hz), 0, 0, 0, NULL},
-    {"slowdown", F64, true, AT(pal_wire_status, slowdown), 0, 0, 0, NULL},
-    {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
-    {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
-    {"row_ms", NUMBERS, true, AT(pal_wire_status, row_ms), 0, AT(pal_wire_status, n_row), PAL_WIRE_ROW_MAX, NULL},
-    {"rows", TEXTS, false, AT(pal_wire_status, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_status, n_row_name),
-     PAL_WIRE_ROW_MAX, NULL},
-    {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
-    {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
-    {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
-    {"skipped", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
-    {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
-    {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
-    {"note", TEXT, false, AT(pal_wire_status, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
-     PAL_WIRE_PART_MAX, active_fields},
-    END};
-static const field member_fields[] = {{"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
-                                      {"role", ROLE, true, AT(pal_wire_member, role), 0, 0, 0, NULL},
-                                      {"name", TEXT, true, AT(pal_wire_member, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-                                      {"tool", TOOL, false, AT(pal_wire_member, tool), 0, 0, 0, NULL},
-                                      {"colour", U32, true, AT(pal_wire_member, colour), 0, 0, 0, NULL},
-                                      END};
-static const field members_fields[] = {{"members", OBJECTS, true, AT(pal_wire_members, member), sizeof(pal_wire_member),
-                                        AT(pal_wire_members, n_member), PAL_WIRE_MEMBER_MAX, member_fields},
-                                       END};
-static const field error_fields[] = {{"code", TEXT, true, AT(pal_wire_problem, code), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-                                     {"text", TEXT, true, AT(pal_wire_problem, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-                                     END};
-static const field join_fields[] = {{"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-                                    {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
-                                    {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
-                                    {"patches", BOOL, false, AT(pal_wire_join, patches), 0, 0, 0, NULL},
-                                    END};
-static const field command_fields[] = {
-    {"verb", TEXT, true, AT(pal_wire_order, verb), LEN(pal_wire_order, verb), 0, 0, NULL},
-    {"target", TEXT, false, AT(pal_wire_order, target), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"args", ARGS, false, AT(pal_wire_order, arg), 0, AT(pal_wire_order, n_arg), PAL_WIRE_ARG_MAX, NULL},
-    END};
-static const field take_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, END};
-static const field leave_fields[] = {END};
-static const field view_fields[] = {{"part", U32, true, AT(pal_wire_view, part), 0, 0, 0, NULL},
-                                    {"field", TEXT, true, AT(pal_wire_view, field), PAL_WIRE_FIELD_BYTES, 0, 0, NULL},
-                                    END};
-static const field answer_fields[] = {
-    {"verb", TEXT, true, AT(pal_wire_answer, verb), LEN(pal_wire_answer, verb), 0, 0, NULL},
-    {"text", TEXT, true, AT(pal_wire_answer, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"args", ARGS, false, AT(pal_wire_answer, arg), 0, AT(pal_wire_answer, n_arg), PAL_WIRE_ARG_MAX, NULL},
-    END};
-static const field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
-
-static const struct {
-    const char *name;
-    bool from_server;
-    const field *fields;
-} message[PAL_CONTROL_COUNT] = {
-#define FIELDS_HELLO               hello_fields
-#define FIELDS_TOPOLOGY            topology_fields
-#define FIELDS_STATUS              status_fields
-#define FIELDS_MEMBERS             members_fields
-#define FIELDS_ERROR               error_fields
-#define FIELDS_PONG                stamp_fields
-#define FIELDS_JOIN                join_fields
-#define FIELDS_COMMAND             command_fields
-#define FIELDS_TAKE                take_fields
-#define FIELDS_LEAVE               leave_fields
-#define FIELDS_PING                stamp_fields
-#define FIELDS_VIEW                view_fields
-#define FIELDS_ANSWER              answer_fields
-#define X(name, text, from_server) {text, from_server, FIELDS_##name},
-    PAL_CONTROL_TABLE(X)
-#undef X
-};
 
 static const char *const role_name[PAL_WIRE_ROLE_COUNT] = {"viewer", "trainee", "instructor"};
 
@@ -185,7 +21,7 @@ const char *pal_wire_role_name(pal_wire_role role)
 
 const char *pal_control_name(pal_control_type type)
 {
-    return (unsigned)type < PAL_CONTROL_COUNT ? message[type].name : NULL;
+    return (unsigned)type < PAL_CONTROL_COUNT ? pal_control_message_table[type].name : NULL;
 }
 
 /* length of the well-formed UTF-8 sequence at s, 0 when there is none (overlong, surrogate, cut, beyond U+10FFFF) */
@@ -274,7 +110,7 @@ static void add_tool(writer *w, int tool)
         add_number(w, tool);
 }
 
-static uint32_t counted(const field *f, const uint8_t *base, int *refusal)
+static uint32_t counted(const pal_control_field *f, const uint8_t *base, int *refusal)
 {
     uint32_t n = f->max;
     if (f->count != FIXED) memcpy(&n, base + f->count, sizeof n);
@@ -290,7 +126,7 @@ static void add_key(writer *w, const char *key, bool first)
     add(w, "\":", 2);
 }
 
-static void add_scalar(writer *w, const field *f, const uint8_t *at)
+static void add_scalar(writer *w, const pal_control_field *f, const uint8_t *at)
 {
     uint16_t u16;
     uint32_t u32;
@@ -313,6 +149,7 @@ static void add_scalar(writer *w, const field *f, const uint8_t *at)
         add_number(w, (double)u64);
         break;
     case F64:
+    case KNOWN:
         memcpy(&f64, at, sizeof f64);
         add_number(w, f64);
         break;
@@ -327,9 +164,9 @@ static void add_scalar(writer *w, const field *f, const uint8_t *at)
     }
 }
 
-static void add_fields(writer *w, const field *f, const uint8_t *base, bool first);
+static void add_fields(writer *w, const pal_control_field *f, const uint8_t *base, bool first);
 
-static void add_list(writer *w, const field *f, const uint8_t *base)
+static void add_list(writer *w, const pal_control_field *f, const uint8_t *base)
 {
     uint32_t n = counted(f, base, &w->refusal);
     const uint8_t *at = base + f->offset;
@@ -338,7 +175,7 @@ static void add_list(writer *w, const field *f, const uint8_t *base)
         if (i && f->type != ARGS) add(w, ",", 1);
         if (f->type == NUMBERS) {
             add_number(w, ((const double *)(const void *)at)[i]);
-        } else if (f->type == TEXTS) {
+        } else if (f->type == TEXTS || f->type == TEXTS_SAID) {
             add_text(w, (const char *)at + i * f->size, f->size);
         } else if (f->type == OBJECTS) {
             add(w, "{", 1);
@@ -356,18 +193,24 @@ static void add_list(writer *w, const field *f, const uint8_t *base)
 }
 
 /* what nobody said is not written */
-static bool left_out(const field *f, const uint8_t *base)
+static bool left_out(const pal_control_field *f, const uint8_t *base)
 {
+    static const size_t size[] = {[U16] = 2, [U32] = 4, [U64] = 8, [F64] = 8, [BOOL] = sizeof(bool)};
+    static const uint8_t zero[8] = {0};
     uint32_t n = 1;
-    bool value = true;
+    double value = 0;
     if (f->required) return false;
     if (f->type == SAID) return !base[f->offset];
-    if (f->type == BOOL) memcpy(&value, base + f->offset, sizeof value);
-    if (f->type == OBJECTS) memcpy(&n, base + f->count, sizeof n);
-    return !value || n == 0;
+    if (f->type == KNOWN) {
+        memcpy(&value, base + f->offset, sizeof value);
+        return isnan(value);
+    }
+    if (f->type <= BOOL) return memcmp(base + f->offset, zero, size[f->type]) == 0;
+    if (f->type == OBJECTS || f->type == NUMBERS || f->type == TEXTS_SAID) memcpy(&n, base + f->count, sizeof n);
+    return n == 0;
 }
 
-static void add_fields(writer *w, const field *f, const uint8_t *base, bool first)
+static void add_fields(writer *w, const pal_control_field *f, const uint8_t *base, bool first)
 {
     for (; f->key && !w->refusal; f++) {
         if (left_out(f, base)) continue;
@@ -395,13 +238,13 @@ int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte)
 {
     writer w = {dst, cap, 0, 0};
     if ((unsigned)c->type >= PAL_CONTROL_COUNT) return PAL_REFUSAL_KIND;
-    size_t limit = message[c->type].from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX;
+    size_t limit = pal_control_message_table[c->type].from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX;
     if (w.cap > limit + 1) w.cap = limit + 1;
     if (w.cap == 0) return PAL_REFUSAL_SPACE;
     add(&w, "{\"type\":\"", 9);
-    add(&w, message[c->type].name, strlen(message[c->type].name));
+    add(&w, pal_control_message_table[c->type].name, strlen(pal_control_message_table[c->type].name));
     add(&w, "\"", 1);
-    add_fields(&w, message[c->type].fields, (const uint8_t *)&c->hello, false);
+    add_fields(&w, pal_control_message_table[c->type].fields, (const uint8_t *)&c->hello, false);
     add(&w, "}", 1);
     if (!w.refusal) *n_byte = w.n;
     return w.refusal;
@@ -477,7 +320,7 @@ static int read_role(const cJSON *item, pal_wire_role *out)
     return PAL_REFUSAL_FIELD;
 }
 
-static int read_scalar(const field *f, const cJSON *item, uint8_t *at)
+static int read_scalar(const pal_control_field *f, const cJSON *item, uint8_t *at)
 {
     static const double most[] = {[U16] = 65535, [U32] = 4294967295.0, [U64] = INTEGER_MAX};
     double v = 0;
@@ -490,7 +333,7 @@ static int read_scalar(const field *f, const cJSON *item, uint8_t *at)
         if (f->type == U16) memcpy(at, &u16, sizeof u16);
         if (f->type == U32) memcpy(at, &u32, sizeof u32);
         if (f->type == U64) memcpy(at, &u64, sizeof u64);
-    } else if (f->type == F64) {
+    } else if (f->type == F64 || f->type == KNOWN) {
         refusal = read_number(item, &v);
         memcpy(at, &v, sizeof v);
     } else if (f->type == BOOL) {
@@ -509,9 +352,9 @@ static int read_scalar(const field *f, const cJSON *item, uint8_t *at)
     return refusal;
 }
 
-static int read_fields(const field *f, const cJSON *object, uint8_t *base);
+static int read_fields(const pal_control_field *f, const cJSON *object, uint8_t *base);
 
-static int read_list(const field *f, const cJSON *list, uint8_t *base)
+static int read_list(const pal_control_field *f, const cJSON *list, uint8_t *base)
 {
     uint32_t n = 0;
     int refusal = 0;
@@ -521,7 +364,7 @@ static int read_list(const field *f, const cJSON *list, uint8_t *base)
         if (n >= f->max) return PAL_REFUSAL_COUNT;
         if (f->type == NUMBERS) {
             refusal = read_number(item, (double *)(void *)at + n);
-        } else if (f->type == TEXTS) {
+        } else if (f->type == TEXTS || f->type == TEXTS_SAID) {
             refusal = read_text(item, (char *)at + n * f->size, f->size);
         } else if (f->type == OBJECTS) {
             refusal = read_fields(f->sub, item, at + n * f->size);
@@ -539,7 +382,7 @@ static int read_list(const field *f, const cJSON *list, uint8_t *base)
     return 0;
 }
 
-static int read_fields(const field *f, const cJSON *object, uint8_t *base)
+static int read_fields(const pal_control_field *f, const cJSON *object, uint8_t *base)
 {
     int refusal = cJSON_IsObject(object) ? PAL_REFUSAL_NONE : PAL_REFUSAL_FIELD;
     for (; f->key && !refusal; f++) {
@@ -547,7 +390,9 @@ static int read_fields(const field *f, const cJSON *object, uint8_t *base)
         bool absent = !item || (f->type == TOOL && cJSON_IsNull(item));
         if (absent) {
             const int none = PAL_WIRE_TOOL_NONE;
+            const double unknown = NAN;
             if (f->type == TOOL) memcpy(base + f->offset, &none, sizeof none);
+            if (f->type == KNOWN) memcpy(base + f->offset, &unknown, sizeof unknown);
             if (f->required) refusal = PAL_REFUSAL_FIELD;
         } else if (f->type == TEXT || f->type == SAID) {
             refusal = read_text(item, (char *)base + f->offset, f->size);
@@ -567,10 +412,11 @@ static int read_message(const cJSON *root, bool from_server, pal_control *c)
     const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(root, "type"));
     if (!cJSON_IsObject(root) || !name) return PAL_REFUSAL_FIELD;
     int type = 0;
-    while (type < PAL_CONTROL_COUNT && strcmp(message[type].name, name)) type++;
-    if (type == PAL_CONTROL_COUNT || message[type].from_server != from_server) return PAL_REFUSAL_KIND;
+    while (type < PAL_CONTROL_COUNT && strcmp(pal_control_message_table[type].name, name)) type++;
+    if (type == PAL_CONTROL_COUNT || pal_control_message_table[type].from_server != from_server)
+        return PAL_REFUSAL_KIND;
     c->type = (pal_control_type)type;
-    return read_fields(message[type].fields, root, (uint8_t *)&c->hello);
+    return read_fields(pal_control_message_table[type].fields, root, (uint8_t *)&c->hello);
 }
 
 int pal_control_get(const char *text, size_t n_byte, bool from_server, pal_control *out)

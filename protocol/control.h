@@ -14,18 +14,23 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define PAL_CONTROL_IN_MAX   4096  /* bytes of a text message from a client */
-#define PAL_CONTROL_OUT_MAX  65536 /* bytes of a text message from the server */
-#define PAL_WIRE_NAME_BYTES  64
-#define PAL_WIRE_TEXT_BYTES  256
-#define PAL_WIRE_ROW_MAX     64
-#define PAL_WIRE_MEMBER_MAX  256
-#define PAL_WIRE_MEMBER_NAME 32
-#define PAL_WIRE_ARG_MAX     16
-#define PAL_WIRE_FIELDS_MAX  8 /* fields that a part may offer */
-#define PAL_WIRE_FIELD_BYTES 24
-#define PAL_WIRE_TOOL_ANY    (-1)
-#define PAL_WIRE_TOOL_NONE   (-2)
+#define PAL_CONTROL_IN_MAX     4096  /* bytes of a text message from a client */
+#define PAL_CONTROL_OUT_MAX    65536 /* bytes of a text message from the server */
+#define PAL_WIRE_NAME_BYTES    64
+#define PAL_WIRE_TEXT_BYTES    256
+#define PAL_WIRE_ROW_MAX       64
+#define PAL_WIRE_MEMBER_MAX    256
+#define PAL_WIRE_MEMBER_NAME   32
+#define PAL_WIRE_ARG_MAX       16
+#define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
+#define PAL_WIRE_FIELD_BYTES   24
+#define PAL_WIRE_WHY_BYTES     128
+#define PAL_WIRE_LABEL_BYTES   120
+#define PAL_WIRE_METHOD_BYTES  32
+#define PAL_WIRE_POINT_MAX     128 /* points of a study that are sent; a point's own index may be larger */
+#define PAL_WIRE_NEIGHBOUR_MAX 8
+#define PAL_WIRE_TOOL_ANY      (-1)
+#define PAL_WIRE_TOOL_NONE     (-2)
 
 /* X(NAME, "type in JSON", from server) */
 #define PAL_CONTROL_TABLE(X)                                                                                           \
@@ -36,6 +41,8 @@
     X(ERROR, "error", true)       /* a request was refused, the connection stays                     */                \
     X(PONG, "pong", true)         /* answer to ping                                                  */                \
     X(ANSWER, "answer", true)     /* a command of sculpting was done, or what was asked for          */                \
+    X(STUDY, "study", true)       /* what a body costs and errs in other settings; to who said `estimate` */           \
+    X(ESTIMATE, "estimate", true) /* 2-4 Hz to who said `estimate`: cost and error of a body now          */           \
     X(JOIN, "join", false)        /* first message of a client                                       */                \
     X(COMMAND, "command", false)  /* pause, resume, step, reset, material ...                        */                \
     X(TAKE, "take", false)        /* take a tool                                                     */                \
@@ -70,9 +77,16 @@ typedef struct pal_wire_part_info {
     bool sculpts; /* its control cells and material can be changed by commands; false is not on the wire */
     bool adapts;  /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
 } pal_wire_part_info; /* its place in the array is its part index   */
+/* rows of a plan in order, of hello, topology and status: each with the part whose body it works on, -1 the whole
+ * scene, and why it is there (which key of the scene called for it). n_row_part and n_row_why 0: nobody said, and then
+ * they are not on the wire; else as many as there are rows */
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
+    uint32_t n_row, n_row_part, n_row_why; /* n_row 0: the rows did not change */
+    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES];
+    double row_part[PAL_WIRE_ROW_MAX];
+    char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
 } pal_wire_topology;
 
 typedef struct pal_wire_tool_info {
@@ -94,7 +108,11 @@ typedef struct pal_wire_hello {
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
     char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
-    uint16_t you_id;                                 /* member id, > 0                                              */
+    uint32_t n_row_part, n_row_why;
+    double row_part[PAL_WIRE_ROW_MAX];
+    char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
+    bool estimates;  /* `estimate` may be asked for; false is not on the wire */
+    uint16_t you_id; /* member id, > 0                                              */
     pal_wire_role you_role;
     char you_name[PAL_WIRE_MEMBER_NAME];
     int you_tool; /* tool given, or PAL_WIRE_TOOL_NONE                                */
@@ -106,6 +124,21 @@ typedef struct pal_wire_active {
     uint32_t n_node, n_spring;         /* now                                      */
     uint32_t n_all_node, n_all_spring; /* and if all of it were of its finest level */
 } pal_wire_active;
+
+/* a part of which there is something to tell; what is false, empty or 0 is not on the wire */
+typedef struct pal_wire_part_state {
+    uint32_t part;
+    bool frozen;                  /* its guard has stopped it; `reset` with its body as target brings it back */
+    bool asleep;                  /* at rest: its rows do not run                                     */
+    char why[PAL_WIRE_WHY_BYTES]; /* it was stopped, one sentence                                  */
+    uint64_t n_rescue;            /* steps that would have gone wrong without a guard, total         */
+    double rescue_ms;             /* what they took, total                                           */
+} pal_wire_part_state;
+/* a row that was switched off and could be switched on */
+typedef struct pal_wire_off {
+    char row[PAL_WIRE_NAME_BYTES];
+    uint32_t part;
+} pal_wire_off;
 
 typedef struct pal_wire_status {
     uint64_t tick; /* steps done                                                     */
@@ -128,6 +161,13 @@ typedef struct pal_wire_status {
     char note[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
     uint32_t n_active;              /* parts that adapt; 0: not on the wire                     */
     pal_wire_active active[PAL_WIRE_PART_MAX];
+    uint32_t n_row_part; /* with n_row_name                                           */
+    double row_part[PAL_WIRE_ROW_MAX];
+    uint32_t n_state; /* parts that are frozen or asleep or were rescued           */
+    pal_wire_part_state state[PAL_WIRE_PART_MAX];
+    uint32_t n_off;
+    pal_wire_off off[PAL_WIRE_ROW_MAX];
+    uint64_t n_unwatched; /* steps of which nothing was shown because nobody looked     */
 } pal_wire_status;
 
 typedef struct pal_wire_member {
@@ -173,6 +213,47 @@ typedef struct pal_wire_answer {
     pal_wire_arg arg[PAL_WIRE_ARG_MAX];
 } pal_wire_answer;
 
+/* one setting of a study: what it costs and how far off it is (README.md, "What accuracy costs") */
+typedef struct pal_wire_point {
+    uint32_t index;                     /* in the server's list: arg of the order `point`        */
+    char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */
+    char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
+    double ms, error_m;                 /* of a step, as the study measured it; largest error    */
+    bool front;                         /* nothing else is both cheaper and nearer              */
+} pal_wire_point;
+typedef struct pal_wire_study {
+    char body[PAL_WIRE_NAME_BYTES];
+    uint32_t n_point; /* 0: there is no study, `estimate` alone */
+    pal_wire_point point[PAL_WIRE_POINT_MAX];
+} pal_wire_study;
+
+/* a neighbour on a knob, as foreseen; NaN: not known, and not on the wire */
+typedef struct pal_wire_neighbour {
+    char knob[PAL_WIRE_METHOD_BYTES]; /* "resolution", "step", "tolerance", "method"                      */
+    char label[PAL_WIRE_LABEL_BYTES];
+    double ms, error_m;
+    uint32_t size; /* args of the order `knob`; 0: as it is, and not on the wire */
+    double step_ms, tolerance;
+} pal_wire_neighbour;
+/* where a body stands now; NaN: not known, and not on the wire */
+typedef struct pal_wire_estimate {
+    char body[PAL_WIRE_NAME_BYTES];
+    char setting[PAL_WIRE_LABEL_BYTES]; /* the present one, for people                           */
+    double point;                       /* its index in the study; NaN: it is none of those      */
+    uint64_t tick;                      /* of the state that was looked at; 0: there is none yet */
+    double time_s;
+    double ms;      /* of a live step, median of the last second                              */
+    double own_ms;  /* processor time that the estimate took                                  */
+    double most_m;  /* largest displacement then                                              */
+    double error_m; /* largest error of a displacement, of these parts together:              */
+    double discretisation_m, algebraic_m, time_m, model_m;
+    double zz_percent;              /* error over solution, in energy                          */
+    bool locking;                   /* the estimate is known to be too small                   */
+    char note[PAL_WIRE_TEXT_BYTES]; /* what is not known and why, or ""                        */
+    uint32_t n_neighbour;
+    pal_wire_neighbour neighbour[PAL_WIRE_NEIGHBOUR_MAX];
+} pal_wire_estimate;
+
 typedef struct pal_wire_view {
     uint32_t part;
     char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
@@ -192,6 +273,8 @@ typedef struct pal_control {
         double stamp_ms;      /* ping, pong: the pinger's own clock         */
         pal_wire_view view;
         pal_wire_answer answer;
+        pal_wire_study study;
+        pal_wire_estimate estimate;
     };
 } pal_control;
 
@@ -203,6 +286,6 @@ const char *pal_control_name(pal_control_type type);
 int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte);
 
 /* Reads one text message. from_server: which direction is expected here; a type of the other direction is refused with
- * KIND. LONG above the limit of that direction. *out is about 20 KiB and is overwritten only on success. */
+ * KIND. LONG above the limit of that direction. *out is about 30 KiB and is overwritten only on success. */
 int pal_control_get(const char *text, size_t n_byte, bool from_server, pal_control *out);
 #endif

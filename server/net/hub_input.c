@@ -166,7 +166,7 @@ static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
     /* read into a copy of its own: answers are made in hub->control */
-    static pal_control in; /* about 20 KiB, [net] only */
+    static pal_control in; /* about 30 KiB, [net] only */
     int refusal = pal_control_get((const char *)bytes, n_byte, false, &in);
     hub->count.n_control++;
     if (refusal) {

@@ -173,12 +173,50 @@ static inline pal_patch_head golden_patch(void)
 }
 
 /* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
-enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 5 };
+enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 10 };
 static inline pal_control_type golden_line_type(int line)
 {
-    static const pal_control_type more[] = {PAL_CONTROL_HELLO, PAL_CONTROL_HELLO, PAL_CONTROL_STATUS, PAL_CONTROL_JOIN,
-                                            PAL_CONTROL_HELLO};
+    static const pal_control_type more[] = {
+        PAL_CONTROL_HELLO, PAL_CONTROL_HELLO,    PAL_CONTROL_STATUS, PAL_CONTROL_JOIN,  PAL_CONTROL_HELLO,
+        PAL_CONTROL_HELLO, PAL_CONTROL_TOPOLOGY, PAL_CONTROL_STATUS, PAL_CONTROL_STUDY, PAL_CONTROL_ESTIMATE};
     return line < PAL_CONTROL_COUNT ? (pal_control_type)line : more[line - PAL_CONTROL_COUNT];
+}
+
+static inline void golden_study(pal_wire_study *s)
+{
+    *s = (pal_wire_study){"liver", 2, {{.index = 0}}};
+    s->point[0] = (pal_wire_point){3, "tet_springs", "tet_springs, 8 voxels", 1.0 / 3, 0.0021, false};
+    s->point[1] = (pal_wire_point){250, "fem hex8_bbar", "fem \"hex8_bbar\", 16 voxels", 16.7, 4.5e-4, true};
+}
+
+static inline void golden_estimate(pal_wire_estimate *e)
+{
+    *e = (pal_wire_estimate){.body = "liver",
+                             .setting = "fem hex8_bbar corotational, 16 voxels",
+                             .point = 250,
+                             .tick = 1234567890123,
+                             .time_s = 1.5,
+                             .ms = 16.25,
+                             .own_ms = 81.5,
+                             .most_m = 0.0125,
+                             .error_m = 1e-3,
+                             .discretisation_m = 7e-4,
+                             .algebraic_m = 1e-9,
+                             .time_m = 2e-4,
+                             .model_m = 1e-4,
+                             .zz_percent = 12.5,
+                             .locking = true,
+                             .note = "nearly incompressible",
+                             .n_neighbour = 2};
+    e->neighbour[0] = (pal_wire_neighbour){"resolution", "fem, 24 voxels", 54.2, 3e-4, 24, 0, 0};
+    e->neighbour[1] = (pal_wire_neighbour){"tolerance", "fem, 0.01", NAN, NAN, 0, 0, 0.01};
+}
+
+/* nothing is known yet: what is not a number is not on the wire */
+static inline void golden_no_estimate(pal_wire_estimate *e)
+{
+    *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .most_m = NAN};
+    e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->zz_percent = NAN;
 }
 
 static inline void golden_control(pal_control_type type, pal_control *c)
@@ -230,6 +268,12 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     case PAL_CONTROL_ANSWER:
         c->answer = (pal_wire_answer){"extrude", "28 cells", 2, {{"cells", 28}, {"can_undo", 1}}};
         break;
+    case PAL_CONTROL_STUDY:
+        snprintf(c->study.body, sizeof c->study.body, "liver");
+        break;
+    case PAL_CONTROL_ESTIMATE:
+        golden_no_estimate(&c->estimate);
+        break;
     case PAL_CONTROL_TAKE:
         c->tool = 2;
         break;
@@ -245,6 +289,30 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     }
 }
 
+/* what came with settings, rescues and switches of rows */
+static inline void golden_rows(uint32_t n, uint32_t *n_part, double *part, uint32_t *n_why,
+                               char (*why)[PAL_WIRE_WHY_BYTES])
+{
+    *n_part = *n_why = n;
+    for (uint32_t i = 0; i < n; i++) {
+        part[i] = (double)i - 1;
+        snprintf(why[i], PAL_WIRE_WHY_BYTES, "bodies[0].model \"fem\" %u", i);
+    }
+}
+
+static inline void golden_status(pal_wire_status *s)
+{
+    s->n_row_part = 3;
+    s->row_part[0] = -1;
+    s->row_part[2] = 15;
+    s->n_state = 2;
+    s->state[0] = (pal_wire_part_state){0, true, false, "node 512 moves at 3,200 m/s", 17, 0.25};
+    s->state[1] = (pal_wire_part_state){2, false, true, "", 0, 0};
+    s->n_off = 1;
+    s->off[0] = (pal_wire_off){"gravity", 1};
+    s->n_unwatched = 123456789012;
+}
+
 static inline void golden_line(int line, pal_control *c)
 {
     golden_control(golden_line_type(line), c);
@@ -257,5 +325,17 @@ static inline void golden_line(int line, pal_control *c)
     }
     if (line == PAL_CONTROL_COUNT + 3) c->join.patches = true;
     if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].sculpts = true;
+    if (line == PAL_CONTROL_COUNT + 5) {
+        c->hello.estimates = true;
+        golden_rows(3, &c->hello.n_row_part, c->hello.row_part, &c->hello.n_row_why, c->hello.row_why);
+    }
+    if (line == PAL_CONTROL_COUNT + 6) {
+        c->topology.n_row = 2;
+        for (int i = 0; i < 2; i++) snprintf(c->topology.row[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
+        golden_rows(2, &c->topology.n_row_part, c->topology.row_part, &c->topology.n_row_why, c->topology.row_why);
+    }
+    if (line == PAL_CONTROL_COUNT + 7) golden_status(&c->status);
+    if (line == PAL_CONTROL_COUNT + 8) golden_study(&c->study);
+    if (line == PAL_CONTROL_COUNT + 9) golden_estimate(&c->estimate);
 }
 #endif

@@ -140,6 +140,38 @@ static void reads_messages_of_before_fields(void)
     CHECK_INT(pal_control_get(status, sizeof status - 1, true, &c), 0);
     CHECK_INT(c.status.n_row_name, 0);
     CHECK_INT(c.status.n_active, 0);
+    CHECK_INT(c.status.n_state, 0);
+    CHECK_INT(c.status.n_off, 0);
+    CHECK_INT(c.status.n_row_part, 0);
+    CHECK(c.status.n_unwatched == 0);
+    static const char topology[] = "{\"type\":\"topology\",\"parts\":[]}";
+    CHECK_INT(pal_control_get(topology, sizeof topology - 1, true, &c), 0);
+    CHECK_INT(c.topology.n_row, 0);
+}
+
+/* a number that nobody knows is NaN here and not there on the wire; what is required is never left out */
+static void what_is_not_known_is_not_written(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    static pal_control estimate;
+    size_t n;
+    golden_control(PAL_CONTROL_ESTIMATE, &estimate);
+    REQUIRE(pal_control_put(text, sizeof text, &estimate, &n) == 0);
+    CHECK(!strstr(text, "error_m") && !strstr(text, "nan") && strstr(text, "\"own_ms\":0"));
+    REQUIRE(pal_control_get(text, n, true, &c) == 0);
+    CHECK(isnan(c.estimate.error_m) && isnan(c.estimate.model_m) && isnan(c.estimate.point));
+    estimate.estimate.own_ms = NAN;
+    CHECK_INT(pal_control_put(text, sizeof text, &estimate, &n), PAL_REFUSAL_NAN);
+    estimate.estimate.own_ms = 0;
+    estimate.estimate.error_m = INFINITY;
+    CHECK_INT(pal_control_put(text, sizeof text, &estimate, &n), PAL_REFUSAL_NAN);
+    estimate.estimate.error_m = 0; /* known to be none: another thing than not known */
+    REQUIRE(pal_control_put(text, sizeof text, &estimate, &n) == 0);
+    CHECK(strstr(text, "\"error_m\":0"));
+    static const char bad[] =
+        "{\"type\":\"study\",\"body\":\"a\",\"points\":[{\"index\":0,\"method\":\"fem\",\"label\":\"\","
+        "\"ms\":1}]}";
+    CHECK_INT(pal_control_get(bad, sizeof bad - 1, true, &c), PAL_REFUSAL_FIELD);
 }
 
 /* an empty text is as good as none, and is not written */
@@ -208,6 +240,8 @@ static void largest_messages_fit_their_limit(void)
     full.hello.n_row = PAL_WIRE_ROW_MAX;
     golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
     for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
+    full.hello.n_row_part = full.hello.n_row_why = PAL_WIRE_ROW_MAX;
+    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row_why[i], '"', PAL_WIRE_WHY_BYTES - 1);
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
@@ -223,10 +257,36 @@ static void largest_messages_fit_their_limit(void)
     for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) {
         full.status.row_ms[i] = 1 / 3.0;
         memset(full.status.row[i], '"', PAL_WIRE_NAME_BYTES - 1);
+        memset(full.status.off[i].row, '"', PAL_WIRE_NAME_BYTES - 1);
+        full.status.row_part[i] = -1;
+    }
+    full.status.n_row_part = full.status.n_off = PAL_WIRE_ROW_MAX;
+    full.status.n_state = PAL_WIRE_PART_MAX;
+    for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
+        full.status.state[i] = (pal_wire_part_state){i, true, true, "", 9007199254740991, 1 / 3.0};
+        memset(full.status.state[i].why, '"', PAL_WIRE_WHY_BYTES - 1);
     }
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
     CHECK(again.status.n_active == PAL_WIRE_PART_MAX && again.status.active[15].n_all_spring == UINT32_MAX);
+    CHECK(again.status.n_state == PAL_WIRE_PART_MAX && again.status.state[15].n_rescue == 9007199254740991);
+}
+
+static void the_largest_study_fits_its_limit(void)
+{
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    static pal_control full, again;
+    size_t n;
+    full.type = PAL_CONTROL_STUDY;
+    full.study.n_point = PAL_WIRE_POINT_MAX;
+    for (uint32_t i = 0; i < PAL_WIRE_POINT_MAX; i++) {
+        full.study.point[i] = (pal_wire_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true};
+        memset(full.study.point[i].label, '"', PAL_WIRE_LABEL_BYTES - 1);
+        memset(full.study.point[i].method, '"', PAL_WIRE_METHOD_BYTES - 1);
+    }
+    CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
+    CHECK_INT(pal_control_get(text, n, true, &again), 0);
+    CHECK_TEXT(again.study.point[PAL_WIRE_POINT_MAX - 1].label, full.study.point[0].label);
 }
 
 static void writer_refuses_what_the_reader_would(void)
@@ -261,9 +321,11 @@ int main(void)
     RUN(refuses_what_is_no_message);
     RUN(refuses_text_beyond_the_limits_before_parsing_it);
     RUN(reads_messages_of_before_fields);
+    RUN(what_is_not_known_is_not_written);
     RUN(accuracy_is_said_only_where_there_is_one);
     RUN(refuses_every_prefix);
     RUN(largest_messages_fit_their_limit);
+    RUN(the_largest_study_fits_its_limit);
     RUN(writer_refuses_what_the_reader_would);
     return check_report();
 }

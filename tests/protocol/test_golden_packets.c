@@ -254,6 +254,13 @@ static void control_lines_are_read_and_written_as_committed(void)
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].sculpts, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
         if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.patches, at == PAL_CONTROL_COUNT + 3);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.estimates, at == PAL_CONTROL_COUNT + 5);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.n_row_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
+        if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.n_row_why, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
+        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.state[0].n_rescue, at == PAL_CONTROL_COUNT + 7 ? 17 : 0);
+        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_off, at == PAL_CONTROL_COUNT + 7);
+        if (kind == PAL_CONTROL_STUDY) CHECK_INT(c.study.point[1].front, at == PAL_CONTROL_COUNT + 8);
+        if (kind == PAL_CONTROL_ESTIMATE) CHECK_INT(isnan(c.estimate.error_m), at != PAL_CONTROL_COUNT + 9);
         /* what was read writes the same text, and so does the content itself */
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
         CHECK_TEXT(again, line);

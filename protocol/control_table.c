@@ -1,0 +1,216 @@
+/* Which fields each control message has, in the order in which they are written. */
+#include "protocol/control_table.h"
+
+#define AT(type, member)  offsetof(type, member)
+#define LEN(type, member) sizeof(((type *)0)->member)
+#define END                                                                                                            \
+    {                                                                                                                  \
+        0                                                                                                              \
+    }
+
+static const pal_control_field part_fields[] = {
+    {"name", TEXT, true, AT(pal_wire_part_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"epoch", U32, true, AT(pal_wire_part_info, epoch), 0, 0, 0, NULL},
+    {"n_vertex", U32, true, AT(pal_wire_part_info, n_vertex), 0, 0, 0, NULL},
+    {"n_triangle", U32, true, AT(pal_wire_part_info, n_triangle), 0, 0, 0, NULL},
+    {"asset", TEXT, true, AT(pal_wire_part_info, asset), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
+    {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
+     PAL_WIRE_FIELDS_MAX, NULL},
+    {"adapts", BOOL, false, AT(pal_wire_part_info, adapts), 0, 0, 0, NULL},
+    {"sculpts", BOOL, false, AT(pal_wire_part_info, sculpts), 0, 0, 0, NULL},
+    END};
+static const pal_control_field tool_fields[] = {
+    {"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
+    END};
+static const pal_control_field you_fields[] = {
+    {"id", U16, true, AT(pal_wire_hello, you_id), 0, 0, 0, NULL},
+    {"role", ROLE, true, AT(pal_wire_hello, you_role), 0, 0, 0, NULL},
+    {"name", TEXT, true, AT(pal_wire_hello, you_name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+    {"tool", TOOL, false, AT(pal_wire_hello, you_tool), 0, 0, 0, NULL},
+    END};
+static const pal_control_field hello_fields[] = {
+    {"version", U32, true, AT(pal_wire_hello, version), 0, 0, 0, NULL},
+    {"session", TEXT, true, AT(pal_wire_hello, session), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"title", TEXT, true, AT(pal_wire_hello, title), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"organ", TEXT, true, AT(pal_wire_hello, organ), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"accuracy", SAID, false, AT(pal_wire_hello, accuracy), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"step_rate_hz", F64, true, AT(pal_wire_hello, step_rate_hz), 0, 0, 0, NULL},
+    {"frame_rate_hz", F64, true, AT(pal_wire_hello, frame_rate_hz), 0, 0, 0, NULL},
+    {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
+    {"box_min_m", NUMBERS, true, AT(pal_wire_hello, box_min_m), 0, FIXED, 3, NULL},
+    {"box_max_m", NUMBERS, true, AT(pal_wire_hello, box_max_m), 0, FIXED, 3, NULL},
+    {"up", NUMBERS, true, AT(pal_wire_hello, up), 0, FIXED, 3, NULL},
+    {"parts", OBJECTS, true, AT(pal_wire_hello, part), sizeof(pal_wire_part_info), AT(pal_wire_hello, n_part),
+     PAL_WIRE_PART_MAX, part_fields},
+    {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),
+     PAL_WIRE_TOOL_MAX, tool_fields},
+    {"rows", TEXTS, true, AT(pal_wire_hello, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_row), PAL_WIRE_ROW_MAX,
+     NULL},
+    {"row_parts", NUMBERS, false, AT(pal_wire_hello, row_part), 0, AT(pal_wire_hello, n_row_part), PAL_WIRE_ROW_MAX,
+     NULL},
+    {"row_whys", TEXTS_SAID, false, AT(pal_wire_hello, row_why), PAL_WIRE_WHY_BYTES, AT(pal_wire_hello, n_row_why),
+     PAL_WIRE_ROW_MAX, NULL},
+    {"estimates", BOOL, false, AT(pal_wire_hello, estimates), 0, 0, 0, NULL},
+    {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
+    END};
+static const pal_control_field topology_fields[] = {
+    {"parts", OBJECTS, true, AT(pal_wire_topology, part), sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part),
+     PAL_WIRE_PART_MAX, part_fields},
+    {"rows", TEXTS_SAID, false, AT(pal_wire_topology, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_topology, n_row),
+     PAL_WIRE_ROW_MAX, NULL},
+    {"row_parts", NUMBERS, false, AT(pal_wire_topology, row_part), 0, AT(pal_wire_topology, n_row_part),
+     PAL_WIRE_ROW_MAX, NULL},
+    {"row_whys", TEXTS_SAID, false, AT(pal_wire_topology, row_why), PAL_WIRE_WHY_BYTES,
+     AT(pal_wire_topology, n_row_why), PAL_WIRE_ROW_MAX, NULL},
+    END};
+static const pal_control_field active_fields[] = {
+    {"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},
+    {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
+    {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
+    {"of_nodes", U32, true, AT(pal_wire_active, n_all_node), 0, 0, 0, NULL},
+    {"of_springs", U32, true, AT(pal_wire_active, n_all_spring), 0, 0, 0, NULL},
+    END};
+static const pal_control_field state_fields[] = {
+    {"part", U32, true, AT(pal_wire_part_state, part), 0, 0, 0, NULL},
+    {"frozen", BOOL, false, AT(pal_wire_part_state, frozen), 0, 0, 0, NULL},
+    {"asleep", BOOL, false, AT(pal_wire_part_state, asleep), 0, 0, 0, NULL},
+    {"why", SAID, false, AT(pal_wire_part_state, why), PAL_WIRE_WHY_BYTES, 0, 0, NULL},
+    {"rescues", U64, false, AT(pal_wire_part_state, n_rescue), 0, 0, 0, NULL},
+    {"rescue_ms", F64, false, AT(pal_wire_part_state, rescue_ms), 0, 0, 0, NULL},
+    END};
+static const pal_control_field off_fields[] = {
+    {"row", TEXT, true, AT(pal_wire_off, row), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"part", U32, true, AT(pal_wire_off, part), 0, 0, 0, NULL},
+    END};
+static const pal_control_field status_fields[] = {
+    {"tick", U64, true, AT(pal_wire_status, tick), 0, 0, 0, NULL},
+    {"sim_time_s", F64, true, AT(pal_wire_status, sim_time_s), 0, 0, 0, NULL},
+    {"paused", BOOL, true, AT(pal_wire_status, paused), 0, 0, 0, NULL},
+    {"frozen", BOOL, true, AT(pal_wire_status, frozen), 0, 0, 0, NULL},
+    {"step_rate_hz", F64, true, AT(pal_wire_status, step_rate_hz), 0, 0, 0, NULL},
+    {"slowdown", F64, true, AT(pal_wire_status, slowdown), 0, 0, 0, NULL},
+    {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
+    {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
+    {"row_ms", NUMBERS, true, AT(pal_wire_status, row_ms), 0, AT(pal_wire_status, n_row), PAL_WIRE_ROW_MAX, NULL},
+    {"rows", TEXTS, false, AT(pal_wire_status, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_status, n_row_name),
+     PAL_WIRE_ROW_MAX, NULL},
+    {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
+    {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
+    {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
+    {"skipped", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
+    {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
+    {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
+    {"note", TEXT, false, AT(pal_wire_status, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
+     PAL_WIRE_PART_MAX, active_fields},
+    {"row_parts", NUMBERS, false, AT(pal_wire_status, row_part), 0, AT(pal_wire_status, n_row_part), PAL_WIRE_ROW_MAX,
+     NULL},
+    {"parts", OBJECTS, false, AT(pal_wire_status, state), sizeof(pal_wire_part_state), AT(pal_wire_status, n_state),
+     PAL_WIRE_PART_MAX, state_fields},
+    {"off", OBJECTS, false, AT(pal_wire_status, off), sizeof(pal_wire_off), AT(pal_wire_status, n_off),
+     PAL_WIRE_ROW_MAX, off_fields},
+    {"unwatched", U64, false, AT(pal_wire_status, n_unwatched), 0, 0, 0, NULL},
+    END};
+static const pal_control_field member_fields[] = {
+    {"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
+    {"role", ROLE, true, AT(pal_wire_member, role), 0, 0, 0, NULL},
+    {"name", TEXT, true, AT(pal_wire_member, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+    {"tool", TOOL, false, AT(pal_wire_member, tool), 0, 0, 0, NULL},
+    {"colour", U32, true, AT(pal_wire_member, colour), 0, 0, 0, NULL},
+    END};
+static const pal_control_field members_fields[] = {{"members", OBJECTS, true, AT(pal_wire_members, member),
+                                                    sizeof(pal_wire_member), AT(pal_wire_members, n_member),
+                                                    PAL_WIRE_MEMBER_MAX, member_fields},
+                                                   END};
+static const pal_control_field error_fields[] = {
+    {"code", TEXT, true, AT(pal_wire_problem, code), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"text", TEXT, true, AT(pal_wire_problem, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    END};
+static const pal_control_field join_fields[] = {
+    {"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
+    {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
+    {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
+    {"patches", BOOL, false, AT(pal_wire_join, patches), 0, 0, 0, NULL},
+    END};
+static const pal_control_field command_fields[] = {
+    {"verb", TEXT, true, AT(pal_wire_order, verb), LEN(pal_wire_order, verb), 0, 0, NULL},
+    {"target", TEXT, false, AT(pal_wire_order, target), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"args", ARGS, false, AT(pal_wire_order, arg), 0, AT(pal_wire_order, n_arg), PAL_WIRE_ARG_MAX, NULL},
+    END};
+static const pal_control_field take_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, END};
+static const pal_control_field leave_fields[] = {END};
+static const pal_control_field view_fields[] = {
+    {"part", U32, true, AT(pal_wire_view, part), 0, 0, 0, NULL},
+    {"field", TEXT, true, AT(pal_wire_view, field), PAL_WIRE_FIELD_BYTES, 0, 0, NULL},
+    END};
+static const pal_control_field answer_fields[] = {
+    {"verb", TEXT, true, AT(pal_wire_answer, verb), LEN(pal_wire_answer, verb), 0, 0, NULL},
+    {"text", TEXT, true, AT(pal_wire_answer, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"args", ARGS, false, AT(pal_wire_answer, arg), 0, AT(pal_wire_answer, n_arg), PAL_WIRE_ARG_MAX, NULL},
+    END};
+static const pal_control_field point_fields[] = {
+    {"index", U32, true, AT(pal_wire_point, index), 0, 0, 0, NULL},
+    {"method", TEXT, true, AT(pal_wire_point, method), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
+    {"label", TEXT, true, AT(pal_wire_point, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
+    {"ms", F64, true, AT(pal_wire_point, ms), 0, 0, 0, NULL},
+    {"error_m", F64, true, AT(pal_wire_point, error_m), 0, 0, 0, NULL},
+    {"front", BOOL, false, AT(pal_wire_point, front), 0, 0, 0, NULL},
+    END};
+static const pal_control_field study_fields[] = {
+    {"body", TEXT, true, AT(pal_wire_study, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"points", OBJECTS, false, AT(pal_wire_study, point), sizeof(pal_wire_point), AT(pal_wire_study, n_point),
+     PAL_WIRE_POINT_MAX, point_fields},
+    END};
+static const pal_control_field neighbour_fields[] = {
+    {"knob", TEXT, true, AT(pal_wire_neighbour, knob), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
+    {"label", TEXT, true, AT(pal_wire_neighbour, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
+    {"ms", KNOWN, false, AT(pal_wire_neighbour, ms), 0, 0, 0, NULL},
+    {"error_m", KNOWN, false, AT(pal_wire_neighbour, error_m), 0, 0, 0, NULL},
+    {"size", U32, false, AT(pal_wire_neighbour, size), 0, 0, 0, NULL},
+    {"step_ms", F64, false, AT(pal_wire_neighbour, step_ms), 0, 0, 0, NULL},
+    {"tolerance", F64, false, AT(pal_wire_neighbour, tolerance), 0, 0, 0, NULL},
+    END};
+static const pal_control_field estimate_fields[] = {
+    {"body", TEXT, true, AT(pal_wire_estimate, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"setting", TEXT, true, AT(pal_wire_estimate, setting), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
+    {"point", KNOWN, false, AT(pal_wire_estimate, point), 0, 0, 0, NULL},
+    {"tick", U64, true, AT(pal_wire_estimate, tick), 0, 0, 0, NULL},
+    {"time_s", F64, true, AT(pal_wire_estimate, time_s), 0, 0, 0, NULL},
+    {"ms", KNOWN, false, AT(pal_wire_estimate, ms), 0, 0, 0, NULL},
+    {"own_ms", F64, true, AT(pal_wire_estimate, own_ms), 0, 0, 0, NULL},
+    {"most_m", KNOWN, false, AT(pal_wire_estimate, most_m), 0, 0, 0, NULL},
+    {"error_m", KNOWN, false, AT(pal_wire_estimate, error_m), 0, 0, 0, NULL},
+    {"discretisation_m", KNOWN, false, AT(pal_wire_estimate, discretisation_m), 0, 0, 0, NULL},
+    {"algebraic_m", KNOWN, false, AT(pal_wire_estimate, algebraic_m), 0, 0, 0, NULL},
+    {"time_m", KNOWN, false, AT(pal_wire_estimate, time_m), 0, 0, 0, NULL},
+    {"model_m", KNOWN, false, AT(pal_wire_estimate, model_m), 0, 0, 0, NULL},
+    {"zz_percent", KNOWN, false, AT(pal_wire_estimate, zz_percent), 0, 0, 0, NULL},
+    {"locking", BOOL, false, AT(pal_wire_estimate, locking), 0, 0, 0, NULL},
+    {"note", SAID, false, AT(pal_wire_estimate, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"neighbours", OBJECTS, false, AT(pal_wire_estimate, neighbour), sizeof(pal_wire_neighbour),
+     AT(pal_wire_estimate, n_neighbour), PAL_WIRE_NEIGHBOUR_MAX, neighbour_fields},
+    END};
+static const pal_control_field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
+
+const pal_control_message pal_control_message_table[PAL_CONTROL_COUNT] = {
+#define FIELDS_HELLO               hello_fields
+#define FIELDS_TOPOLOGY            topology_fields
+#define FIELDS_STATUS              status_fields
+#define FIELDS_MEMBERS             members_fields
+#define FIELDS_ERROR               error_fields
+#define FIELDS_PONG                stamp_fields
+#define FIELDS_JOIN                join_fields
+#define FIELDS_COMMAND             command_fields
+#define FIELDS_TAKE                take_fields
+#define FIELDS_LEAVE               leave_fields
+#define FIELDS_PING                stamp_fields
+#define FIELDS_VIEW                view_fields
+#define FIELDS_ANSWER              answer_fields
+#define FIELDS_STUDY               study_fields
+#define FIELDS_ESTIMATE            estimate_fields
+#define X(name, text, from_server) {text, from_server, FIELDS_##name},
+    PAL_CONTROL_TABLE(X)
+#undef X
+};
