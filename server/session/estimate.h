@@ -1,13 +1,14 @@
 /* How far off a running body is, in parts (numerics.md part 2, "What accuracy costs, live"), while somebody looks.
  *
  * An estimator has a thread and worlds of its own. The simulation hands it a copy of its state and of the loads that it
- * bears, at most 4 times a second and only while it is wanted; then it solves, beside the running session:
- *   discretisation  the rest under those loads on this mesh and on one of twice its edge (Richardson): |u_h - u_2h| /
- *                   (2^p - 1); and in energy by the recovery of Zienkiewicz and Zhu (1987) on this mesh
- *   algebraic       what the solver's residual leaves, from its last conjugate gradients
- *   time            one step as it is against two of half of it, from the same state
- *   model           the rest by finite elements with the neo-Hookean law against that of the body's own rows
- * Nothing of it exists while nobody looks: no thread, no world, no copy. Thread: [sim] and its own. */
+ * bears, at most 4 times a second and only while the estimator is free; then it solves, beside the running session
+ * (estimate_work.h says how each part is found):
+ *   discretisation  the rest under those loads on this mesh and on one of twice its edge (Richardson)
+ *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh
+ *   algebraic       the next steps as they are against those of a solver that leaves next to nothing
+ *   time            the next steps against twice as many of half the length, from the same state
+ *   model           the rest by the neo-Hookean law against that of the body's own rows; of springs: by finite elements
+ * Nothing of it exists while nobody looks: no thread, no world, no copy. Thread: as said at each function. */
 #ifndef PAL_SESSION_ESTIMATE_H
 #define PAL_SESSION_ESTIMATE_H
 #include "server/sim/setting.h"
@@ -20,7 +21,7 @@ typedef struct pal_estimate {
     double time_s;
     double most_m; /* largest displacement then                              */
     /* largest displacement errors, m; NaN: not known for this body (note says why) */
-    double error_m; /* of all parts together: their sum                       */
+    double error_m; /* of all parts together: the sum of those that are known; NaN: none is */
     double discretisation_m, algebraic_m, time_m, model_m;
     double zz_percent; /* energy norm of the error over that of the solution    */
     bool locking;      /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
@@ -33,11 +34,20 @@ typedef struct pal_estimate {
 } pal_estimate;
 
 typedef struct pal_estimator pal_estimator;
-/* worlds and thread for one body of a scene, which is borrowed. REFUSED: a body that cannot be estimated, one sentence;
- * MEMORY. Takes time (it makes meshes): on its own thread. [any] */
+/* Starts the thread of one body of a scene, which is borrowed until close, and returns; meshes and worlds are made on
+ * that thread. What cannot be estimated is said in the note of the first estimate. REFUSED: no such body; MEMORY;
+ * INTERNAL: no thread. Short enough for [sim]. [any] */
 pal_err pal_estimator_open(const pal_scene *scene, int body, pal_note *note, pal_estimator **out);
-void pal_estimator_close(pal_estimator *estimator); /* joins its thread; NULL is fine */
-/* the state as it is now, if the estimator is free and it is time for another one; copies, never waits. [sim] */
+/* asks the thread to end as soon as it can; never waits. The estimator gives no more estimates. [any] */
+void pal_estimator_leave(pal_estimator *estimator);
+bool pal_estimator_gone(const pal_estimator *estimator); /* the thread has ended: close does not wait. [any] */
+void pal_estimator_close(pal_estimator *estimator);      /* leaves, joins the thread; NULL is fine */
+/* After every step (step_ms NaN: none was made, as while paused): notes what it took, and copies the state as it is now
+ * when the estimator is free and it is time for another one. Never waits, takes no memory. One thread. [sim] */
 void pal_estimator_look(pal_estimator *estimator, const pal_world *world, double step_ms);
-bool pal_estimator_read(pal_estimator *estimator, pal_estimate *out); /* newest; false: none yet. [any] */
+/* newest; false: none yet. Copies. [any] */
+bool pal_estimator_read(pal_estimator *estimator, pal_estimate *out);
+/* how many threads of estimators there are in this process, and how many estimates they have made, for tests [any] */
+int pal_estimator_threads(void);
+uint64_t pal_estimator_made(void);
 #endif

@@ -11,6 +11,7 @@
 #include "server/base/ring.h"
 #include "server/base/trio.h"
 #include "server/session/input_log.h"
+#include "server/session/watch.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -68,6 +69,7 @@ struct pal_session {
     pthread_mutex_t note_lock;
     pal_note note;
     pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
+    pal_watch watch;                     /* who looks at estimates */
 
     /* the simulation thread's own */
     pal_input_log *log;
@@ -250,6 +252,9 @@ static void obey(pal_session *s, const pal_command *command)
     case PAL_COMMAND_BRUSH:
         brush(s, command);
         break;
+    case PAL_COMMAND_ESTIMATE:
+        pal_watch_ask(&s->watch, command->body, command->wanted);
+        break;
     case PAL_COMMAND_COUNT:
         break;
     }
@@ -285,6 +290,13 @@ static void step(pal_session *s)
     }
 }
 
+static void estimate(pal_session *s, bool stepped)
+{
+    pal_note note = {""};
+    double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
+    if (pal_watch_step(&s->watch, s->world, step_ms, &note)) say(s, &note);
+}
+
 /* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
 static void pace(pal_session *s, uint64_t *due)
 {
@@ -314,11 +326,13 @@ static void *simulate(void *user)
         uint64_t now = pal_clock_ns();
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
         changed = take_poses(s, now) || changed;
-        if (!s->paused || s->single > 0) {
+        bool moves = !s->paused || s->single > 0;
+        if (moves) {
             step(s);
             if (s->single > 0) s->single--;
             changed = true;
         }
+        estimate(s, moves);
         if (changed) publish(s);
     }
     return NULL;
@@ -382,6 +396,7 @@ static void release(pal_session *s)
     for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
     pal_ring_destroy(s->command);
     pal_world_destroy(s->world);
+    pal_watch_close(&s->watch);
     pthread_mutex_destroy(&s->note_lock);
     free((void *)(uintptr_t)s->options.record_path);
     free(s->row);
@@ -393,6 +408,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     pal_session *s = calloc(1, sizeof *s);
     if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a session");
     pthread_mutex_init(&s->note_lock, NULL);
+    pal_watch_init(&s->watch, scene);
     s->scene = scene;
     if (options) s->options = *options;
     if (s->options.record_path) s->options.record_path = strdup(s->options.record_path);
@@ -452,6 +468,7 @@ static void hand_over(pal_session *to, pal_session *from)
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
                           memory_order_relaxed);
     memcpy(to->n_look, from->n_look, sizeof to->n_look);
+    pal_watch_hand_over(&to->watch, &from->watch);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
     for (int b = 0; b < to->scene->n_body; b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++)
@@ -545,7 +562,14 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
          command->slot >= s->scene->n_tool ||
          (command->brush.kind != PAL_BRUSH_NONE && pal_brush_check(&command->brush, NULL))))
         return refuse(s);
+    if (command->kind == PAL_COMMAND_ESTIMATE && (command->body < 0 || command->body >= s->scene->n_body))
+        return refuse(s);
     return pal_ring_put(s->command, command);
+}
+
+bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
+{
+    return pal_watch_read(&s->watch, body, out);
 }
 
 const pal_frame *pal_session_take_frame(pal_session *s)

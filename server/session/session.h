@@ -8,10 +8,12 @@
  * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
  * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback; a lock guards only
  * the sentence of pal_session_last_note. No heap or file call after open until close, but when somebody begins or ends
- * to look at a field, or a brush begins or has gone out: then its row (and a field's place in frames) comes and goes,
- * between two steps. Fields are no input: they are not in the input log and change no hash. Brushes are. */
+ * to look at a field or an estimate, or a brush begins or has gone out: then its row (and a field's place in frames)
+ * comes and goes, between two steps. Fields and estimates are no input: they are not in the input log and change no
+ * hash. Brushes are. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
+#include "server/session/estimate.h"
 #include "server/sim/effect.h"
 #include "server/sim/world.h"
 
@@ -26,6 +28,8 @@ typedef enum pal_command_kind {
     PAL_COMMAND_FIELD,    /* body, field, wanted: one more or one less who looks; the row is there while anybody does */
     PAL_COMMAND_BRUSH,    /* body, slot, brush: what the hand of tool `slot` does (world.h); letting the tool go or its
                              lease ends it, a reset or a session that follows as well */
+    PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimate.h), a
+                             thread and worlds of its own, is there while anybody does */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 
@@ -85,6 +89,9 @@ const pal_frame *pal_session_take_frame(pal_session *session);
 bool pal_session_alive(const pal_session *session);
 /* a body's material as the world has it: of the scene, or the last one that was not refused; copies. [any] */
 void pal_session_material(pal_session *session, int body, pal_material *out);
+/* newest estimate of a body's errors while somebody looks (PAL_COMMAND_ESTIMATE), of a state at most some hundreds of
+ * ms old; false: nobody does, or there is none yet. A session that follows starts anew. Copies. [any] */
+bool pal_session_estimate(pal_session *session, int body, pal_estimate *out);
 /* last thing that went wrong in a command (a refused material or brush), "" when nothing; copies. [any] */
 void pal_session_last_note(pal_session *session, pal_note *out);
 #endif

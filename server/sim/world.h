@@ -90,6 +90,9 @@ void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
 pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */
 
+uint64_t pal_world_tick(const pal_world *world);                                  /* steps since create or reset */
+double pal_world_time_s(const pal_world *world);                                  /* simulated since then         */
+void pal_world_material_now(const pal_world *world, int body, pal_material *out); /* with live edits; copies */
 int pal_world_rows(const pal_world *world);
 void pal_world_row(const pal_world *world, int row, pal_row_info *out);
 int pal_world_parts(const pal_world *world);
@@ -101,6 +104,7 @@ size_t pal_world_bytes(const pal_world *world);    /* memory of the world's aren
 /* for tests, tools and the lab: the bodies themselves [sim] */
 int pal_world_bodies(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
+const pal_body *pal_world_look(const pal_world *world, int body); /* the same to read */
 void pal_world_moved(pal_world *world, int body); /* after its x was set from outside: limits are taken anew */
 const pal_row *pal_world_effect(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);

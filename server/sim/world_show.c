@@ -114,6 +114,26 @@ uint64_t pal_world_hash(const pal_world *world)
     return hash;
 }
 
+uint64_t pal_world_tick(const pal_world *world)
+{
+    return world->tick;
+}
+
+double pal_world_time_s(const pal_world *world)
+{
+    return world->time_s;
+}
+
+const pal_body *pal_world_look(const pal_world *world, int body)
+{
+    return &world->plan.body[body];
+}
+
+void pal_world_material_now(const pal_world *world, int body, pal_material *out)
+{
+    *out = world->material[body];
+}
+
 int pal_world_rows(const pal_world *world)
 {
     return world->plan.n_row;

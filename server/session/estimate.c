@@ -1,0 +1,202 @@
+/* The estimator's thread and its two crossing points: a state in, when the thread is free and a quarter of a second has
+ * gone by, and an estimate out, under a lock that the simulation never takes.
+ *
+ * The state's place belongs to the thread while `place` is BUSY and to the simulation while it is FREE; whoever has it
+ * hands it over, so neither waits. */
+#include "server/session/estimate.h"
+
+#include "server/base/clock.h"
+#include "server/session/estimate_work.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+enum { BUSY, FREE };
+static const uint64_t period_ns = 250000000;
+static const int niceness = 10; /* the simulation goes first */
+
+static _Atomic int n_thread;
+static _Atomic uint64_t n_made;
+
+struct pal_estimator {
+    const pal_scene *scene;
+    int body;
+    pthread_t thread;
+    sem_t wake;
+    _Atomic bool stop, gone;
+    _Atomic int place;
+    pal_estimate_work *work;   /* the thread's */
+    pal_estimate_state *state; /* of work; whose it is says `place` */
+    pthread_mutex_t lock;
+    pal_estimate newest; /* tick 0: none yet */
+    bool there;
+    /* the simulation's own */
+    uint64_t looked_ns, looked_tick;
+    float ms[PAL_ESTIMATE_STEPS];
+    uint64_t n_ms;
+    double step_s;
+};
+
+static void publish(pal_estimator *e, const pal_estimate *estimate)
+{
+    pthread_mutex_lock(&e->lock);
+    e->newest = *estimate;
+    e->there = true;
+    pthread_mutex_unlock(&e->lock);
+    atomic_fetch_add_explicit(&n_made, 1, memory_order_relaxed);
+}
+
+/* nothing is known, and why */
+static void publish_refusal(pal_estimator *e, const pal_note *note)
+{
+    pal_estimate none = {.error_m = NAN,
+                         .discretisation_m = NAN,
+                         .algebraic_m = NAN,
+                         .time_m = NAN,
+                         .model_m = NAN,
+                         .zz_percent = NAN,
+                         .most_m = NAN,
+                         .ms = NAN};
+    snprintf(none.note, sizeof none.note, "%.159s", note->text);
+    publish(e, &none);
+}
+
+static bool wait_state(pal_estimator *e)
+{
+    atomic_store_explicit(&e->place, FREE, memory_order_release);
+    while (!atomic_load_explicit(&e->stop, memory_order_acquire)) {
+        if (atomic_load_explicit(&e->place, memory_order_acquire) == BUSY) return true;
+        while (sem_wait(&e->wake)) continue;
+    }
+    return false;
+}
+
+static void *estimate(void *user)
+{
+    pal_estimator *e = user;
+    pal_note note = {""};
+    (void)setpriority(PRIO_PROCESS, (id_t)syscall(SYS_gettid), niceness);
+    pal_err err = pal_estimate_work_open(e->scene, e->body, &e->stop, &note, &e->work);
+    if (!err) e->state = pal_estimate_work_state(e->work);
+    if (err && err != PAL_ERR_STATE) publish_refusal(e, &note);
+    while (!err && wait_state(e)) {
+        pal_estimate out;
+        uint64_t before = pal_clock_thread_ns();
+        bool whole = pal_estimate_work_run(e->work, &out);
+        out.own_ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
+        if (whole) publish(e, &out);
+    }
+    pal_estimate_work_close(e->work);
+    e->work = NULL;
+    atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
+    atomic_store_explicit(&e->gone, true, memory_order_release);
+    return NULL;
+}
+
+static pal_err start(pal_estimator *e, pal_note *note)
+{
+    /* signals belong to the thread that waits for them */
+    sigset_t all, old;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    atomic_fetch_add_explicit(&n_thread, 1, memory_order_relaxed);
+    int failed = pthread_create(&e->thread, NULL, estimate, e);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    if (!failed) return PAL_ERR_OK;
+    atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
+    return pal_note_set(note, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
+}
+
+static void release(pal_estimator *e)
+{
+    sem_destroy(&e->wake);
+    pthread_mutex_destroy(&e->lock);
+    free(e);
+}
+
+pal_err pal_estimator_open(const pal_scene *scene, int body, pal_note *note, pal_estimator **out)
+{
+    if (body < 0 || body >= scene->n_body)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body, scene->n_body);
+    pal_estimator *e = calloc(1, sizeof *e);
+    if (!e) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for an estimator");
+    e->scene = scene, e->body = body, e->step_s = scene->step_s;
+    pthread_mutex_init(&e->lock, NULL);
+    sem_init(&e->wake, 0, 0);
+    pal_err err = start(e, note);
+    if (err)
+        release(e);
+    else
+        *out = e;
+    return err;
+}
+
+void pal_estimator_leave(pal_estimator *e)
+{
+    atomic_store_explicit(&e->stop, true, memory_order_release);
+    sem_post(&e->wake);
+}
+
+bool pal_estimator_gone(const pal_estimator *e)
+{
+    return atomic_load_explicit(&e->gone, memory_order_acquire);
+}
+
+void pal_estimator_close(pal_estimator *e)
+{
+    if (!e) return;
+    pal_estimator_leave(e);
+    pthread_join(e->thread, NULL);
+    release(e);
+}
+
+/* the times of the last second's steps */
+static void copy_times(const pal_estimator *e, pal_estimate_state *to)
+{
+    uint64_t n = e->n_ms < PAL_ESTIMATE_STEPS ? e->n_ms : PAL_ESTIMATE_STEPS;
+    double second = e->step_s > 0 ? ceil(1 / e->step_s) : 1;
+    to->n_ms = second < (double)n ? (int)second : (int)n;
+    for (int i = 0; i < to->n_ms; i++) to->ms[i] = e->ms[(e->n_ms - 1 - (uint64_t)i) % PAL_ESTIMATE_STEPS];
+}
+
+void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms)
+{
+    if (!isnan(step_ms)) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
+    if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
+    uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
+    /* nothing has moved since */
+    if (e->looked_ns && tick == e->looked_tick && isnan(step_ms)) return;
+    if (e->looked_ns && now - e->looked_ns < period_ns) return;
+    if (!pal_estimate_copy(e->state, world, e->body)) return;
+    e->looked_ns = now, e->looked_tick = tick;
+    copy_times(e, e->state);
+    atomic_store_explicit(&e->place, BUSY, memory_order_release);
+    sem_post(&e->wake);
+}
+
+bool pal_estimator_read(pal_estimator *e, pal_estimate *out)
+{
+    pthread_mutex_lock(&e->lock);
+    bool there = e->there;
+    if (there) *out = e->newest;
+    pthread_mutex_unlock(&e->lock);
+    return there;
+}
+
+int pal_estimator_threads(void)
+{
+    return atomic_load_explicit(&n_thread, memory_order_relaxed);
+}
+
+uint64_t pal_estimator_made(void)
+{
+    return atomic_load_explicit(&n_made, memory_order_relaxed);
+}

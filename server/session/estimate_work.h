@@ -1,0 +1,36 @@
+/* What an estimator computes, without its thread: the parts of the error of one body in one state (estimate.h). Heap
+ * memory; everything here is slow. Thread: one at a time. */
+#ifndef PAL_SESSION_ESTIMATE_WORK_H
+#define PAL_SESSION_ESTIMATE_WORK_H
+#include "server/session/estimate.h"
+
+#include <stdatomic.h>
+
+enum { PAL_ESTIMATE_STEPS = 256 };
+
+/* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */
+typedef struct pal_estimate_state {
+    uint64_t tick;
+    double time_s;
+    int n_dof, n_node;
+    double *x, *v; /* m, m/s [n_dof][3] */
+    double *load;  /* lasting and contact loads, N [n_node][3] */
+    int n_substep; /* of the step */
+    pal_material material;
+    float ms[PAL_ESTIMATE_STEPS]; /* of the last steps, any order */
+    int n_ms;
+} pal_estimate_state;
+
+typedef struct pal_estimate_work pal_estimate_work;
+/* meshes and worlds for one body of a scene, which is borrowed; ends early with STATE when *stop is set (NULL: never).
+ * REFUSED: no such body, or one of which nothing can be estimated (one sentence); MEMORY */
+pal_err pal_estimate_work_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_note *note,
+                               pal_estimate_work **out);
+void pal_estimate_work_close(pal_estimate_work *work); /* NULL is fine */
+pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work);
+/* the state of `body` of a world made from the scene; false: that is no state to look at (not finite, frozen, another
+ * number of points). Copies, no memory. [sim] */
+bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body);
+/* estimates the state; false: it was stopped */
+bool pal_estimate_work_run(pal_estimate_work *work, pal_estimate *out);
+#endif
