@@ -21,15 +21,28 @@ pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_note *note)
     return PAL_ERR_OK;
 }
 
-pal_err pal_svg_end(pal_svg *svg, const char *path, pal_note *note)
+pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_note *note)
 {
     fputs("</svg>\n", svg->to);
     bool whole = !ferror(svg->to);
     whole = fclose(svg->to) == 0 && whole;
-    pal_err err = whole ? pal_file_write(path, svg->text, svg->n_byte, note)
-                        : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a drawing", path);
-    free(svg->text);
+    if (whole)
+        *text = svg->text, *n_byte = svg->n_byte;
+    else
+        free(svg->text);
     *svg = (pal_svg){0};
+    return whole ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+}
+
+pal_err pal_svg_end(pal_svg *svg, const char *path, pal_note *note)
+{
+    char *text = NULL;
+    size_t n_byte = 0;
+    pal_note why = {""};
+    pal_err err = pal_svg_take(svg, &text, &n_byte, &why);
+    if (err) return pal_note_set(note, err, "%s: %s", path, why.text);
+    err = pal_file_write(path, text, n_byte, note);
+    free(text);
     return err;
 }
 

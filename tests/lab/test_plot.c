@@ -131,6 +131,57 @@ static void names_cannot_leave_their_text(void)
     free(text);
 }
 
+/* the boxes of all small texts, 6.2 pixels a character, 11 high */
+static int small_texts(const char *text, double box[][4], int most)
+{
+    int n = 0;
+    for (const char *at = text; n < most && (at = strstr(at, "<text x=")); at++) {
+        double x, y;
+        const char *end = strchr(at, '>'), *stop = end ? strchr(end, '<') : NULL;
+        if (!stop || sscanf(at, "<text x=\"%lf\" y=\"%lf\"", &x, &y) != 2) continue;
+        if (!strstr(at, "font-size=\"11\"") || strstr(at, "font-size=\"11\"") > end) continue;
+        box[n][0] = x, box[n][1] = y - 9, box[n][2] = x + 6.2 * (double)(stop - end - 1), box[n++][3] = y + 2;
+    }
+    return n;
+}
+
+static void labels_keep_off_each_other_and_off_marks(void)
+{
+    enum { N = 40 };
+    double x[N], y[N], box[N + 2][4];
+    pal_plot_label l[N];
+    for (int i = 0; i < N; i++) {
+        /* four heaps of ten */
+        x[i] = pow(10, i / 10 + 0.02 * (i % 10)), y[i] = pow(10, -i / 10 - 0.03 * (i * 7 % 10));
+        l[i] = (pal_plot_label){x[i], y[i], "hex8_bbar 24"};
+    }
+    pal_plot plot = {.title = "t", .x_label = "ms", .y_label = "mm", .log_x = true, .log_y = true, .wide = 900};
+    plot.n_curve = 1, plot.n_guide = 2, plot.n_label = N, plot.label = l;
+    plot.curve[0] = (pal_curve){.name = "dots", .n = N, .x = x, .y = y, .dots = true};
+    plot.guide[0] = (pal_plot_guide){.vertical = true, .at = 100, .text = "real time"};
+    plot.guide[1] = (pal_plot_guide){.at = 1e-5, .text = "reference"};
+    char *text = draw(&plot);
+    REQUIRE(text);
+    CHECK(strstr(text, "stroke-width=\"2\"") == NULL); /* dots have no line */
+    int n = small_texts(text, box, N + 2);
+    CHECK(n >= 20 + 2);
+    for (int a = 0; a < n; a++) {
+        CHECK(box[a][0] >= left && box[a][2] <= 900 - 210 && box[a][1] >= top && box[a][3] <= top + high);
+        for (int b = 0; b < a; b++)
+            CHECK(box[a][0] >= box[b][2] || box[b][0] >= box[a][2] || box[a][1] >= box[b][3] || box[b][1] >= box[a][3]);
+        /* the guides' own texts come first */
+        double low = log10(1e-5), span_y = 0 - low, margin = 0.06 * span_y + 0.02, span = span_y + 2 * margin;
+        for (int i = 0; i < N && a > 1; i++) {
+            double top_log = 0, py = top + high * (margin + top_log - log10(y[i])) / span;
+            double from_x = 0.06 * 3.18 + 0.02, px = left + 606 * (from_x + log10(x[i])) / (3.18 + 2 * from_x);
+            CHECK(px <= box[a][0] || px >= box[a][2] || py <= box[a][1] || py >= box[a][3]);
+        }
+    }
+    /* the axis reaches a guide that no point reaches */
+    CHECK(strstr(text, ">1e-05</text>") != NULL);
+    free(text);
+}
+
 static void nothing_to_draw_and_nowhere_to_write_are_refused(void)
 {
     const double x[] = {0, -1, INFINITY}, y[] = {1, 1, 1};
@@ -158,6 +209,7 @@ int main(void)
     RUN(logarithmic_axes_leave_out_what_has_no_logarithm);
     RUN(few_decades_have_ticks_between_and_many_are_thinned);
     RUN(names_cannot_leave_their_text);
+    RUN(labels_keep_off_each_other_and_off_marks);
     RUN(nothing_to_draw_and_nowhere_to_write_are_refused);
     return check_report();
 }
