@@ -1,5 +1,5 @@
-/* Checked reading of a JSON tree for scene files (private to this room): every refusal is "file: entry.path: sentence".
- * And numbers for a tree that is written. Thread: [load]. */
+/* Checked reading of a JSON tree for scene files and what commands keep beside them: every refusal is "file:
+ * entry.path: sentence". And numbers for a tree that is written. Thread: [load]. */
 #ifndef PAL_SCENE_JSON_READER_H
 #define PAL_SCENE_JSON_READER_H
 #include "server/base/err.h"

@@ -1,0 +1,1 @@
+pal_fuzz(study LINK pal_commands)
