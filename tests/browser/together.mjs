@@ -30,25 +30,33 @@ try {
   const before = Math.max(...(await Promise.all(pages.map(moved))));
   check("the organ rests quietly", before < 0.001, `${(1000 * before).toFixed(2)} mm`);
 
-  // the bridge places itself over the part's top and presses once a second, until both have seen it
-  const bridge = start(program("palpate-bridge"), ["--server", `ws://127.0.0.1:${server.info.port}/ws`, "--name", "Bridge",
-    "--device", "virtual:touch", "--script", "cycle", "--options", "depth=12,wait=4", "--json"]);
+  // the bridge places itself over the part's top and presses once a second, until both have seen it and it has felt it
   const names = (page) => page.evaluate(() => [...window.palpate.state.members.values()].map((m) => m.name));
-  const seen = await Promise.all(pages.map((page) => until(() => names(page), (l) => l.includes("Bridge"))));
-  const most = await Promise.all(pages.map((page) => until(() => moved(page), (m) => m > before + 0.002)));
-  for (const i of [0, 1]) {
-    check(`browser ${i + 1} knows the bridge by its name`, seen[i].includes("Bridge"), seen[i].join(" "));
-    check(`browser ${i + 1} sees the vertices move under the bridge's tool`, most[i] > before + 0.002, `${(1000 * most[i]).toFixed(2)} mm`);
+  const press = async (wait_ms) => {
+    const bridge = start(program("palpate-bridge"), ["--server", `ws://127.0.0.1:${server.info.port}/ws`, "--name", "Bridge",
+      "--device", "virtual:touch", "--script", "cycle", "--options", "depth=12,wait=4", "--json"]);
+    const seen = await Promise.all(pages.map((page) => until(() => names(page), (l) => l.includes("Bridge"))));
+    const most = await Promise.all(pages.map((page) => until(() => moved(page), (m) => m > before + 0.002)));
+    await pages[0].screenshot({ path: join(pictures, "together.png") });
+    await new Promise((done) => setTimeout(done, wait_ms));
+    bridge.kill("SIGINT");
+    await bridge.ended;
+    return { seen, most, felt: JSON.parse(bridge.text) };
+  };
+  // Cores shared with two renderers: the first presses may come before a contact model does, and a servo loop that is
+  // late takes its forces off, as it must. So it is given more time, four times; it says how often.
+  let tries = 1, last = await press(3000);
+  for (; last.felt.force_max_N <= 0.05 && tries < 4; tries++) {
+    console.log(`     felt ${last.felt.force_max_N} N of ${last.felt.models} models, forces ${last.felt.forces}: once more`);
+    last = await press(6000 * tries);
   }
-  await pages[0].screenshot({ path: join(pictures, "together.png") });
-  // the first press may come before its first contact model: a few more
-  await new Promise((done) => setTimeout(done, 3000));
-  bridge.kill("SIGINT");
-  await bridge.ended;
-  const felt = JSON.parse(bridge.text);
-  check("the bridge's forces keep their cap", felt.force_max_N <= 3.0001, `${felt.force_max_N} N`);
-  // a servo loop that cores shared with two renderers make late takes its forces off, as it must
-  check("and are felt, unless the loop was late", felt.force_max_N > 0.05 || felt.forces !== "full", felt.forces);
+  for (const i of [0, 1]) {
+    check(`browser ${i + 1} knows the bridge by its name`, last.seen[i].includes("Bridge"), last.seen[i].join(" "));
+    check(`browser ${i + 1} sees the vertices move under the bridge's tool`, last.most[i] > before + 0.002, `${(1000 * last.most[i]).toFixed(2)} mm`);
+  }
+  check("the bridge's forces keep their cap", last.felt.force_max_N <= 3.0001, `${last.felt.force_max_N} N`);
+  check("and are felt, unless the loop was late to the end", last.felt.force_max_N > 0.05 || last.felt.forces !== "full",
+    `${last.felt.force_max_N} N, ${last.felt.forces}, try ${tries}`);
   logger.kill("SIGINT");
   await logger.ended;
   const log = readFileSync(record).toString("latin1"), name = server.info.sessions?.[0]?.name ?? "";
