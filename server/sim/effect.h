@@ -89,6 +89,17 @@ typedef struct pal_solve_report {
     double analyse_s, assemble_s, factor_s, solve_s; /* time spent since load                                     */
 } pal_solve_report;
 
+/* stress at a quadrature point of an element, where and for what it stands: one call for each, element by element */
+typedef struct pal_stress_point {
+    int element, n_corner;
+    const int32_t *node; /* of the element [n_corner]                                                 */
+    const double *shape; /* shape functions there [n_corner]                                          */
+    double stress[9];    /* symmetric, Pa, current axes, of the volume at rest (Kirchhoff)            */
+    double volume_m3;    /* at rest, by its share of material; 0: of no element, there is no such call */
+    double mu_Pa, lambda_Pa;
+} pal_stress_point;
+typedef void pal_stress_take(void *user, const pal_stress_point *point);
+
 typedef struct pal_effect {
     const char *name; /* as written in scene files */
     pal_stage stage;
@@ -121,7 +132,10 @@ typedef struct pal_effect {
     bool implicit; /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
     /* FORCE: adds to sum [n_node] the row's field times volume and to volume_m3 [n_node] the volume it stands for */
     void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
-    unsigned fields;                                         /* what measure gives, 1 << pal_field each */
+    unsigned fields; /* what measure gives, 1 << pal_field each */
+    /* FORCE: the stress of every element at the body's d, as the row's forces have it; no memory. For the recovery of
+     * zz.h; NULL: not known */
+    void (*stress)(void *self, const pal_body *body, pal_stress_take *take, void *user);
     void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
     void (*destroy)(void *self); /* what make took beside the arena (threads, factors); NULL: nothing. [load] */
 } pal_effect;

@@ -70,10 +70,11 @@ static inline int pal_hex_pair(int c, int d)
     return c * (17 - c) / 2 + d - c;
 }
 
-/* effect.h assemble, rotate, measure */
+/* effect.h assemble, rotate, measure, stress */
 void pal_hex_assemble(pal_hex_row *row, double k, pal_blocks *to);
 void pal_hex_rotate(const pal_hex_row *row, double *turn);
 void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, double *sum, double *volume_m3);
+void pal_hex_stress(pal_hex_row *row, const pal_body *body, pal_stress_take *take, void *user);
 
 /* the laws: body->slots->x holds positions (or p), forces (or products) are added to body->slots->f */
 void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots);

@@ -349,3 +349,33 @@ void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field fi
         }
     }
 }
+
+void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_take *take, void *user)
+{
+    static const double centre[4] = {0.25, 0.25, 0.25, 0.25};
+    int n = t->wish.n_corner;
+    double shape[4][10];
+    for (int p = 0; p < t->n_point && n == 10; p++) pal_tet10_shape(pal_tet_gauss[p], shape[p], NULL);
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        double volume = *lane_at(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
+        if (volume <= 0) continue;
+        pal_stress_point to = {.element = e,
+                               .n_corner = n,
+                               .node = t->corner + (size_t)n * (size_t)e,
+                               .volume_m3 = volume / t->n_point,
+                               .mu_Pa = *lane_at(t->stiff, 2, t->place[e], 0) / volume,
+                               .lambda_Pa = *lane_at(t->stiff, 2, t->place[e], 1) / volume};
+        bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
+        pal_elastic_tets_rotation(t, e, r);
+        for (int k = 0; k < t->n_point; k++) {
+            pal_elastic_tets_gradient(t, e, k, d, f);
+            if (neo)
+                pal_neo_stress(to.mu_Pa, to.mu_Pa + to.lambda_Pa, 0, f, p);
+            else
+                pal_corotational_stress(to.mu_Pa, to.lambda_Pa, f, r, p);
+            for (int i = 0; i < 9; i++) to.stress[i] = pal_dot3(p + 3 * (i / 3), (neo ? f : r) + 3 * (i % 3));
+            to.shape = n == 10 ? shape[k] : centre;
+            take(user, &to);
+        }
+    }
+}

@@ -82,4 +82,6 @@ void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9]);
 void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, const double *d, double f[9]);
 /* effect.h measure: von Mises of the Cauchy stress (corotational, linear: of the rotated small-strain one), energy */
 void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field field, double *sum, double *volume_m3);
+/* effect.h stress */
+void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_take *take, void *user);
 #endif

@@ -153,6 +153,15 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
         pal_hex_measure(row, body, field, sum, volume_m3);
 }
 
+static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)
+{
+    pal_hex_row *row = self;
+    if (row->tangled)
+        pal_elastic_tets_stress(row->split, body->d, take, user);
+    else
+        pal_hex_stress(row, body, take, user);
+}
+
 static const pal_tangent tangent = {
     .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
 
@@ -167,4 +176,5 @@ const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
                                            .reset = reset,
                                            .tangent = &tangent,
                                            .measure = measure,
-                                           .fields = PAL_ELASTIC_FIELDS};
+                                           .fields = PAL_ELASTIC_FIELDS,
+                                           .stress = stress};

@@ -177,6 +177,11 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
     pal_elastic_tets_measure(acting(self), body->d, field, sum, volume_m3);
 }
 
+static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)
+{
+    pal_elastic_tets_stress(acting(self), body->d, take, user);
+}
+
 static bool couple(void *self, pal_cliques *out)
 {
     const pal_elastic_tets *whole = &((tet_row *)self)->whole;
@@ -230,4 +235,5 @@ const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
                                            .reset = reset,
                                            .tangent = &tangent,
                                            .measure = measure,
-                                           .fields = PAL_ELASTIC_FIELDS};
+                                           .fields = PAL_ELASTIC_FIELDS,
+                                           .stress = stress};
