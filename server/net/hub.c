@@ -189,14 +189,11 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->tick = f->tick;
         w->sim_time_s = f->time_s;
         w->paused = f->paused;
-        for (int p = 0; p < f->n_part; p++) w->frozen |= f->part[p].frozen;
         if (isfinite(f->slowdown) && f->slowdown > 0) w->slowdown = f->slowdown;
         w->substeps = f->n_substep > 0 ? (uint32_t)f->n_substep : 0;
         w->n_row = (uint32_t)f->n_row;
         for (int r = 0; r < f->n_row; r++) w->row_ms[r] = s->row_ms[r];
-        /* rows of fields have come: the plan is no longer that of hello */
-        for (int r = 0; r < f->n_row && f->n_row != pal_session_rows(s->session); r++)
-            pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->row_name[r]);
+        pal_hub_status_plan(c->room, f, w);
         for (int p = 0; p < s->n_part; p++)
             if (s->part[p].places)
                 w->active[w->n_active++] =
@@ -442,6 +439,10 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         room->session = session[i];
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
+        if (options->setting && options->n_setting[i] > 0) {
+            room->setting = options->setting[i];
+            room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
+        }
         err = pal_stream_open(session[i], options->error_m, note, &room->stream);
         if (!err) hub->n_room++;
     }

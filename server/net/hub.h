@@ -9,6 +9,7 @@
 #include "server/net/site.h"
 #include "server/net/stream.h"
 #include "server/net/transport.h"
+#include "server/sim/setting.h"
 
 typedef struct pal_hub pal_hub;
 
@@ -16,6 +17,9 @@ typedef struct pal_hub_options {
     double error_m;
     int most_clients;
     pal_site *site; /* borrowed; NULL: no files */
+    /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
+    const pal_priced_setting *const *setting;
+    const int *n_setting, *setting_body;
 } pal_hub_options;
 
 /* builds the streams; borrows loop, sessions and their array; listens to the loop. A session that a command of

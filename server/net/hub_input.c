@@ -56,6 +56,7 @@ static void say_hello(pal_hub *hub, pal_client *c)
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_HELLO;
     pal_stream_hello(c->room->stream, hello);
+    pal_hub_hello_rows(c->room, hello);
     hello->credit = (uint32_t)c->credit.most;
     hello->you_id = pal_stream_wire_id(m->id);
     hello->you_role = (pal_wire_role)m->role;

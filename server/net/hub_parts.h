@@ -1,5 +1,5 @@
-/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c and hub_pages.c share: the hub's records. Private to these.
- * Thread: [net]. */
+/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c, hub_plan.c and hub_pages.c share: the hub's records. Private to
+ * these. Thread: [net]. */
 #ifndef PAL_NET_HUB_PARTS_H
 #define PAL_NET_HUB_PARTS_H
 #include "server/net/credit.h"
@@ -55,6 +55,8 @@ typedef struct pal_hub_room {
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last asked for */
+    const pal_priced_setting *setting;   /* what a study found, for body setting_body [n_setting]; NULL: no study */
+    int n_setting, setting_body;
     int tier_users[PAL_STREAM_TIER];
     int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients that look at a field   */
     bool told[PAL_BODY_MAX][PAL_FIELD_COUNT];  /* the session knows that some do */
@@ -108,6 +110,10 @@ uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
 bool pal_hub_sculpt_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
 void pal_hub_sculpt_turn(pal_hub *hub); /* what the workshop has done, and the next order */
 void pal_hub_sculpt_end(pal_hub *hub);  /* closes the sessions that the hub made */
+/* hub_plan.c */
+void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
+void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);
+void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out); /* rows and bodies */
 /* hub_pages.c */
 void pal_hub_get(void *hub, const char *path, pal_reply *reply);
 #endif

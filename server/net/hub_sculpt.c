@@ -463,6 +463,7 @@ static void tell_topology(pal_hub *hub, pal_hub_room *room)
         hub->control->type = PAL_CONTROL_TOPOLOGY;
         hub->control->topology.n_part = (uint32_t)room->stream->n_part;
         for (int p = 0; p < room->stream->n_part; p++) hub->control->topology.part[p] = room->stream->part[p].info;
+        pal_hub_topology_rows(room, &hub->control->topology);
         memset(c->sent_change, 0, sizeof c->sent_change);
         memset(c->sent_field, 0, sizeof c->sent_field);
         pal_hub_say(hub, c, hub->control);

@@ -460,10 +460,4 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
                                 : scene->tool[t].radius_m > 0              ? scene->tool[t].radius_m
                                                                            : 0.04 * sqrt(size);
     }
-    int n_row = pal_session_rows(stream->session);
-    for (int r = 0; r < n_row && r < PAL_WIRE_ROW_MAX; r++) {
-        pal_row_info row;
-        pal_session_row(stream->session, r, &row);
-        pal_plain_text(out->row[out->n_row++], PAL_WIRE_NAME_BYTES, row.name);
-    }
 }

@@ -85,6 +85,6 @@ double pal_stream_tier_error_m(const pal_stream *stream, int tier);
 double pal_stream_rate_hz(const pal_stream *stream); /* of cycles: the scene's steps, at most PAL_STREAM_RATE_HZ */
 /* measured steps per second; call about three times a second */
 void pal_stream_measure(pal_stream *stream, uint64_t now_ns);
-/* fills hello but for `you` and credit */
+/* fills hello but for `you`, credit and rows */
 void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out);
 #endif

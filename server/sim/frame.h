@@ -64,5 +64,6 @@ typedef struct pal_frame {
     int n_row;
     uint32_t row_ns[PAL_FRAME_ROWS];      /* of the last step, in the plan's order           */
     const char *row_name[PAL_FRAME_ROWS]; /* constants; more than at load while fields are shown */
+    int row_body[PAL_FRAME_ROWS];         /* whose row it is                                     */
 } pal_frame;
 #endif

@@ -90,6 +90,7 @@ void pal_world_frame(const pal_world *world, pal_frame *out)
     for (int i = 0; i < out->n_row; i++) {
         uint64_t ns = w->plan.row[i].spent_ns;
         out->row_name[i] = w->plan.row[i].effect->name;
+        out->row_body[i] = w->plan.row_body[i];
         out->row_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
     }
 }
