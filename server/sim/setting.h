@@ -12,14 +12,17 @@ enum { PAL_SETTING_TEXT = 120 };
 
 typedef struct pal_setting {
     char model[PAL_NAME];   /* "fem", "tet_springs", "adaptive_springs", "subdivision_fem"                     */
-    char element[PAL_NAME]; /* fem: "hex8_bbar", "hex8", "tet4", "tet10"; "": the model's own choice           */
+    char element[PAL_NAME]; /* fem: "hex8_bbar", "hex8", "tet4", "tet10"; "": the model's own choice;
+                             * adaptive_springs: "refined": wholly on its finest level, "": it adapts             */
     char law[PAL_NAME];     /* fem: "corotational", "neo_hookean", "linear"; "": the model's own choice        */
     char solver[PAL_NAME];  /* "implicit_euler", "sdirk2", "verlet", "rk4", "central_cg"; "": the model's own  */
-    int size;               /* voxels on the longest axis (fem, tet_springs), levels (the others); 0: as it is */
-    double step_s;          /* of the whole scene; 0: as it is                                                  */
-    double tolerance;       /* of an implicit solver's residual or of CG; 0: the solver's own                   */
-    double k_distance_J, k_area_J, k_volume_J; /* calibrated springs; k_distance_J 0: from the material; k_area_J 0: no
-                                                * such row                                                         */
+    int size;      /* voxels on the longest axis (fem, tet_springs), levels (the others; subdivision_fem: -1 for none);
+                    * 0: as it is                                                                                      */
+    double step_s; /* of the whole scene; 0: as it is                                                  */
+    double tolerance; /* of an implicit solver's residual or of CG; 0: the solver's own                   */
+    /* calibrated springs, weighted by volume (spring_law.h), of this very size; k_distance_J 0: all from the material;
+     * k_area_J 0: no such row, -1: that from the material as well */
+    double k_distance_J, k_area_J, k_volume_J;
 } pal_setting;
 
 /* a setting with what it costs and how far off it is, as a study found (lab/study.h) */
@@ -32,6 +35,8 @@ typedef struct pal_priced_setting {
 
 /* the setting that a body of a scene has now; size is that of the prepared mesh (0 when it was made elsewhere) */
 void pal_setting_of(const pal_scene *scene, int body, pal_setting *out);
+/* does a body take a model? REFUSED (one sentence why), or a word that is no model */
+pal_err pal_setting_fits(const pal_body_def *body, const char *model, pal_note *note);
 /* "fem hex8_bbar corotational, 16 voxels, implicit_euler, 16.7 ms": only what is given. Returns text. [any] */
 const char *pal_setting_text(const pal_setting *setting, char text[PAL_SETTING_TEXT]);
 bool pal_setting_same(const pal_setting *a, const pal_setting *b); /* [any] */
@@ -42,9 +47,13 @@ typedef struct pal_set_scene {
     pal_prepared mesh; /* of the changed body; n_node 0: it kept its own */
     int body;
 } pal_set_scene;
-/* Makes it: keeps material, supports, regions, effects and tools; prepares voxels anew from the body's shown surface
- * when the size differs. *out heap, pal_set_scene_free; borrows from `from`, which outlives it. REFUSED: a model that
- * does not fit the body (one sentence why), an unknown word, a size or number out of range; BUDGET, MEMORY */
+/* Makes it: keeps material, supports, regions, effects, tools and the keys of model and solver that a setting does not
+ * speak of; prepares voxels anew from the body's shown surface when the size differs, or when finite elements find no
+ * measured fill. Cut voxels count by their filled share, those less than a quarter full are dropped unless more than
+ * 2.5 % of the volume would go, and the voxels' planes go through the border of the first support or region that cuts
+ * the body, as lab/load_case.h has it. *out heap, pal_set_scene_free; borrows from `from`, which outlives it. REFUSED:
+ * a model that does not fit the body (one sentence why), an unknown word, a size or number out of range; BUDGET, MEMORY
+ */
 pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to, pal_note *note, pal_set_scene **out);
 void pal_set_scene_free(pal_set_scene *scene); /* NULL is fine */
 #endif
