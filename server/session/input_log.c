@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { VERSION = 2, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
+enum { VERSION = 3, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -70,6 +70,7 @@ static int payload_of(pal_input_kind kind)
         return 16;
     case PAL_INPUT_LET_GO:
     case PAL_INPUT_RESET:
+    case PAL_INPUT_RESET_BODY:
         return 0;
     }
     return -1;

@@ -1,13 +1,14 @@
 /* The input log's bytes (private to this room): writer and reader of the records that replay.h speaks of.
  *
- * Little-endian. Header 40 bytes: "palinlog", u32 version 2 (1 has no BRUSH), u32 hash interval in steps, f64 step_s,
- * u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or body), u16 payload
- * bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the next step. The last record is
- * END; a file without it is cut.
+ * Little-endian. Header 40 bytes: "palinlog", u32 version 3 (1 has no BRUSH, 2 no RESET_BODY), u32 hash interval in
+ * steps, f64 step_s, u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or
+ * body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the next step.
+ * The last record is END; a file without it is cut.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
  *   LET_GO    tool    0
  *   RESET     0       0
+ *   RESET_BODY body   0                                  (version 3)
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, soft, pressure_Pa, lift_m[3],
  *                        stiffness_N_m (version 2)
@@ -36,7 +37,8 @@ typedef enum pal_input_kind {
     PAL_INPUT_MATERIAL,
     PAL_INPUT_HASH,
     PAL_INPUT_END,
-    PAL_INPUT_BRUSH
+    PAL_INPUT_BRUSH,
+    PAL_INPUT_RESET_BODY
 } pal_input_kind;
 
 typedef struct pal_input_record {

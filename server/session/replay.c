@@ -28,7 +28,8 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
         if (record.kind == PAL_INPUT_HASH) hash_step = step;
         bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_LET_GO;
         if ((tool && record.index >= (int)header->n_tool) ||
-            ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH) &&
+            ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
+              record.kind == PAL_INPUT_RESET_BODY) &&
              record.index >= (int)header->n_body))
             return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
                                 tool ? "tool" : "body", record.index);
@@ -56,6 +57,9 @@ static pal_err apply(pal_world *world, const pal_input_record *record, pal_repla
     case PAL_INPUT_RESET:
         report->n_command++, pal_world_reset(world);
         break;
+    case PAL_INPUT_RESET_BODY:
+        report->n_command++;
+        return pal_world_reset_body(world, record->index);
     case PAL_INPUT_MATERIAL:
         report->n_command++;
         return pal_world_material(world, record->index, &record->material, note);

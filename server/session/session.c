@@ -17,6 +17,7 @@
 #include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -231,6 +232,12 @@ static void obey(pal_session *s, const pal_command *command)
         for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
         pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
         break;
+    case PAL_COMMAND_RESET_BODY:
+        (void)pal_world_reset_body(s->world, command->body);
+        say(s, &note);
+        pal_input_log_put(s->log,
+                          &(pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = command->body, .step = s->step});
+        break;
     case PAL_COMMAND_MATERIAL:
         if (pal_world_material(s->world, command->body, &command->material, &note)) {
             atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
@@ -270,6 +277,19 @@ static bool take_commands(pal_session *s)
     return any;
 }
 
+/* what went wrong in a step: the bodies that stand still, with their reasons */
+static void tell(pal_session *s, pal_err err)
+{
+    pal_note note;
+    pal_note_set(&note, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
+    for (int b = 0; b < pal_world_bodies(s->world); b++) {
+        const pal_body *body = pal_world_body(s->world, b);
+        size_t used = strlen(note.text);
+        if (body->frozen) (void)snprintf(note.text + used, sizeof note.text - used, "; %s: %s", body->name, body->why);
+    }
+    say(s, &note);
+}
+
 static void step(pal_session *s)
 {
     if (s->n_marks == 0) mark_pace(s, pal_clock_ns());
@@ -283,11 +303,7 @@ static void step(pal_session *s)
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
-    if (err) {
-        pal_note note;
-        pal_note_set(&note, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
-        say(s, &note);
-    }
+    if (err) tell(s, err);
 }
 
 static void estimate(pal_session *s, bool stepped)
@@ -555,6 +571,8 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
     if ((int)command->kind < 0 || command->kind >= PAL_COMMAND_COUNT) return refuse(s);
     if (command->kind == PAL_COMMAND_MATERIAL &&
         (command->body < 0 || command->body >= s->scene->n_body || !material_ok(&command->material)))
+        return refuse(s);
+    if (command->kind == PAL_COMMAND_RESET_BODY && (command->body < 0 || command->body >= s->scene->n_body))
         return refuse(s);
     if (command->kind == PAL_COMMAND_FIELD && !pal_session_gives(s, command->body, command->field)) return refuse(s);
     if (command->kind == PAL_COMMAND_BRUSH &&

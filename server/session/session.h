@@ -30,6 +30,7 @@ typedef enum pal_command_kind {
                              lease ends it, a reset or a session that follows as well */
     PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimate.h), a
                              thread and worlds of its own, is there while anybody does */
+    PAL_COMMAND_RESET_BODY, /* body: that one alone back to rest and unfrozen (pal_world_reset_body) */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 

@@ -7,6 +7,7 @@
 #include "server/mesh/skin.h"
 #include "server/mesh/surface.h"
 #include "server/mesh/tets.h"
+#include "server/sim/rescue.h"
 #include "server/sim/strips.h"
 
 /* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
@@ -73,17 +74,14 @@ typedef struct pal_body {
     struct pal_shell *shell; /* NULL: the body does not adapt */
     struct pal_pack *pack;   /* working arrays of rows and solver (pack.h); NULL: none made */
     struct pal_solid *solid; /* model subdivision_fem (solid.h); heap, freed with the world; NULL: another model */
-    bool frozen;             /* set by finite_guard or the solver: the body no longer moves           */
+    bool frozen;             /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
     double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */
     double h_m;              /* typical element edge                                                  */
     double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
     double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
     double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
-    uint64_t n_capped;       /* node loads shortened since reset                                        */
-    uint64_t n_clamped;      /* node moves shortened by the solver since reset                          */
-    uint64_t n_heavy;   /* sub-steps since reset in which deformation asked for more than the budget of sub-steps */
-    uint64_t n_tangled; /* times since reset that voxel elements were found turned over and ran on their split  */
-    uint64_t n_split;   /* changes between voxel elements and their split                                        */
+    pal_rescues rescue;      /* since reset: what kept it within its bounds, and what that took         */
+    char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
 
     bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
     bool wants_compliance; /* a CONTACT row asks for it: set in its make; the SOLVE row is made after all others */

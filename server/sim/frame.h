@@ -21,6 +21,10 @@ typedef struct pal_frame_part {
     float *position_m; /* [n_vertex][3] */
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
+    char why[PAL_WHY]; /* one sentence while frozen, else empty */
+    /* since the body's reset: what kept it within its bounds (rescue.h), how many in all, and their time */
+    pal_rescues rescue;
+    uint64_t n_rescue, rescue_ns;
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
     /* bodies that adapt (sim/shell.h): the table of drawn triangles at this revision, 0 0 0 in empty places. Vertices
      * of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */

@@ -295,14 +295,16 @@ static void clamp_moves(pal_implicit *core, double tau)
         double far = pal_norm3(way), own = fmin(far, pal_dist3(way, mean));
         if (body->held[i]) continue;
         longest = fmax(longest, own);
-        body->n_clamped += own > most;
+        body->rescue.n_clamped += own > most;
     }
     if (!(longest > most)) return;
+    uint64_t before = pal_clock_ns();
     for (int i = 0; i < core->cg.n; i++) {
         if (body->held[i / 3]) continue;
         double way = body->v[i] - core->start[i] - mean[i % 3];
         body->v[i] = core->start[i] + mean[i % 3] + most / longest * way;
     }
+    body->rescue.ns += pal_clock_ns() - before;
 }
 
 /* the body to where velocities lead from x* */
@@ -411,6 +413,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
     pal_body *body = core->system.body;
     pal_solve_report *to = &core->report;
     int most = core->wish.newton;
+    uint64_t again_ns = 0;
     open_stage(core, tau);
     for (int k = 0;; k++) {
         if (k > 0) memcpy(core->start, body->v, bytes3(core));
@@ -422,7 +425,10 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         double best = core->wish.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
-        if (to->converged || k == most || !isfinite(left)) return PAL_ERR_OK;
+        if (to->converged || k == most || !isfinite(left)) {
+            if (again_ns) body->rescue.ns += pal_clock_ns() - again_ns;
+            return PAL_ERR_OK;
+        }
         /* an iteration of several need not be solved better than the next one starts */
         iterate(core, tau, core->wish.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
         if (core->wish.newton > 1) {
@@ -431,7 +437,11 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         }
         to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
         to->converged = core->cg.residual <= best;
+        /* from here on all is a rescue: the search, and the iterations that follow it */
+        if (most > core->wish.newton) body->rescue.ns += pal_clock_ns() - again_ns;
         if (most == rescue_newton || !rises(core)) return PAL_ERR_OK;
+        again_ns = pal_clock_ns();
+        body->rescue.n_search++;
         search(core, tau);
         most++;
     }
@@ -448,7 +458,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
     if (!sound(body)) {
-        body->frozen = true;
+        pal_body_stop_bad(body, "");
         return false;
     }
     if (core->system.n_free == 0) {
@@ -512,10 +522,10 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
     if (!sound(body)) {
+        pal_body_stop_bad(body, "");
         memcpy(body->x, core->x0, bytes3(core));
         memset(body->v, 0, bytes3(core));
         pal_body_place(body);
-        body->frozen = true;
         return;
     }
     pal_body_place(body);

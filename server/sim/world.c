@@ -38,7 +38,7 @@ static double find_limit(pal_world *w, int sub)
         double limit = solve->effect->limit(solve->self, &step);
         step.body->dt_limit_s = limit;
         if (!(limit > 0))
-            step.body->frozen = true;
+            pal_body_stop_bad(step.body, "its forces allow no stable step");
         else if (limit < least)
             least = limit;
     }
@@ -240,25 +240,39 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     return PAL_ERR_OK;
 }
 
+/* one body at rest, its rows as at load */
+static void rest_body(pal_world *w, int b)
+{
+    pal_body *body = &w->plan.body[b];
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof, n_load = 3 * sizeof(double) * (size_t)body->n_node;
+    memcpy(body->x, body->x_rest, n_byte);
+    memset(body->v, 0, n_byte);
+    memset(body->g, 0, n_byte);
+    memset(body->f, 0, n_load);
+    memset(body->load, 0, n_load);
+    if (body->outer) memset(body->outer, 0, n_load);
+    pal_body_place(body);
+    body->frozen = false;
+    body->why[0] = 0;
+    body->rescue = (pal_rescues){0};
+    for (int i = 0; i < w->plan.n_row; i++) {
+        const pal_row *row = &w->plan.row[i];
+        if (w->plan.row_body[i] == b && row->effect->reset) row->effect->reset(row->self, body);
+    }
+}
+
+pal_err pal_world_reset_body(pal_world *world, int body)
+{
+    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
+    rest_body(world, body);
+    find_limit(world, 0);
+    run_output(world);
+    return PAL_ERR_OK;
+}
+
 void pal_world_reset(pal_world *world)
 {
-    for (int b = 0; b < world->plan.n_body; b++) {
-        pal_body *body = &world->plan.body[b];
-        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof, n_load = 3 * sizeof(double) * (size_t)body->n_node;
-        memcpy(body->x, body->x_rest, n_byte);
-        memset(body->v, 0, n_byte);
-        memset(body->g, 0, n_byte);
-        memset(body->f, 0, n_load);
-        memset(body->load, 0, n_load);
-        if (body->outer) memset(body->outer, 0, n_load);
-        pal_body_place(body);
-        body->frozen = false;
-        body->n_capped = body->n_clamped = body->n_heavy = 0;
-    }
-    for (int i = 0; i < world->plan.n_row; i++) {
-        const pal_row *row = &world->plan.row[i];
-        if (row->effect->reset) row->effect->reset(row->self, &world->plan.body[world->plan.row_body[i]]);
-    }
+    for (int b = 0; b < world->plan.n_body; b++) rest_body(world, b);
     for (int t = 0; t < world->tools.n_tool; t++) {
         const pal_tool *old = &world->tools.tool[t];
         world->tools.tool[t] = (pal_tool){.radius_m = old->radius_m, .force_cap_N = old->force_cap_N};
@@ -291,6 +305,7 @@ void pal_world_follow(pal_world *world, const pal_world *before, int edited, con
         if (known && to_v) memcpy(body->v, to_v, n_byte);
         pal_body_place(body);
         body->frozen = from->frozen;
+        memcpy(body->why, from->why, sizeof body->why);
         pal_world_moved(w, b);
     }
     run_output(w);
@@ -381,14 +396,25 @@ static void cap_loads(pal_body *body)
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 <= cap2) continue;
+        uint64_t before = pal_clock_ns();
         pal_scale3(load, body->load_cap_N / sqrt(load2), load);
-        body->n_capped++;
+        body->rescue.n_capped++;
+        body->rescue.ns += pal_clock_ns() - before;
     }
+}
+
+/* a row that fails stops its body alone; true: it has */
+static bool fails(pal_world *w, pal_body *body, const pal_row *row, pal_err err)
+{
+    if (!err) return false;
+    pal_body_stop(body, -1, "row %s: %s", row->effect->name, pal_err_text(err));
+    if (!w->row_err) w->row_err = err;
+    return true;
 }
 
 /* lasting loads and tool contact of one body, every node's load within the cap. Loads that an implicit solver gives
  * back by the stiffness of the contact are beyond any cap: there the rows themselves keep what is left within it */
-static pal_err run_contact(pal_world *w, pal_step *step, int b)
+static void run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
     begin_loads(body);
@@ -396,11 +422,10 @@ static pal_err run_contact(pal_world *w, pal_step *step, int b)
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
-        PAL_TRY(row->effect->run(row->self, step));
+        if (fails(w, body, row, row->effect->run(row->self, step))) return;
         row->spent_ns += pal_clock_ns() - before;
     }
     if (!body->implicit && (body->outer || step->n_contact > 0)) cap_loads(body);
-    return PAL_ERR_OK;
 }
 
 static uint64_t force_ns(const pal_step *step)
@@ -410,7 +435,7 @@ static uint64_t force_ns(const pal_step *step)
     return sum;
 }
 
-static pal_err run_substep(pal_world *w, pal_step *shared)
+static void run_substep(pal_world *w, pal_step *shared)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
         if (w->plan.body[b].frozen) continue;
@@ -418,21 +443,22 @@ static pal_err run_substep(pal_world *w, pal_step *shared)
         step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
         step.time_s = shared->time_s;
         step.heavy = shared->heavy && step.body->dt_limit_s < step.dt_s;
-        step.body->n_heavy += step.heavy;
-        PAL_TRY(run_contact(w, &step, b));
+        step.body->rescue.n_heavy += step.heavy;
+        run_contact(w, &step, b);
         pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
-        PAL_TRY(solve->effect->run(solve->self, &step));
+        if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
         /* nodes follow their points, for contact and for what comes after the step */
         if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_place(step.body);
-        solve->spent_ns += pal_clock_ns() - before - (force_ns(&step) - forces);
+        uint64_t took = pal_clock_ns() - before;
+        solve->spent_ns += took - (force_ns(&step) - forces);
+        if (step.heavy) step.body->rescue.ns += took;
         pal_arena_reset(w->scratch);
     }
-    return PAL_ERR_OK;
 }
 
 /* ADAPT, GUARD and OUTPUT rows, once a step */
-static pal_err run_stage(pal_world *w, pal_stage stage, double dt_s)
+static void run_stage(pal_world *w, pal_stage stage, double dt_s)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_step step = step_of(w, b);
@@ -444,16 +470,15 @@ static pal_err run_stage(pal_world *w, pal_stage stage, double dt_s)
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
             uint64_t before = pal_clock_ns();
-            PAL_TRY(row->effect->run(row->self, &step));
+            if (fails(w, step.body, row, row->effect->run(row->self, &step))) break;
             row->spent_ns += pal_clock_ns() - before;
         }
         pal_arena_reset(w->scratch);
     }
-    return PAL_ERR_OK;
 }
 
 /* equal sub-steps; the rest of the step is split again when the limit falls below them */
-static pal_err run_substeps(pal_world *w, double dt_s)
+static void run_substeps(pal_world *w, double dt_s)
 {
     double done_s = 0;
     int n_sub = 0;
@@ -470,11 +495,10 @@ static pal_err run_substeps(pal_world *w, double dt_s)
         step.sub = sub, step.n_sub = n_sub;
         step.time_s = w->time_s + done_s + step.dt_s;
         pal_tools_advance(&w->tools, sub, n_sub, step.dt_s);
-        PAL_TRY(run_substep(w, &step));
+        run_substep(w, &step);
         done_s += step.dt_s;
     }
     w->n_substep = n_sub;
-    return PAL_ERR_OK;
 }
 
 static int count_frozen(const pal_world *w)
@@ -494,16 +518,17 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     int frozen = count_frozen(w);
     for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++) pal_tool_take(&w->tools.tool[t], w->has_asked[t] ? &w->asked[t] : NULL);
-    PAL_TRY(run_substeps(w, dt_s));
+    w->row_err = PAL_ERR_OK;
+    run_substeps(w, dt_s);
     pal_tools_finish(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;
-    PAL_TRY(run_stage(w, PAL_STAGE_ADAPT, dt_s));
-    PAL_TRY(run_stage(w, PAL_STAGE_GUARD, dt_s));
-    PAL_TRY(run_stage(w, PAL_STAGE_OUTPUT, dt_s));
+    run_stage(w, PAL_STAGE_ADAPT, dt_s);
+    run_stage(w, PAL_STAGE_GUARD, dt_s);
+    run_stage(w, PAL_STAGE_OUTPUT, dt_s);
     w->step_ns = pal_clock_thread_ns() - began;
     w->end_ns = pal_clock_ns();
-    return count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
+    return w->row_err ? w->row_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
 }
 
 /* ---- what others see: frames and shown surfaces are in world_show.c ---- */

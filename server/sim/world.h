@@ -45,12 +45,16 @@ void pal_world_destroy(pal_world *world);  /* [load] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
 /* moves on by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number; BUDGET: more sub-steps than
  * scene->most_substep even at rest, a body that refines being on its finest level (both: nothing moved); FROZEN when a
- * body diverged in this step and was frozen. Where deformation alone asks for more than the budget, the step goes on
+ * body diverged in this step and was frozen (body.why), or what a row gave that failed and froze its body: the other
+ * bodies have moved on all the same. Where deformation alone asks for more than the budget, the step goes on
  * with heavier nodes (pal_body.n_heavy). [sim]
  */
 pal_err pal_world_step(pal_world *world, double dt_s);
 /* every body back to rest, tools let go, time 0. [sim] */
 void pal_world_reset(pal_world *world);
+/* one body back to rest, as it was at load, and unfrozen; its lasting loads and brushes end, tools let it go. The other
+ * bodies, tools and time go on as if nothing had been. REFUSED: no such body. [sim] */
+pal_err pal_world_reset_body(pal_world *world, int body);
 /* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
 /* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body

@@ -26,6 +26,7 @@ struct pal_world {
     double step_s, time_s, limit_s, rest_limit_s;
     int most_substep, n_substep;
     uint64_t tick, step_ns, end_ns;
+    pal_err row_err;       /* of the first row that failed in this step */
     pal_field_rows fields; /* put in while the world runs */
     pal_brush_rows brushes;
 };

@@ -41,6 +41,10 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     const double *o = body->offset_m;
     to->revision = body->revision;
     to->frozen = body->frozen;
+    memcpy(to->why, body->why, sizeof to->why);
+    to->rescue = body->rescue;
+    to->n_rescue = pal_rescues_sum(&body->rescue);
+    to->rescue_ns = body->rescue.ns;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
         copy_slots(body->shell, to);

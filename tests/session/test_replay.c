@@ -58,6 +58,7 @@ static bool record(void)
         if (seq == 70) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET}), tick = 0;
         if (seq == 82) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = blow});
         if (seq == 90) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 0, .brush = lift});
+        if (seq == 20) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = 0});
         if (seq == 96) pal_session_put_pose(s, 1, NULL);
         if (seq == 130) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift});
         if (seq == 140) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1});
@@ -78,7 +79,7 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     if (err) CHECK_FAIL("%s", note.text);
     CHECK(report.n_tick > 200);
     CHECK(report.n_pose > 10);
-    CHECK_INT(report.n_command, 6);
+    CHECK_INT(report.n_command, 7);
     CHECK(report.n_hash > 3);
     CHECK_INT(report.n_hash_equal, report.n_hash);
     CHECK(report.first_difference == UINT64_MAX);
@@ -152,7 +153,7 @@ static void broken_logs_are_refused_with_one_sentence(void)
         uint8_t value;
         const char *part;
     } fault[] = {{0, 'x', "not an input log"},
-                 {8, 3, "version 3"},
+                 {8, 4, "version 4"},
                  {13, 0xff, "steps between hashes"},
                  {24, (uint8_t)(whole[24] ^ 1), "another scene"},
                  {PAL_INPUT_HEADER, 77, "no record of kind 77"},

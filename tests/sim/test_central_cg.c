@@ -264,7 +264,7 @@ static void limit_holds_in_flight(void)
         solid_run(&w, 1, limit);
     }
     CHECK(pal_body_finite(&w.t.body));
-    CHECK_INT(w.t.body.n_clamped, 0);
+    CHECK_INT(w.t.body.rescue.n_clamped, 0);
     CHECK_LE(farthest(&w), 40);
     CHECK_LE(0.5 * at_rest, least);
     CHECK_LE(most, 2 * at_rest);

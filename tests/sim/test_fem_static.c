@@ -263,7 +263,7 @@ static void turned_corners_keep_the_law(void)
                report.n_newton, report.residual, 100 * end[2] / b.length_m);
         CHECK(report.converged);
         CHECK_LE(report.n_newton, 30);
-        CHECK_INT((int)b.body->n_tangled, 0);
+        CHECK_INT((int)b.body->rescue.n_tangled, 0);
         CHECK(end[2] > b.length_m);
         for (int c = 0; c < 3; c++) CHECK_NEAR(reaction[c], load[c], 1e-6 * load[2]);
         beam_free(&b);

@@ -57,7 +57,17 @@ static void hurt(tool_scene *s, insult how)
         run_guard(s);
     else
         CHECK_INT(pal_world_step(s->world, s->scene->step_s), PAL_ERR_FROZEN);
+    const char *const want[] = {"is no number", "is no number", "is no number", "m allowed", "RMS allowed"};
+    char name[24];
+    snprintf(name, sizeof name, "node %d of tetrahedron ", node);
+    CHECK(strstr(s->body->why, want[how]) != NULL);
+    /* numbers that are none have spread in that step */
+    if (how == FAR_AWAY) CHECK(strncmp(s->body->why, name, strlen(name)) == 0);
+    CHECK(strstr(s->body->why, ") mm: ") != NULL && strlen(s->body->why) < PAL_WHY - 1);
+    CHECK_INT(s->body->rescue.n_stopped, 1);
     check_frozen_and_back(s, good);
+    CHECK_TEXT(s->body->why, "");
+    CHECK_INT(s->body->rescue.n_stopped, 0);
     for (int c = 0; c < 3; c++) CHECK(isfinite(tool_of(s, 0)->force_N[c]));
 }
 
@@ -81,9 +91,120 @@ static void leaves_a_body_alone_that_is_only_pressed_hard(void)
     tool_scene_close(&s);
 }
 
+/* two slabs beside each other; the second one as it moves alone is what it does beside one that stops */
+static bool open_pair(tool_scene *s)
+{
+    if (!slab_scene(s, 4, 4, 3, 0.01, 1, 0.01, 15)) return false;
+    s->scene->n_body = 2;
+    s->scene->body[1] = s->scene->body[0];
+    snprintf(s->scene->body[1].name, sizeof s->scene->body[1].name, "other");
+    return tool_scene_open(s);
+}
+
+/* the second body is under load and falls into its rest; bad: in its way the first one is hurt and reset */
+static bool run_pair(bool bad, double *x)
+{
+    tool_scene s;
+    if (!open_pair(&s)) return false;
+    pal_body *one = pal_world_body(s.world, 0), *two = pal_world_body(s.world, 1);
+    const double force_N[3] = {0.05, 0, -0.1};
+    CHECK_INT(pal_world_load(s.world, 1, two->n_node - 1, force_N), 0);
+    for (int k = 0; k < 30; k++) {
+        if (bad && k == 10) one->x[4] = NAN;
+        pal_err err = pal_world_step(s.world, s.scene->step_s);
+        CHECK_INT(err, bad && k == 10 ? PAL_ERR_FROZEN : 0);
+        CHECK(one->frozen == (bad && k >= 10 && k <= 20) && !two->frozen);
+        if (bad && k == 20) CHECK_INT(pal_world_reset_body(s.world, 0), 0);
+        if (bad && k == 20) CHECK(!one->frozen && one->why[0] == 0);
+    }
+    CHECK_LE(rms_displacement(one), 1e-12);
+    CHECK(rms_displacement(two) > 1e-5);
+    CHECK_INT(pal_world_reset_body(s.world, 2), PAL_ERR_REFUSED);
+    CHECK_INT(pal_world_reset_body(s.world, -1), PAL_ERR_REFUSED);
+    memcpy(x, two->x, 3 * sizeof(double) * (size_t)two->n_dof);
+    tool_scene_close(&s);
+    return true;
+}
+
+static void one_of_two_bodies_stops_alone_and_is_reset_alone(void)
+{
+    static double x[2][3 * 5 * 5 * 4];
+    REQUIRE(run_pair(false, x[0]) && run_pair(true, x[1]));
+    CHECK(memcmp(x[0], x[1], sizeof x[0]) == 0);
+}
+
+static pal_err fail(void *self, pal_step *step)
+{
+    (void)self, (void)step;
+    return PAL_ERR_NUMERIC;
+}
+
+static void a_row_that_fails_stops_its_body_alone(void)
+{
+    tool_scene s;
+    REQUIRE(open_pair(&s));
+    pal_body *one = pal_world_body(s.world, 0), *two = pal_world_body(s.world, 1);
+    two->v[3 * (two->n_dof - 1)] = 0.1;
+    pal_row *row = NULL;
+    for (int i = 0; i < pal_world_rows(s.world) && !row; i++) {
+        const pal_row *r = pal_world_effect(s.world, i);
+        if (r->effect->stage == PAL_STAGE_SOLVE) row = (pal_row *)(uintptr_t)r;
+    }
+    REQUIRE(row != NULL);
+    const pal_effect *was = row->effect;
+    pal_effect bad = *was;
+    bad.run = fail;
+    row->effect = &bad;
+    CHECK_INT(pal_world_step(s.world, s.scene->step_s), PAL_ERR_NUMERIC);
+    CHECK(one->frozen && !two->frozen && rms_displacement(two) > 1e-6);
+    CHECK(strstr(one->why, "row verlet: no usable number") != NULL);
+    CHECK_INT(pal_world_step(s.world, s.scene->step_s), 0);
+    row->effect = was;
+    CHECK_INT(pal_world_reset_body(s.world, 0), 0);
+    CHECK_INT(pal_world_step(s.world, s.scene->step_s), 0);
+    CHECK(!one->frozen);
+    tool_scene_close(&s);
+}
+
+static void rescues_are_counted_with_their_price_and_only_then(void)
+{
+    tool_scene s;
+    REQUIRE(open_two(&s));
+    pal_frame *frame = pal_frame_create(s.world);
+    REQUIRE(frame != NULL);
+    for (int i = 0; i < 20; i++) {
+        move_tool(&s, 0, 0.02, 0.02, 0.04 - 0.0004 * i, false);
+        REQUIRE(step_world(&s, 1));
+    }
+    pal_world_frame(s.world, frame);
+    CHECK_INT(frame->part[0].n_rescue, 0);
+    CHECK_INT(frame->part[0].rescue_ns, 0);
+    const double force_N[3] = {0, 0, 1e6};
+    CHECK_INT(pal_world_load(s.world, 0, s.body->n_node - 1, force_N), 0);
+    REQUIRE(step_world(&s, 2));
+    pal_world_frame(s.world, frame);
+    const pal_frame_part *part = &frame->part[0];
+    CHECK_INT(part->rescue.n_capped, s.body->rescue.n_capped);
+    CHECK(part->rescue.n_capped >= 2 && part->n_rescue >= part->rescue.n_capped);
+    CHECK(part->rescue_ns > 0);
+    s.body->x[0] = NAN;
+    CHECK_INT(pal_world_step(s.world, s.scene->step_s), PAL_ERR_FROZEN);
+    pal_world_frame(s.world, frame);
+    CHECK(part->frozen && strstr(part->why, "node 0 of tetrahedron 0 at (0, 0, 0) mm") == part->why);
+    CHECK_INT(part->rescue.n_stopped, 1);
+    pal_world_reset(s.world);
+    pal_world_frame(s.world, frame);
+    CHECK(!part->frozen && part->why[0] == 0 && part->n_rescue == 0 && part->rescue_ns == 0);
+    pal_frame_destroy(frame);
+    tool_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(freezes_what_is_no_number_too_far_or_too_fast);
     RUN(leaves_a_body_alone_that_is_only_pressed_hard);
+    RUN(one_of_two_bodies_stops_alone_and_is_reset_alone);
+    RUN(a_row_that_fails_stops_its_body_alone);
+    RUN(rescues_are_counted_with_their_price_and_only_then);
     return check_report();
 }

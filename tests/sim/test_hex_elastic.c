@@ -514,7 +514,7 @@ static void ten_thousand_turns_leave_no_energy(void)
         }
         CHECK_LE(worst, 1e-6 * strained);
         CHECK_LE(most, 1e-9 * 5000 * 0.01 * 0.01);
-        CHECK_INT(b.body.n_tangled, 0);
+        CHECK_INT(b.body.rescue.n_tangled, 0);
         hex_body_free(&b);
     }
 }

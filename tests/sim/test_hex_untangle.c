@@ -58,7 +58,7 @@ static void untangles_bodies_that_are_turned_over(void)
         hex_effect->tangent->linearise(b.row, &b.body);
         CHECK(b.row->tangled);
         relax(&b, 300);
-        CHECK(b.body.n_tangled > 0 && b.body.n_split >= 2);
+        CHECK(b.body.rescue.n_tangled > 0 && b.body.rescue.n_split >= 2);
         CHECK(!b.row->tangled);
         CHECK_LE(0.9, pal_hex_least_corner(b.row, &b.body));
         CHECK_LE(hex_energy(&b), 1e-3 * small);

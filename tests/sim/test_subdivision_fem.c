@@ -428,7 +428,7 @@ static void a_pressed_solid_pushes_back_calmly(void)
             for (int k = 0; k < c.body->n_shown && !way; k++)
                 deepest = fmax(deepest, 0.01 - pal_dist3(c.body->d + 3 * c.body->shown_node[k], pose.position_m));
         }
-        CHECK_INT(c.body->n_capped, 0);
+        CHECK_INT(c.body->rescue.n_capped, 0);
         clay_close(&c);
     }
     printf("  %.3f N, implicit %.3f N, vertices up to %.2f mm inside, changes by %.2g N a step\n", force[0], force[1],

@@ -138,13 +138,13 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
     const double size = fabs(first) > 0 ? fabs(first) : 1;
     *out = (hard_run){.finite = true, .most = 0, .back_s = INFINITY};
     for (int i = 0; i < n; i++) {
-        uint64_t split = b->body->n_split;
+        uint64_t split = b->body->rescue.n_split;
         pal_err err = pal_world_step(b->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(b->body) && !b->body->frozen;
         if (!out->finite) return;
         double now = pal_world_energy_J(b->world) - hard_work_J(b->body);
         out->most = fmax(out->most, now / size);
-        if (b->body->n_split == split) out->rise = fmax(out->rise, (now - before) / size);
+        if (b->body->rescue.n_split == split) out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (hard_rms(b->body) > 1e-3 * b->body->size_m || hard_inverted(b) > 0)
             out->back_s = INFINITY;

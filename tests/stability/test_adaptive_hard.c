@@ -173,7 +173,7 @@ static void a_million_newtons_on_a_node_for_a_second_leave_nothing(void)
             REQUIRE(!pal_world_step(s.world, 1.0 / STEPS_A_SECOND));
             REQUIRE(pal_body_finite(s.body));
         }
-        CHECK(s.body->n_capped > 0);
+        CHECK(s.body->rescue.n_capped > 0);
         REQUIRE(!pal_world_load(s.world, 0, node, (const double[3]){0, 0, 0}));
         CHECK_LE(run_bounded(&s, recover_s), 1e-3);
         shell_scene_close(&s);

@@ -98,7 +98,7 @@ static void mirrored_hexahedra_are_found_untangled_and_counted(void)
         fem_beam b;
         REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2, 0.45));
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        CHECK_INT(b.body->n_tangled, 0);
+        CHECK_INT(b.body->rescue.n_tangled, 0);
         hard_insult(&b, HARD_MIRROR, 0);
         double first = hard_energy_J(&b);
         CHECK(first > 0);
@@ -110,7 +110,7 @@ static void mirrored_hexahedra_are_found_untangled_and_counted(void)
         hard_steps(&b, 3, 1.0 / 60, &run);
         CHECK_LE(run.most, 1.01);
         CHECK_LE(run.back_s, 3);
-        CHECK(b.body->n_tangled > 0 && b.body->n_split >= 2 && b.body->n_split % 2 == 0);
+        CHECK(b.body->rescue.n_tangled > 0 && b.body->rescue.n_split >= 2 && b.body->rescue.n_split % 2 == 0);
         CHECK_INT(hard_hex_row(&b)->tangled, 0);
         beam_free(&b);
     }

@@ -42,7 +42,7 @@ static void a_meganewton_on_a_node_is_capped_and_forgotten(void)
                 REQUIRE(pal_body_finite(s.body) && !s.body->frozen);
                 far = fmax(far, pal_dist3(s.body->d + 3 * node, s.body->node_rest + 3 * node));
             }
-            CHECK(s.body->n_capped > 0);
+            CHECK(s.body->rescue.n_capped > 0);
             REQUIRE(!pal_world_load(s.world, 0, node, (const double[3]){0, 0, 0}));
             solid_steps(&s, 2, solid_step_s, &run);
             CHECK(run.finite);
@@ -154,7 +154,7 @@ static void numbers_that_are_none_are_refused(void)
     /* 1e300 N is a number: it is capped */
     REQUIRE(!pal_world_load(s.world, 0, 30, (const double[3]){0, 0, 1e300}));
     REQUIRE(solid_scene_step(&s, 10, solid_step_s));
-    CHECK(pal_body_finite(s.body) && s.body->n_capped > 0);
+    CHECK(pal_body_finite(s.body) && s.body->rescue.n_capped > 0);
     solid_scene_close(&s);
 }
 

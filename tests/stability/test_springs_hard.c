@@ -152,7 +152,7 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_stay_bound
             printf("  %s%s: %d of %d inverted, RMS %.2g of S, %d sub-steps, %llu heavy, %llu clamped\n",
                    held ? "held, " : "free, ", names[kind], count_inverted(b.body), b.body->tets->n_tet,
                    rms_from_rest(b.body) / b.body->size_m, pal_world_substeps(b.world),
-                   (unsigned long long)b.body->n_heavy, (unsigned long long)b.body->n_clamped);
+                   (unsigned long long)b.body->rescue.n_heavy, (unsigned long long)b.body->rescue.n_clamped);
             CHECK_LE(extent(b.body), 1.5 * fmax(before, b.body->size_m));
             /* what can only go one way goes back; a mirrored or shuffled body may rest tangled */
             if (goes_back) CHECK_LE(rms_from_rest(b.body), 1e-3 * b.body->size_m);
@@ -196,7 +196,7 @@ static void a_meganewton_on_a_vertex_is_shortened_and_forgotten(void)
             REQUIRE(!pal_world_step(b.world, 1.0 / 60));
             REQUIRE(pal_body_finite(b.body));
         }
-        CHECK(b.body->n_capped > 0);
+        CHECK(b.body->rescue.n_capped > 0);
         CHECK_LE(extent(b.body), 10 * b.body->size_m);
         REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 0}));
         run_bounded(&b, 2);

@@ -2,7 +2,8 @@
  *
  * Diverged means: a position or velocity is not finite, a node is farther than `reach` box diagonals from its rest
  * place, or the root mean square speed is beyond `speed_m_s`. The last good positions (a copy of every step) come back,
- * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it).
+ * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it),
+ * body->why names the point, the element and the number.
  * Of a body whose points carry nodes (pal_body.embed) the points are looked at and put back, the speed is that of the
  * nodes.
  * Of a body that adapts (sim/shell.h) the active points are looked at and copied. Which are active is not taken back:
@@ -122,6 +123,28 @@ static bool sound(const finite_guard *guard, const pal_body *body)
     return near && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
+/* names what is out of bounds: no number, the point that is farthest out, or the fastest one */
+static void tell(const finite_guard *guard, pal_body *body)
+{
+    double far_m = 0, fast_m_s = 0, limit = guard->reach * body->size_m;
+    int far = -1, fast = -1;
+    bool number = pal_body_finite(body);
+    for (int k = 0; k < body->n_active && number; k++) {
+        int i = pal_body_point(body, k);
+        double way[3], longest, speed = pal_norm3(body->v + 3 * (size_t)i);
+        pal_sub3(way, body->x + 3 * (size_t)i, body->x_rest + 3 * (size_t)i);
+        longest = fmax(fabs(way[0]), fmax(fabs(way[1]), fabs(way[2])));
+        if (longest > far_m) far_m = longest, far = i;
+        if (speed > fast_m_s) fast_m_s = speed, fast = i;
+    }
+    if (!number)
+        pal_body_stop_bad(body, "");
+    else if (far_m > limit)
+        pal_body_stop(body, far, "%.3g m from its rest place, %.3g m allowed", far_m, limit);
+    else
+        pal_body_stop(body, fast, "speed %.3g m/s, %.3g m/s RMS allowed", fast_m_s, guard->speed_m_s);
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     finite_guard *guard = self;
@@ -131,8 +154,8 @@ static pal_err run(void *self, pal_step *step)
         if (!body->frozen) keep(guard, body);
         return PAL_ERR_OK;
     }
+    tell(guard, body);
     put_back(guard, body);
-    body->frozen = true;
     return PAL_ERR_OK;
 }
 

@@ -6,6 +6,7 @@
  *
  * The tangent is taken at linearise, and with it the decision on untangling; without an implicit solver the decision is
  * taken whenever forces are. */
+#include "server/base/clock.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_hex.h"
 
@@ -35,9 +36,11 @@ static pal_err run(void *self, pal_step *step)
     pal_hex_row *row = self;
     pal_body *body = step->body;
     if (!row->implicit) pal_hex_untangle(row, body);
-    body->n_tangled = row->n_tangled, body->n_split = row->n_switch;
+    body->rescue.n_tangled = row->n_tangled, body->rescue.n_split = row->n_switch;
     if (row->tangled) {
+        uint64_t before = pal_clock_ns();
         pal_elastic_tets_force(row->split, body->d, body->f);
+        body->rescue.ns += pal_clock_ns() - before;
         return PAL_ERR_OK;
     }
     pal_slots_load(body->slots, body->d);

@@ -15,6 +15,7 @@
  * `internal` holds for corotational and neo_hookean; the linear law has no net force, but a torque once it turns, as
  * every linear model. Ten nodes, corotational: a torque too while an element is crushed to next to nothing
  * (elastic_tet.h). */
+#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_tet.h"
@@ -138,8 +139,10 @@ static pal_elastic_tets *acting(void *self)
 static pal_err run(void *self, pal_step *step)
 {
     const tet_row *row = self;
-    if (row->split) step->body->n_tangled = row->n_tangled, step->body->n_split = row->n_switch;
+    if (row->split) step->body->rescue.n_tangled = row->n_tangled, step->body->rescue.n_split = row->n_switch;
+    uint64_t before = row->tangled ? pal_clock_ns() : 0;
     pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
+    if (row->tangled) step->body->rescue.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 

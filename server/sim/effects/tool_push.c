@@ -285,7 +285,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->behind_s > push->slip_s) {
         seat(push, h, body, next, tool->radius_m);
-        h->ease = 0;
+        h->ease = 0, body->rescue.n_slipped++;
     }
     if (!body->shell) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);

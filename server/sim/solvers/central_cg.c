@@ -23,6 +23,7 @@
  * one would have moved farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three
  * times and grow again by 2 % of what was halved a sub-step. Where the
  * world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
+#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
 #include "server/num/envelope.h"
@@ -416,11 +417,19 @@ static void find_change(central *row, const pal_step *step)
     row->report.converged = row->cg.residual <= row->tolerance * norm;
 }
 
+static void shorten(pal_body *body, double *v, double to)
+{
+    uint64_t before = pal_clock_ns();
+    pal_scale3(v, to, v);
+    body->rescue.n_clamped++;
+    body->rescue.ns += pal_clock_ns() - before;
+}
+
 /* v+ and p+; the longest way of a point against the others, which is no number when a velocity is none */
 static double move(central *row, pal_body *body, double dt)
 {
     const double most_m = most_move_S * body->size_m;
-    const uint64_t n_clamped = body->n_clamped;
+    const uint64_t n_clamped = body->rescue.n_clamped;
     double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
@@ -429,7 +438,7 @@ static double move(central *row, pal_body *body, double dt)
         if (!body->held[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;
         poison += 0 * way;
-        if (way > most_m) pal_scale3(v, most_m / way, v), body->n_clamped++;
+        if (way > most_m) shorten(body, v, most_m / way);
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);
         pal_copy3(row->was + 3 * (size_t)i, v);
         pal_axpy3(mean, 1.0 / body->n_dof, v);
@@ -439,7 +448,7 @@ static double move(central *row, pal_body *body, double dt)
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
         most2 = fmax(most2, pal_dot3(from, from));
     }
-    row->wild = body->n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
+    row->wild = body->rescue.n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
     return dt * sqrt(most2) + poison;
 }
 

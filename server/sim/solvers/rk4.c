@@ -16,6 +16,7 @@
  * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Held nodes stand, led ones
  * (held 2) keep their velocity. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
  * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. */
+#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/pack.h"
@@ -532,7 +533,7 @@ static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double most
         if (way > most_m) move *= most_m / way;
         if (speed > most_m) v *= most_m / speed;
         if (way > most_m || speed > most_m) *to = pal_join(from + move, v);
-        body->n_clamped += way > most_m || speed > most_m;
+        body->rescue.n_clamped += way > most_m || speed > most_m;
     }
 }
 
@@ -559,7 +560,11 @@ static pal_err run(void *self, pal_step *step)
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
     double way = sqrt(stage_last(row, body, &r)), most = most_move_S * body->size_m;
-    if (way > most) clamp_moves(row, body, step->dt_s, most);
+    if (way > most) {
+        uint64_t before = pal_clock_ns();
+        clamp_moves(row, body, step->dt_s, most);
+        body->rescue.ns += pal_clock_ns() - before;
+    }
     give_motion(body);
     give_forces(row, body);
     row->way_m += way > most ? most : way;

@@ -556,7 +556,7 @@ static pal_err run(void *self, pal_step *step)
     static_newton *row = self;
     pal_body *body = row->system.body;
     if (!pal_body_finite(body)) {
-        body->frozen = true;
+        pal_body_stop_bad(body, "");
         return PAL_ERR_OK;
     }
     memcpy(row->x0, body->x, bytes3(row));
@@ -578,9 +578,9 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_rest(row, step));
     if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
     if (!pal_body_finite(body)) {
+        pal_body_stop_bad(body, "");
         memcpy(body->x, row->x0, bytes3(row));
         pal_body_place(body);
-        body->frozen = true;
         return PAL_ERR_OK;
     }
     pal_body_place(body);

@@ -7,6 +7,7 @@
  * time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a sub-step (numerics.md part 3).
  * Where the world cannot afford the sub-steps (step->heavy), the same inequality is met by adding mass to the nodes
  * that break it. */
+#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 
@@ -100,7 +101,7 @@ static void clamp_moves(pal_body *body, double dt_s, double most_m)
         double *v = body->v + 3 * i, move = pal_norm3(v) * dt_s;
         if (move > most_m) {
             pal_scale3(v, most_m / move, v);
-            body->n_clamped++;
+            body->rescue.n_clamped++;
         }
     }
 }
@@ -126,7 +127,11 @@ static pal_err run(void *self, pal_step *step)
         poison += 0 * v2;
     }
     double way = sqrt(most2) * dt, most = most_move_S * body->size_m;
-    if (way > most) clamp_moves(body, dt, most);
+    if (way > most) {
+        uint64_t before = pal_clock_ns();
+        clamp_moves(body, dt, most);
+        body->rescue.ns += pal_clock_ns() - before;
+    }
     /* a velocity that is no number makes the way one too, and so the next limit */
     row->way_m += (way < most ? way : most) + poison;
 
