@@ -41,6 +41,7 @@ static void leave_room(pal_hub *hub, pal_client *c)
     empty(c);
     if (!c->id) return;
     pal_hub_look_away(c);
+    pal_hub_estimate_none(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
     pal_members_leave(&room->members, c->id);
@@ -75,7 +76,7 @@ static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
     c->peer->ops->ready(c->peer);
 }
 
-static pal_packet *encode(pal_hub *hub, const pal_control *control)
+pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
 {
     size_t n = 0;
     int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
@@ -90,7 +91,7 @@ static pal_packet *encode(pal_hub *hub, const pal_control *control)
 void pal_hub_say(pal_hub *hub, pal_client *client, const pal_control *control)
 {
     if (client->peer->drop_code) return;
-    queue(hub, client, encode(hub, control));
+    queue(hub, client, pal_hub_encode(hub, control));
 }
 
 void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
@@ -143,7 +144,7 @@ static bool client_waiting(void *user, const pal_peer *peer)
     (void)user;
     if (!c || peer->drop_code) return false;
     return c->n_queue || c->members_due || c->status_due || c->haptic || c->out_begin < c->n_out ||
-           pal_hub_wants_field(c) || wants_cycle(c);
+           pal_hub_wants_estimate(c) || pal_hub_wants_field(c) || wants_cycle(c);
 }
 
 static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
@@ -161,7 +162,7 @@ static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
         to->colour = pal_hub_colour(from->id);
         pal_plain_text(to->name, sizeof to->name, from->name);
     }
-    return encode(hub, hub->control);
+    return pal_hub_encode(hub, hub->control);
 }
 
 static pal_packet *status_message(pal_hub *hub, pal_client *c)
@@ -202,7 +203,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }
-    return encode(hub, hub->control);
+    return pal_hub_encode(hub, hub->control);
 }
 
 /* the triangles that go with the newest frame of a part; false: they cannot be had now, so the frame waits too */
@@ -258,6 +259,7 @@ static pal_packet *take_next(pal_hub *hub, pal_client *c)
         c->status_due = false;
         if ((p = status_message(hub, c))) return p;
     }
+    if ((p = pal_hub_next_estimate(hub, c))) return p;
     if (c->haptic) {
         p = c->haptic;
         c->haptic = NULL;
@@ -398,6 +400,7 @@ static void hub_tick(void *user)
     for (int r = 0; r < hub->n_room; r++) {
         pal_stream_measure(hub->room[r].stream, now);
         pal_hub_tell_fields(&hub->room[r]);
+        pal_hub_tell_estimates(&hub->room[r]);
     }
     for (int i = 0; i < hub->most_clients; i++) {
         pal_client *c = &hub->client[i];
@@ -413,6 +416,7 @@ static void hub_tick(void *user)
         }
         judge_tier(hub, c, now);
         c->status_due = true;
+        pal_hub_estimates_due(c);
         c->peer->ops->ready(c->peer);
     }
 }

@@ -57,6 +57,7 @@ static void say_hello(pal_hub *hub, pal_client *c)
     hub->control->type = PAL_CONTROL_HELLO;
     pal_stream_hello(c->room->stream, hello);
     pal_hub_hello_rows(c->room, hello);
+    hello->estimates = true;
     hello->credit = (uint32_t)c->credit.most;
     hello->you_id = pal_stream_wire_id(m->id);
     hello->you_role = (pal_wire_role)m->role;
@@ -145,6 +146,7 @@ static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 {
     static const char *const verbs[PAL_COMMAND_FIELD] = {"pause", "resume", "step", "reset", "material"};
     pal_command command = {.kind = PAL_COMMAND_COUNT};
+    if (pal_hub_estimate_order(hub, c, order)) return; /* everybody may look */
     if (!pal_members_may_command(&c->room->members, c->id)) {
         pal_hub_complain(hub, c, "role", "a viewer gives no commands");
         return;

@@ -1,5 +1,5 @@
-/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c, hub_plan.c and hub_pages.c share: the hub's records. Private to
- * these. Thread: [net]. */
+/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c, hub_plan.c, hub_accuracy.c and hub_pages.c share: the hub's
+ * records. Private to these. Thread: [net]. */
 #ifndef PAL_NET_HUB_PARTS_H
 #define PAL_NET_HUB_PARTS_H
 #include "server/net/credit.h"
@@ -32,6 +32,7 @@ typedef struct pal_client {
     uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_places.change */
     uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */
     uint64_t sent_field[PAL_BODY_MAX];  /* number of the values sent last            */
+    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* looked at; to be sent */
     /* figures */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status                   */
@@ -55,6 +56,8 @@ typedef struct pal_hub_room {
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last asked for */
+    int n_estimate[PAL_BODY_MAX];        /* clients that look at an estimate */
+    bool told_estimate[PAL_BODY_MAX];    /* the session knows that some do */
     const pal_priced_setting *setting;   /* what a study found, for body setting_body [n_setting]; NULL: no study */
     int n_setting, setting_body;
     int tier_users[PAL_STREAM_TIER];
@@ -86,6 +89,7 @@ struct pal_hub {
 };
 
 /* hub.c */
+pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control);           /* NULL: it cannot be, logged */
 void pal_hub_say(pal_hub *hub, pal_client *client, const pal_control *control); /* queues; overflow drops the client */
 void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
@@ -110,6 +114,14 @@ uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
 bool pal_hub_sculpt_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
 void pal_hub_sculpt_turn(pal_hub *hub); /* what the workshop has done, and the next order */
 void pal_hub_sculpt_end(pal_hub *hub);  /* closes the sessions that the hub made */
+/* hub_accuracy.c */
+/* the order `estimate` is dealt with; false: it is another one */
+bool pal_hub_estimate_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
+void pal_hub_estimate_none(pal_client *client);  /* it goes */
+void pal_hub_tell_estimates(pal_hub_room *room); /* what the session does not know yet */
+void pal_hub_estimates_due(pal_client *client);  /* a tick */
+bool pal_hub_wants_estimate(const pal_client *client);
+pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
 /* hub_plan.c */
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);

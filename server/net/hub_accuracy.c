@@ -1,0 +1,206 @@
+/* What accuracy costs, as clients see it (protocol/README.md): the study's points once, then a body's estimate at every
+ * tick of the hub, to those who ask for it. Who looks is counted as with fields; the session estimates while anybody
+ * does, and nothing of it is there while nobody does. */
+#include "server/net/hub_parts.h"
+
+#include "server/net/plain_text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+void pal_hub_tell_estimates(pal_hub_room *room)
+{
+    for (int b = 0; b < room->stream->n_part; b++) {
+        bool wanted = room->n_estimate[b] > 0;
+        if (wanted == room->told_estimate[b]) continue;
+        pal_command command = {.kind = PAL_COMMAND_ESTIMATE, .body = b, .wanted = wanted};
+        /* a session whose queue is full is told at the next tick */
+        if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->told_estimate[b] = wanted;
+    }
+}
+
+static void look(pal_client *c, int body, bool wanted)
+{
+    if (c->estimate[body] == wanted) return;
+    c->room->n_estimate[body] += wanted ? 1 : -1;
+    c->estimate[body] = wanted;
+    if (!wanted) c->estimate_due[body] = false;
+}
+
+void pal_hub_estimate_none(pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++) look(c, b, false);
+    pal_hub_tell_estimates(c->room);
+}
+
+/* ---- the study ---- */
+
+/* points of one method are one curve: "fem hex8_bbar", "tet_springs calibrated" */
+static void method_text(const pal_setting *s, char out[PAL_WIRE_METHOD_BYTES])
+{
+    char text[3 * PAL_NAME];
+    snprintf(text, sizeof text, "%s%s%s%s", s->model, s->element[0] ? " " : "", s->element,
+             s->k_distance_J > 0 ? " calibrated" : "");
+    pal_plain_text(out, PAL_WIRE_METHOD_BYTES, text);
+}
+
+static void say_study(pal_hub *hub, pal_client *c, int body)
+{
+    const pal_hub_room *room = c->room;
+    pal_wire_study *study = &hub->control->study;
+    int n = room->setting_body == body ? room->n_setting : 0, n_front = 0;
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_STUDY;
+    pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
+    for (int i = 0; i < n; i++) n_front += room->setting[i].front;
+    /* as many as fit, those of the front before others */
+    int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
+    for (int i = 0; i < n && study->n_point < PAL_WIRE_POINT_MAX; i++) {
+        const pal_priced_setting *p = &room->setting[i];
+        char text[PAL_SETTING_TEXT];
+        if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
+        room_left -= !p->front;
+        pal_wire_point *to = &study->point[study->n_point++];
+        *to = (pal_wire_point){.index = (uint32_t)i, .ms = p->ms, .error_m = p->error_m, .front = p->front};
+        method_text(&p->setting, to->method);
+        pal_plain_text(to->label, sizeof to->label, pal_setting_text(&p->setting, text));
+    }
+    pal_hub_say(hub, c, hub->control);
+}
+
+/* ---- the estimate ---- */
+
+/* does a setting of a study say what holds now? Words and numbers that it leaves open fit anything; better: how many
+ * it does say. -1: it says something else */
+static int likeness(const pal_setting *of, const pal_setting *now)
+{
+    const char *const word[][2] = {
+        {of->model, now->model}, {of->element, now->element}, {of->law, now->law}, {of->solver, now->solver}};
+    const double value[][2] = {{of->size, now->size},
+                               {of->step_s, now->step_s},
+                               {of->tolerance, now->tolerance},
+                               {of->k_distance_J, now->k_distance_J}};
+    int n_same = 0;
+    for (int i = 0; i < 4; i++) {
+        bool same = !strcmp(word[i][0], word[i][1]);
+        if (!same && (i == 0 || (word[i][0][0] && word[i][1][0]))) return -1;
+        n_same += same;
+    }
+    for (int i = 0; i < 4; i++) {
+        double a = value[i][0], b = value[i][1];
+        bool same = fabs(a - b) <= 1e-6 * fabs(a), open = i < 3 && (a == 0 || b == 0);
+        if (!same && !open) return -1;
+        n_same += same;
+    }
+    return n_same;
+}
+
+/* index in the study of what holds now, NaN: it is none of those */
+static double point_of(const pal_hub_room *room, int body, const pal_setting *now)
+{
+    int best = -1, best_same = -1;
+    for (int i = 0; i < room->n_setting && room->setting_body == body; i++) {
+        int n_same = likeness(&room->setting[i].setting, now);
+        if (n_same > best_same) best = i, best_same = n_same;
+    }
+    return best < 0 ? NAN : (double)best;
+}
+
+static double known(double value)
+{
+    return isfinite(value) ? value : NAN;
+}
+
+static void put_neighbour(const pal_priced_setting *from, const pal_setting *now, pal_wire_neighbour *to)
+{
+    const pal_setting *s = &from->setting;
+    char text[PAL_SETTING_TEXT];
+    bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
+    bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
+    bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
+    *to = (pal_wire_neighbour){.ms = known(from->ms), .error_m = known(from->error_m)};
+    if (s->size > 0 && s->size != now->size) to->size = (uint32_t)s->size;
+    if (step) to->step_ms = 1e3 * s->step_s;
+    if (tolerance) to->tolerance = s->tolerance;
+    snprintf(to->knob, sizeof to->knob, "%s",
+             method      ? "method"
+             : to->size  ? "resolution"
+             : step      ? "step"
+             : tolerance ? "tolerance"
+                         : "solver");
+    pal_plain_text(to->label, sizeof to->label, pal_setting_text(s, text));
+}
+
+static void put_estimate(const pal_estimate *from, const pal_setting *now, pal_wire_estimate *to)
+{
+    to->tick = from->tick;
+    to->time_s = isfinite(from->time_s) ? from->time_s : 0;
+    to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
+    to->ms = known(from->ms), to->most_m = known(from->most_m), to->error_m = known(from->error_m);
+    to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
+    to->time_m = known(from->time_m), to->model_m = known(from->model_m), to->zz_percent = known(from->zz_percent);
+    to->locking = from->locking;
+    pal_plain_text(to->note, sizeof to->note, from->note);
+    for (int i = 0; i < from->n_neighbour && i < PAL_WIRE_NEIGHBOUR_MAX; i++)
+        put_neighbour(&from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
+}
+
+pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
+{
+    pal_wire_estimate *out = &hub->control->estimate;
+    pal_estimate estimate;
+    pal_setting now;
+    char text[PAL_SETTING_TEXT];
+    int b = 0;
+    while (b < c->room->stream->n_part && !c->estimate_due[b]) b++;
+    if (b == c->room->stream->n_part) return NULL;
+    c->estimate_due[b] = false;
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_ESTIMATE;
+    pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
+    pal_setting_of(pal_session_scene(c->room->session), b, &now);
+    pal_plain_text(out->setting, sizeof out->setting, pal_setting_text(&now, text));
+    out->point = point_of(c->room, b, &now);
+    out->ms = c->room->stream->step_ms > 0 ? c->room->stream->step_ms : NAN;
+    out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
+        out->zz_percent = NAN;
+    if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(&estimate, &now, out);
+    return pal_hub_encode(hub, hub->control);
+}
+
+bool pal_hub_wants_estimate(const pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++)
+        if (c->estimate_due[b]) return true;
+    return false;
+}
+
+void pal_hub_estimates_due(pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++) c->estimate_due[b] = c->estimate[b];
+}
+
+bool pal_hub_estimate_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    const pal_stream *s = c->room->stream;
+    int body = order->target[0] ? -1 : 0;
+    if (strcmp(order->verb, "estimate")) return false;
+    for (int b = 0; b < s->n_part; b++)
+        if (!strcmp(s->part[b].info.name, order->target)) body = b;
+    if (body < 0) {
+        pal_hub_complain(hub, c, "target", "there is no body %s", order->target);
+        return true;
+    }
+    if (order->n_arg != 1 || strcmp(order->arg[0].key, "on")) {
+        pal_hub_complain(hub, c, "args", "estimate takes on");
+        return true;
+    }
+    bool wanted = order->arg[0].value != 0, before = c->estimate[body];
+    look(c, body, wanted);
+    pal_hub_tell_estimates(c->room);
+    if (wanted && !before) say_study(hub, c, body);
+    c->estimate_due[body] = wanted;
+    c->peer->ops->ready(c->peer);
+    return true;
+}
