@@ -137,7 +137,8 @@ static void put_estimate(const pal_estimate *from, const pal_setting *now, pal_w
     to->tick = from->tick;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
-    to->ms = known(from->ms), to->most_m = known(from->most_m), to->error_m = known(from->error_m);
+    if (isfinite(from->ms) && from->ms > 0) to->ms = from->ms;
+    to->most_m = known(from->most_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m), to->zz_percent = known(from->zz_percent);
     to->locking = from->locking;

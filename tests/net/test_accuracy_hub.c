@@ -1,0 +1,181 @@
+/* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
+#include "server/net/server.h"
+#include "server/session/estimate.h"
+#include "tests/net/mem_client.h"
+#include "tests/net/small_scene.h"
+
+#include <time.h>
+
+static small_scene organ;
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pal_transport *road;
+static uint64_t now_ns;
+
+enum { POINTS = 5 };
+static pal_priced_setting setting[POINTS];
+
+/* as a study keeps them, by ascending ms; point 2 is what the scene has, point 3 was not measured */
+static void make_points(void)
+{
+    static const double ms[POINTS] = {0.1, 0.2, 0.4, 0.8, 3}, error_m[POINTS] = {4e-3, 5e-3, 2e-3, NAN, 1e-4};
+    memset(setting, 0, sizeof setting);
+    for (int i = 0; i < POINTS; i++) {
+        setting[i].ms = ms[i], setting[i].error_m = error_m[i];
+        setting[i].front = i != 1 && i != 3;
+        pal_setting_of(&organ.scene, 0, &setting[i].setting);
+        setting[i].setting.size = 4 + 2 * i;
+    }
+    pal_setting_of(&organ.scene, 0, &setting[2].setting);
+    snprintf(setting[4].setting.model, sizeof setting[4].setting.model, "fem");
+    snprintf(setting[4].setting.element, sizeof setting[4].setting.element, "hex8_bbar");
+}
+
+static void begin(bool with_study)
+{
+    static const pal_priced_setting *list[1];
+    static int n_setting[1] = {POINTS}, body[1] = {0};
+    pal_session *sessions[1];
+    pal_note note = {""};
+    list[0] = setting;
+    gate = pal_server_gate_create();
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
+    pal_server_options net = {
+        .road = "mem", .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body};
+    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    sessions[0] = session;
+    if (pal_server_open(&net, sessions, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    pal_server_connect(server, gate);
+    road = pal_server_transport(server);
+    now_ns = 1000000000ull;
+}
+
+static void end(void)
+{
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+}
+
+/* half a second of the hub's time, so that every turn is a tick */
+static void turn(mem_client *a, mem_client *b)
+{
+    now_ns += 500000000ull;
+    pal_server_turn(server, now_ns);
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+    nanosleep(&(struct timespec){0, 2000000}, NULL);
+}
+
+#define UNTIL(condition, a, b)                                                                                         \
+    do {                                                                                                               \
+        for (int turns = 0; !(condition) && turns < 10000; turns++) turn(a, b);                                        \
+        CHECK(condition);                                                                                              \
+    } while (0)
+
+#define LOOK(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"on\":" #on "}}"
+
+static void nothing_is_estimated_while_nobody_looks(void)
+{
+    mem_client ada;
+    uint64_t made = pal_estimator_made();
+    begin(true);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 3, &ada, NULL);
+    CHECK(ada.last[PAL_CONTROL_HELLO].hello.estimates);
+    CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
+    CHECK_INT(pal_estimator_threads(), 0);
+    CHECK(pal_estimator_made() == made);
+    mem_end(&ada);
+    end();
+}
+
+static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
+{
+    mem_client ada, bo;
+    begin(true);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    turn(&ada, &bo);
+    mem_text(&ada, LOOK(1));
+    mem_text(&ada, LOOK(1)); /* twice is once */
+    UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 2, &ada, &bo);
+    CHECK_INT(bo.n_text[PAL_CONTROL_STUDY] + bo.n_text[PAL_CONTROL_ESTIMATE], 0);
+    CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
+    const pal_wire_study *study = &ada.last[PAL_CONTROL_STUDY].study;
+    CHECK_TEXT(study->body, "organ");
+    CHECK_INT(study->n_point, POINTS - 1);
+    CHECK_INT(study->point[3].index, 4);
+    CHECK_TEXT(study->point[3].method, "fem hex8_bbar");
+    CHECK(study->point[0].front && !study->point[1].front && study->point[3].error_m == 1e-4);
+    const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
+    CHECK_TEXT(e->body, "organ");
+    CHECK(e->point == 2 && strstr(e->setting, "tet_springs"));
+    UNTIL(e->ms > 0, &ada, &bo);
+    UNTIL(pal_estimator_threads() == 1, &ada, &bo);
+
+    /* who may do nothing else may look all the same; one estimator serves both */
+    mem_text(&bo, LOOK(1));
+    UNTIL(bo.n_text[PAL_CONTROL_ESTIMATE] > 0 && bo.n_text[PAL_CONTROL_STUDY] == 1, &ada, &bo);
+    CHECK_INT(pal_estimator_threads(), 1);
+    mem_text(&ada, LOOK(0));
+    for (int i = 0; i < 3; i++) turn(&ada, &bo);
+    int n_ada = ada.n_text[PAL_CONTROL_ESTIMATE], n_bo = bo.n_text[PAL_CONTROL_ESTIMATE];
+    UNTIL(bo.n_text[PAL_CONTROL_ESTIMATE] > n_bo + 2, &ada, &bo);
+    CHECK_INT(ada.n_text[PAL_CONTROL_ESTIMATE], n_ada);
+    CHECK_INT(pal_estimator_threads(), 1);
+    mem_end(&bo); /* gone without a word */
+    UNTIL(pal_estimator_threads() == 0, &ada, NULL);
+    CHECK_INT(ada.n_bad, 0);
+    mem_end(&ada);
+    end();
+}
+
+static void without_a_study_there_is_the_estimate_alone(void)
+{
+    mem_client ada;
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_text(&ada, LOOK(1));
+    UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 0, &ada, NULL);
+    CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
+    CHECK_INT(ada.last[PAL_CONTROL_STUDY].study.n_point, 0);
+    CHECK(isnan(ada.last[PAL_CONTROL_ESTIMATE].estimate.point));
+    mem_end(&ada);
+    end();
+}
+
+static void bad_orders_are_refused_with_a_sentence(void)
+{
+    static const char *const bad[] = {
+        "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"liver\",\"args\":{\"on\":1}}",
+        "{\"type\":\"command\",\"verb\":\"estimate\"}",
+        "{\"type\":\"command\",\"verb\":\"estimate\",\"args\":{\"off\":1}}"};
+    static const char *const said[] = {"there is no body liver", "estimate takes on", "estimate takes on"};
+    mem_client ada;
+    begin(true);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    turn(&ada, NULL);
+    for (int i = 0; i < 3; i++) {
+        mem_text(&ada, bad[i]);
+        UNTIL(ada.n_text[PAL_CONTROL_ERROR] == i + 1, &ada, NULL);
+        CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].problem.text, said[i]);
+    }
+    CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
+    CHECK_INT(pal_estimator_threads(), 0);
+    mem_end(&ada);
+    end();
+}
+
+int main(void)
+{
+    if (!small_scene_make(&organ, "small")) return 1;
+    make_points();
+    RUN(nothing_is_estimated_while_nobody_looks);
+    RUN(who_asks_sees_study_and_estimate_until_the_last_has_gone);
+    RUN(without_a_study_there_is_the_estimate_alone);
+    RUN(bad_orders_are_refused_with_a_sentence);
+    pal_prepared_free(&organ.mesh);
+    return check_report();
+}
