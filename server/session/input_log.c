@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { VERSION = 3, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
+enum { VERSION = 4, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -64,6 +64,8 @@ static int payload_of(pal_input_kind kind)
         return 32;
     case PAL_INPUT_BRUSH:
         return 112;
+    case PAL_INPUT_ROW:
+        return 4 + PAL_NAME;
     case PAL_INPUT_HASH:
         return 8;
     case PAL_INPUT_END:
@@ -283,6 +285,9 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
         put_f(&at, (double[3]){b->radius_m, b->soft, b->pressure_Pa}, 3);
         put_f(&at, b->lift_m, 3);
         put_f(&at, &b->stiffness_N_m, 1);
+    } else if (record->kind == PAL_INPUT_ROW) {
+        put_u(&at, record->wanted, 4);
+        memcpy(at, record->row, PAL_NAME), at += PAL_NAME;
     } else if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
         put_u(&at, record->hash, 8);
         if (record->kind == PAL_INPUT_END) put_u(&at, record->n_dropped, 8);
@@ -391,6 +396,13 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
         get_f(&from, &b->pressure_Pa, 1);
         get_f(&from, b->lift_m, 3);
         get_f(&from, &b->stiffness_N_m, 1);
+    } else if (record.kind == PAL_INPUT_ROW) {
+        uint64_t on = get_u(&from, 4);
+        if (on > 1 || from[PAL_NAME - 1] != 0)
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: a row that is neither on nor off, or no name",
+                                name, *at);
+        record.wanted = on == 1;
+        memcpy(record.row, from, PAL_NAME);
     } else if (record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END) {
         record.hash = get_u(&from, 8);
         if (record.kind == PAL_INPUT_END) record.n_dropped = get_u(&from, 8);

@@ -1,9 +1,9 @@
 /* The input log's bytes (private to this room): writer and reader of the records that replay.h speaks of.
  *
- * Little-endian. Header 40 bytes: "palinlog", u32 version 3 (1 has no BRUSH, 2 no RESET_BODY), u32 hash interval in
- * steps, f64 step_s, u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index (tool or
- * body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the next step.
- * The last record is END; a file without it is cut.
+ * Little-endian. Header 40 bytes: "palinlog", u32 version 4 (1 has no BRUSH, 2 no RESET_BODY, 3 no ROW), u32 hash
+ * interval in steps, f64 step_s, u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index
+ * (tool or body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the
+ * next step. The last record is END; a file without it is cut.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
  *   LET_GO    tool    0
@@ -12,6 +12,7 @@
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, soft, pressure_Pa, lift_m[3],
  *                        stiffness_N_m (version 2)
+ *   ROW       body   52  u32 on, name[48] ended by zeros (version 4)
  *   HASH      0       8  u64 world hash, at least every `hash interval` steps
  *   END       0      16  u64 world hash, u64 records that were dropped (0: the log is whole)
  *
@@ -38,7 +39,8 @@ typedef enum pal_input_kind {
     PAL_INPUT_HASH,
     PAL_INPUT_END,
     PAL_INPUT_BRUSH,
-    PAL_INPUT_RESET_BODY
+    PAL_INPUT_RESET_BODY,
+    PAL_INPUT_ROW
 } pal_input_kind;
 
 typedef struct pal_input_record {
@@ -50,6 +52,8 @@ typedef struct pal_input_record {
     uint64_t hash, n_dropped;
     int slot; /* BRUSH: tool */
     pal_brush brush;
+    bool wanted; /* ROW */
+    char row[PAL_NAME];
 } pal_input_record;
 
 /* a number for everything of a scene that decides the simulation: steps, meshes, materials, entries; not its texts */

@@ -29,7 +29,7 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
         bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_LET_GO;
         if ((tool && record.index >= (int)header->n_tool) ||
             ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
-              record.kind == PAL_INPUT_RESET_BODY) &&
+              record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_ROW) &&
              record.index >= (int)header->n_body))
             return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
                                 tool ? "tool" : "body", record.index);
@@ -42,7 +42,8 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
 }
 
 /* one record against the world, which has taken record->step steps */
-static pal_err apply(pal_world *world, const pal_input_record *record, pal_replay_report *report, pal_note *note)
+static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_record *record,
+                     pal_replay_report *report, pal_note *note)
 {
     uint64_t hash;
     switch (record->kind) {
@@ -66,6 +67,9 @@ static pal_err apply(pal_world *world, const pal_input_record *record, pal_repla
     case PAL_INPUT_BRUSH:
         report->n_command++;
         return pal_world_brush(world, record->index, record->slot, &record->brush, note);
+    case PAL_INPUT_ROW:
+        report->n_command++;
+        return pal_world_switch_row(world, scene, record->index, record->row, record->wanted, note);
     case PAL_INPUT_HASH:
     case PAL_INPUT_END:
         hash = pal_world_hash(world);
@@ -96,7 +100,7 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const 
                 return pal_note_set(note, err, "%s: step %llu: %s", name, (unsigned long long)report->n_tick,
                                     pal_err_text(err));
         }
-        PAL_TRY(apply(world, &record, report, note));
+        PAL_TRY(apply(world, scene, &record, report, note));
     }
     return PAL_ERR_OK;
 }

@@ -67,6 +67,7 @@ struct pal_session {
     pal_trio frames;
     _Atomic bool stop;
     _Atomic uint64_t beat_ns, n_refused;
+    _Atomic int n_watch; /* who looks at frames; only_watched alone asks */
     pthread_mutex_t note_lock;
     pal_note note;
     pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
@@ -74,7 +75,7 @@ struct pal_session {
 
     /* the simulation thread's own */
     pal_input_log *log;
-    bool paused;
+    bool paused, watched;
     int single;       /* steps asked for while paused        */
     uint64_t step;    /* taken since open: resets do not count */
     uint64_t n_late;  /* began late                          */
@@ -213,6 +214,31 @@ static void brush(pal_session *s, const pal_command *command)
     say(s, &note);
 }
 
+static void switch_row(pal_session *s, const pal_command *command)
+{
+    pal_note note = {""};
+    if (pal_world_switch_row(s->world, s->scene, command->body, command->row, command->wanted, &note)) {
+        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+    } else {
+        pal_input_record record = {
+            .kind = PAL_INPUT_ROW, .index = command->body, .step = s->step, .wanted = command->wanted};
+        memcpy(record.row, command->row, sizeof record.row);
+        pal_input_log_put(s->log, &record);
+        note.text[0] = 0;
+    }
+    say(s, &note);
+}
+
+/* has somebody begun to look, or the last one ceased to? true: what is shown is new */
+static bool look_around(pal_session *s)
+{
+    bool watched = !s->options.only_watched || atomic_load_explicit(&s->n_watch, memory_order_relaxed) > 0;
+    if (watched == s->watched) return false;
+    s->watched = watched;
+    pal_world_watch(s->world, watched);
+    return watched;
+}
+
 static void obey(pal_session *s, const pal_command *command)
 {
     pal_note note = {""};
@@ -261,6 +287,9 @@ static void obey(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_ESTIMATE:
         pal_watch_ask(&s->watch, command->body, command->wanted);
+        break;
+    case PAL_COMMAND_ROW:
+        switch_row(s, command);
         break;
     case PAL_COMMAND_COUNT:
         break;
@@ -335,6 +364,7 @@ static void *simulate(void *user)
     pal_session *s = user;
     uint64_t due = pal_clock_ns();
     s->end_ns = due;
+    look_around(s);
     publish(s);
     while (!atomic_load_explicit(&s->stop, memory_order_acquire)) {
         pace(s, &due);
@@ -342,6 +372,7 @@ static void *simulate(void *user)
         uint64_t now = pal_clock_ns();
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
         changed = take_poses(s, now) || changed;
+        changed = look_around(s) || changed;
         bool moves = !s->paused || s->single > 0;
         if (moves) {
             step(s);
@@ -363,7 +394,7 @@ static pal_err copy_plan(pal_session *s)
     if (!s->row) return PAL_ERR_MEMORY;
     for (int k = 0; k < s->n_row; k++) {
         pal_world_row(s->world, k, &s->row[k]);
-        s->row[k].spent_ns = 0;
+        s->row[k].spent_ns = s->row[k].n_run = 0;
     }
     s->n_part = pal_world_parts(s->world);
     for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
@@ -432,6 +463,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->step_ns = (uint64_t)(scene->step_s * SECOND_NS + 0.5);
     s->lease_ns = (uint64_t)((s->options.lease_s > 0 ? s->options.lease_s : 0.25) * SECOND_NS);
     s->paused = s->options.start_paused;
+    s->watched = true;
     atomic_init(&s->beat_ns, pal_clock_ns());
     pal_err err = prepare(s, note);
     if (!err && !s->options.hold) err = start(s, note);
@@ -467,6 +499,22 @@ void pal_session_close(pal_session *s)
     release(s);
 }
 
+/* rows that were switched off stay off, as far as the new scene has them */
+static void hand_rows(pal_session *to, const pal_session *from)
+{
+    for (int k = 0; k < from->n_row; k++) {
+        bool there = false;
+        for (int i = 0; i < pal_world_rows(from->world) && !there; i++) {
+            pal_row_info now;
+            pal_world_row(from->world, i, &now);
+            there = !strcmp(now.name, from->row[k].name) && !strcmp(now.body, from->row[k].body);
+        }
+        for (int b = 0; b < to->scene->n_body && !there; b++)
+            if (!strcmp(to->scene->body[b].name, from->row[k].body))
+                (void)pal_world_switch_row(to->world, to->scene, b, from->row[k].name, false, NULL);
+    }
+}
+
 /* what the thread of `from` knew and that of `to` goes on with; poses that had not been taken yet as well */
 static void hand_over(pal_session *to, pal_session *from)
 {
@@ -483,6 +531,9 @@ static void hand_over(pal_session *to, pal_session *from)
     to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
                           memory_order_relaxed);
+    atomic_store_explicit(&to->n_watch, atomic_load_explicit(&from->n_watch, memory_order_relaxed),
+                          memory_order_relaxed);
+    hand_rows(to, from);
     memcpy(to->n_look, from->n_look, sizeof to->n_look);
     pal_watch_hand_over(&to->watch, &from->watch);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
@@ -524,7 +575,7 @@ int pal_session_rows(const pal_session *s)
 
 void pal_session_row(const pal_session *s, int row, pal_row_info *out)
 {
-    *out = row >= 0 && row < s->n_row ? s->row[row] : (pal_row_info){"", "", "", 0, 0};
+    *out = row >= 0 && row < s->n_row ? s->row[row] : (pal_row_info){.name = "", .body = "", .stage = "", .why = ""};
 }
 
 int pal_session_parts(const pal_session *s)
@@ -582,6 +633,9 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
         return refuse(s);
     if (command->kind == PAL_COMMAND_ESTIMATE && (command->body < 0 || command->body >= s->scene->n_body))
         return refuse(s);
+    if (command->kind == PAL_COMMAND_ROW &&
+        (command->body < 0 || command->body >= s->scene->n_body || !memchr(command->row, 0, sizeof command->row)))
+        return refuse(s);
     return pal_ring_put(s->command, command);
 }
 
@@ -593,6 +647,11 @@ bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
 const pal_frame *pal_session_take_frame(pal_session *s)
 {
     return pal_trio_take(&s->frames);
+}
+
+void pal_session_watch(pal_session *s, bool looks)
+{
+    atomic_fetch_add_explicit(&s->n_watch, looks ? 1 : -1, memory_order_relaxed);
 }
 
 bool pal_session_alive(const pal_session *s)

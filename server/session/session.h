@@ -31,6 +31,8 @@ typedef enum pal_command_kind {
     PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimate.h), a
                              thread and worlds of its own, is there while anybody does */
     PAL_COMMAND_RESET_BODY, /* body: that one alone back to rest and unfrozen (pal_world_reset_body) */
+    PAL_COMMAND_ROW,        /* body, row, wanted: switches a row of the plan off and on (world.h); recorded, kept by a
+                               session that follows; why not: pal_session_last_note */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 
@@ -42,12 +44,14 @@ typedef struct pal_command {
     bool wanted;
     int slot;
     pal_brush brush;
+    char row[PAL_NAME];
 } pal_command;
 
 typedef struct pal_session_options {
     double lease_s; /* 0: 0.25                                                                   */
     bool start_paused;
     bool hold;                /* the thread does not run yet: pal_session_follow starts it                 */
+    bool only_watched;        /* what is shown is computed only while pal_session_watch says that somebody looks */
     bool unpaced;             /* step as fast as possible (tests, replay); frames are still newest-wins    */
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: nobody     */
     void *user;
@@ -86,6 +90,10 @@ pal_err pal_session_put_pose(pal_session *session, int tool, const pal_pose *pos
 pal_err pal_session_command(pal_session *session, const pal_command *command);
 /* newest unseen frame or NULL; valid until the next call. One reader. [net] */
 const pal_frame *pal_session_take_frame(pal_session *session);
+/* one more (true) or one less who looks at the frames; counts only with the option only_watched, where it begins with
+ * nobody: what is shown, skins above all, is then not computed, and frames bring positions as they were last (n_output
+ * of a part stays). The first who comes gets a frame of the present within a step, paused or not. [any] */
+void pal_session_watch(pal_session *session, bool looks);
 /* did the thread tick in the last second (or is it paused)? for /healthz [any] */
 bool pal_session_alive(const pal_session *session);
 /* a body's material as the world has it: of the scene, or the last one that was not refused; copies. [any] */

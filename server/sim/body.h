@@ -75,6 +75,9 @@ typedef struct pal_body {
     struct pal_pack *pack;   /* working arrays of rows and solver (pack.h); NULL: none made */
     struct pal_solid *solid; /* model subdivision_fem (solid.h); heap, freed with the world; NULL: another model */
     bool frozen;             /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
+    bool asleep;             /* set by row sleep: at rest, so none of its rows is run until something comes near */
+    bool stale;              /* x has changed since its OUTPUT rows were run                                     */
+    uint64_t n_output;       /* times its OUTPUT rows were run since load: `shown` changed no more often        */
     double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */
     double h_m;              /* typical element edge                                                  */
     double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */

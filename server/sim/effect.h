@@ -48,7 +48,8 @@ typedef struct pal_build {
     const pal_scene *scene;
     const pal_body_def *def;
     pal_body *body;
-    pal_arena *arena;    /* world memory                                                     */
+    pal_arena *arena;    /* the row's memory: gone when it is switched off                   */
+    pal_arena *lasting;  /* the body's memory, for what other rows use as well; NULL: arena  */
     size_t scratch_byte; /* a row raises it to the scratch it needs in a sub-step            */
     pal_note *note;      /* may be NULL                                                      */
     const pal_row *made; /* this body's rows made so far: all others when SOLVE is made [n_made] */
@@ -129,7 +130,13 @@ typedef struct pal_effect {
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
     /* optional, for implicit solvers; a body with an implicit solver refuses `internal` rows without it */
     const pal_tangent *tangent;
-    bool implicit; /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
+    bool implicit;   /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
+    bool keeps_rows; /* SOLVE: holds pointers or patterns of the body's rows, so it is made anew when they change */
+    /* time from which the row's force no longer changes with time by itself, s; INFINITY: never. NULL: it never does */
+    double (*settled_s)(const void *self);
+    /* GUARD, of a body that it put to sleep (body->asleep): shall it wake in the step that begins? step as of that
+     * step's first sub-step, tools with where they go in it */
+    bool (*wakes)(void *self, pal_step *step);
     /* FORCE: adds to sum [n_node] the row's field times volume and to volume_m3 [n_node] the volume it stands for */
     void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
     unsigned fields; /* what measure gives, 1 << pal_field each */
@@ -145,6 +152,9 @@ struct pal_row {
     void *self;
     uint64_t spent_ns; /* in the last step; FORCE rows inside SOLVE are counted on their own and not in SOLVE */
     size_t n_byte;     /* memory it took at load                                                              */
+    uint64_t n_run;    /* times it was run since load                                                         */
+    const char *why;   /* what in the scene calls for it; of the body's memory, never NULL in a plan          */
+    pal_arena *arena;  /* its own memory; NULL: somebody else's                                               */
 };
 
 /* d = embed x; f = load, then every FORCE row adds (those with drag only when drag_apart is false), then g = embed' f;

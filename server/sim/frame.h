@@ -25,6 +25,8 @@ typedef struct pal_frame_part {
     /* since the body's reset: what kept it within its bounds (rescue.h), how many in all, and their time */
     pal_rescues rescue;
     uint64_t n_rescue, rescue_ns;
+    bool asleep;       /* at rest: its rows are not run until something comes near (row sleep)      */
+    uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
     /* bodies that adapt (sim/shell.h): the table of drawn triangles at this revision, 0 0 0 in empty places. Vertices
      * of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */

@@ -14,5 +14,7 @@ struct pal_model {
     const char *name; /* tet_springs | subdivision_fem | adaptive_springs | fem */
     /* allocates body arrays (pal_body_allocate), masses, rest; lists the rows. [load] */
     pal_err (*build)(pal_item *item, pal_build *build, pal_recipe *out);
+    /* the rows alone, of a body that was built: the same list. [sim] */
+    pal_err (*list)(pal_item *item, pal_build *build, pal_recipe *out);
 };
 #endif

@@ -43,6 +43,7 @@ pal_err pal_pack_gather(pal_step *step)
     for (int i = 0; i < step->n_force; i++) {
         pal_row *row = &step->force[i];
         if (step->drag_apart && row->effect->drag) continue;
+        row->n_run++;
         PAL_TRY(row->effect->pull(row->self, step));
         uint64_t now = pal_clock_ns();
         row->spent_ns += now - before;

@@ -1,5 +1,5 @@
 /* Scene -> bodies and ordered rows. */
-#include "server/sim/plan.h"
+#include "server/sim/plan_parts.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
@@ -10,28 +10,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* what one body's entries ask for, in order, before rows are made */
-typedef struct wish {
-    const pal_effect *effect;
-    pal_item *item;
-} wish;
-enum { WISH_MAX = 2 * PAL_ROW_ITEMS + 2 };
-
-typedef struct build_state {
-    pal_build build;
-    pal_recipe recipe;
-    pal_item own[PAL_ROW_ITEMS + 3]; /* copies of the scene's items: reading marks them */
-    wish wish[WISH_MAX];
-    int n_wish;
-} build_state;
-
 const char *pal_stage_name(pal_stage stage)
 {
     static const char *const names[] = {"contact", "force", "solve", "adapt", "guard", "output"};
     return (unsigned)stage < PAL_STAGE_COUNT ? names[stage] : "?";
 }
 
-static pal_err add_wish(build_state *s, pal_item *item, bool replaces)
+static pal_err add_wish(pal_wishes *s, pal_item *item, bool replaces)
 {
     const pal_effect *effect = pal_effect_find(item->name);
     const char *body = s->build.body->name;
@@ -45,17 +30,17 @@ static pal_err add_wish(build_state *s, pal_item *item, bool replaces)
         if (!replaces || !models)
             return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
                                 item->path, item->name);
-        s->wish[i] = (wish){effect, item};
+        s->wish[i] = (pal_wish){effect, item};
         return PAL_ERR_OK;
     }
-    if (s->n_wish == WISH_MAX)
-        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body, WISH_MAX);
-    s->wish[s->n_wish++] = (wish){effect, item};
+    if (s->n_wish == PAL_WISH_MAX)
+        return pal_note_set(s->build.note, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body, PAL_WISH_MAX);
+    s->wish[s->n_wish++] = (pal_wish){effect, item};
     return PAL_ERR_OK;
 }
 
 /* the entry `solver` or `output`; an empty name asks for nothing */
-static pal_err add_named(build_state *s, pal_item *own, const pal_item *item, pal_stage stage)
+static pal_err add_named(pal_wishes *s, pal_item *own, const pal_item *item, pal_stage stage)
 {
     if (!item->name[0]) return PAL_ERR_OK;
     *own = *item;
@@ -133,7 +118,7 @@ static void choose_output(const pal_body *body, pal_item *output)
 }
 
 /* arrays, supports and the ordered wishes of one body */
-static pal_err build_body(build_state *s, const pal_scene *scene)
+static pal_err build_body(pal_wishes *s, const pal_scene *scene)
 {
     const pal_body_def *def = s->build.def;
     pal_body *body = s->build.body;
@@ -155,11 +140,18 @@ static pal_err build_body(build_state *s, const pal_scene *scene)
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
     for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
 
+    return pal_wishes_collect(s);
+}
+
+pal_err pal_wishes_collect(pal_wishes *s)
+{
+    const pal_body_def *def = s->build.def;
+    pal_item *own = s->own;
     s->n_wish = 0;
     for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
     /* what is shown comes before the entries, so that a row field_out finds it */
     pal_item output = def->output;
-    choose_output(body, &output);
+    choose_output(s->build.body, &output);
     PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));
     for (int i = 0; i < def->n_effect; i++) {
         *++own = def->effect[i];
@@ -168,7 +160,68 @@ static pal_err build_body(build_state *s, const pal_scene *scene)
     return add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE);
 }
 
-static pal_err make_rows(build_state *s, pal_row *row, int *n_row)
+/* a row's own memory begins with a block of this size and grows by such */
+enum { ROW_BLOCK = 4096 };
+
+pal_err pal_wishes_make(pal_wishes *s, const pal_wish *wish, bool shared, pal_row *row)
+{
+    pal_arena *lasting = s->build.arena;
+    pal_arena *own = shared ? NULL : pal_arena_create(ROW_BLOCK, true);
+    if (!shared && !own) return PAL_ERR_MEMORY;
+    size_t before = shared ? pal_arena_used(lasting) : 0;
+    *row = (pal_row){.effect = wish->effect, .arena = own, .why = ""};
+    s->build.lasting = lasting;
+    s->build.arena = own ? own : lasting;
+    pal_err err = wish->effect->make(wish->item, &s->build, &row->self);
+    row->n_byte = pal_arena_used(s->build.arena) - before;
+    s->build.arena = lasting;
+    return err;
+}
+
+void pal_plan_unmake(pal_row *row)
+{
+    if (row->self && row->effect->destroy) row->effect->destroy(row->self);
+    pal_arena_destroy(row->arena);
+    row->self = NULL, row->arena = NULL;
+}
+
+/* where a wish comes from: the model's recipe, the solver or output of the scene, or an effect of it */
+size_t pal_wish_why(const pal_wishes *s, const pal_wish *wish, char *text, size_t n_byte)
+{
+    const pal_item *model = &s->own[0], *item = wish->item;
+    const pal_body_def *def = s->build.def;
+    bool recipe = item >= s->recipe.row && item < s->recipe.row + PAL_ROW_ITEMS;
+    if (recipe && wish->effect->drag)
+        return (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
+                                def->name);
+    if (recipe) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);
+    return (size_t)snprintf(text, n_byte, "%s \"%s\"", item->path, item->name);
+}
+
+/* the sentences of a body's rows, in one piece of memory */
+static pal_err explain(const pal_wishes *s, pal_row *row, int n_row, const char **why)
+{
+    size_t n_byte = 0, used = 0;
+    for (int i = 0; i < s->n_wish; i++) n_byte += pal_wish_why(s, &s->wish[i], NULL, 0) + 1;
+    char *text = pal_arena_take(s->build.arena, n_byte);
+    if (!text) return PAL_ERR_MEMORY;
+    *why = text;
+    for (int i = 0; i < s->n_wish; i++) {
+        size_t n = pal_wish_why(s, &s->wish[i], text + used, n_byte - used);
+        for (int k = 0; k < n_row; k++)
+            if (row[k].effect == s->wish[i].effect) row[k].why = text + used;
+        used += n + 1;
+    }
+    return PAL_ERR_OK;
+}
+
+/* does the row say what the body shows? */
+static bool shows(const pal_wish *wish)
+{
+    return wish->effect->stage == PAL_STAGE_OUTPUT && strcmp(wish->effect->name, "field_out") != 0;
+}
+
+static pal_err make_rows(pal_wishes *s, pal_row *row, int *n_row)
 {
     int n_solve = 0, first = *n_row;
     const char *name = s->build.body->name;
@@ -186,12 +239,10 @@ static pal_err make_rows(build_state *s, pal_row *row, int *n_row)
         for (int i = 0; i < s->n_wish; i++) {
             pal_stage stage = s->wish[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
-            size_t before = pal_arena_used(s->build.arena);
             s->build.made = row + first, s->build.n_made = *n_row - first;
             pal_row *r = &row[(*n_row)++];
-            r->effect = s->wish[i].effect;
-            PAL_TRY(r->effect->make(s->wish[i].item, &s->build, &r->self));
-            r->n_byte = pal_arena_used(s->build.arena) - before;
+            /* what a body shows stays with it, its other rows may be switched off */
+            PAL_TRY(pal_wishes_make(s, &s->wish[i], shows(&s->wish[i]), r));
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
     if (n_solve != 1)
@@ -217,7 +268,7 @@ static void sort_rows(pal_plan *plan, const pal_row *made, const int *made_body)
 
 /* what a body that adapts takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
  * of triangles, parents) and lasting loads, and the world's own */
-static pal_err check_memory(const build_state *s, size_t arena_byte)
+static pal_err check_memory(const pal_wishes *s, size_t arena_byte)
 {
     enum { WORLD_BYTE = 1 << 17 };
     const pal_body *body = s->build.body;
@@ -231,10 +282,10 @@ static pal_err check_memory(const build_state *s, size_t arena_byte)
     return err;
 }
 
-static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, build_state *s, pal_row *made,
+static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *note, pal_wishes *s, pal_row *made,
                          pal_plan *out)
 {
-    int made_body[PAL_BODY_MAX * WISH_MAX];
+    int made_body[PAL_BODY_MAX * PAL_WISH_MAX];
     out->n_body = scene->n_body;
     out->body = PAL_NEW(arena, pal_body, scene->n_body);
     if (!out->body) return PAL_ERR_MEMORY;
@@ -245,7 +296,10 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *not
         size_t before_byte = pal_arena_used(arena);
         PAL_TRY(build_body(s, scene));
         PAL_TRY(make_rows(s, made, &out->n_row));
-        PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte));
+        PAL_TRY(explain(s, made + before, out->n_row - before, &out->why[b]));
+        size_t row_byte = 0;
+        for (int i = before; i < out->n_row; i++) row_byte += made[i].arena ? made[i].n_byte : 0;
+        PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte + row_byte));
         for (int i = before; i < out->n_row; i++) made_body[i] = b;
         if (s->build.scratch_byte > out->scratch_byte) out->scratch_byte = s->build.scratch_byte;
     }
@@ -270,14 +324,13 @@ static void free_solids(pal_plan *plan)
 
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note, pal_plan *out)
 {
-    build_state *s = calloc(1, sizeof *s);
+    pal_wishes *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     *out = (pal_plan){0};
-    pal_row made[PAL_BODY_MAX * WISH_MAX] = {{0}};
+    pal_row made[PAL_BODY_MAX * PAL_WISH_MAX] = {{0}};
     pal_err err = build_all(scene, arena, note, s, made, out);
     /* rows that were made before something was refused */
-    for (int i = 0; err && i < out->n_row; i++)
-        if (made[i].self && made[i].effect->destroy) made[i].effect->destroy(made[i].self);
+    for (int i = 0; err && i < out->n_row; i++) pal_plan_unmake(&made[i]);
     if (err) {
         free_solids(out);
         *out = (pal_plan){0};
@@ -288,91 +341,9 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_note *note,
 
 void pal_plan_free(pal_plan *plan)
 {
-    for (int i = 0; i < plan->n_row; i++)
-        if (plan->row[i].self && plan->row[i].effect->destroy) plan->row[i].effect->destroy(plan->row[i].self);
+    for (int i = 0; i < plan->n_row; i++) pal_plan_unmake(&plan->row[i]);
     plan->n_row = 0;
     if (plan->row != plan->load_row) free(plan->row);
     plan->row = plan->load_row = NULL;
     free_solids(plan);
-}
-
-/* of heap tables: the rows, then their bodies */
-static size_t table_bytes(int n_row)
-{
-    return (size_t)n_row * (sizeof(pal_row) + sizeof(int));
-}
-
-/* the plan's tables are from now on those at `row`: the arena's own or heap */
-static void change_tables(pal_plan *plan, pal_row *row, int *row_body, int n_row)
-{
-    if (plan->row != plan->load_row) free(plan->row);
-    plan->row = row;
-    plan->row_body = row_body;
-    plan->n_row = n_row;
-}
-
-/* rows of this stage and body grow by `by`, all behind them move */
-static void shift(pal_plan *plan, int stage, int body, int by)
-{
-    plan->n_of[stage][body] += by;
-    for (int s = stage; s < PAL_STAGE_COUNT; s++)
-        for (int b = 0; b < plan->n_body; b++)
-            if (s > stage || b > body) plan->first[s][b] += by;
-}
-
-pal_err pal_plan_insert(pal_plan *plan, int body, const pal_row *row)
-{
-    int stage = row->effect->stage, at = plan->first[stage][body] + plan->n_of[stage][body], n = plan->n_row;
-    pal_row *to = malloc(table_bytes(n + 1));
-    if (!to) return PAL_ERR_MEMORY;
-    int *to_body = (int *)(void *)(to + n + 1);
-    memcpy(to, plan->row, (size_t)at * sizeof *to);
-    memcpy(to + at + 1, plan->row + at, (size_t)(n - at) * sizeof *to);
-    memcpy(to_body, plan->row_body, (size_t)at * sizeof *to_body);
-    memcpy(to_body + at + 1, plan->row_body + at, (size_t)(n - at) * sizeof *to_body);
-    to[at] = *row;
-    to_body[at] = body;
-    change_tables(plan, to, to_body, n + 1);
-    shift(plan, stage, body, 1);
-    return PAL_ERR_OK;
-}
-
-void pal_plan_remove(pal_plan *plan, const void *self)
-{
-    int at = 0;
-    while (at < plan->n_row && plan->row[at].self != self) at++;
-    if (at == plan->n_row || plan->n_row == plan->n_load) return;
-    int stage = plan->row[at].effect->stage, body = plan->row_body[at], n = plan->n_row - 1;
-    if (plan->row[at].effect->destroy) plan->row[at].effect->destroy(plan->row[at].self);
-    memmove(plan->row + at, plan->row + at + 1, (size_t)(n - at) * sizeof *plan->row);
-    memmove(plan->row_body + at, plan->row_body + at + 1, (size_t)(n - at) * sizeof *plan->row_body);
-    plan->n_row = n;
-    shift(plan, stage, body, -1);
-    if (n > plan->n_load) return;
-    /* the rows of load are alone again: back to the arena's tables */
-    memcpy(plan->load_row, plan->row, (size_t)n * sizeof *plan->row);
-    memcpy(plan->load_row_body, plan->row_body, (size_t)n * sizeof *plan->row_body);
-    change_tables(plan, plan->load_row, plan->load_row_body, n);
-}
-
-size_t pal_plan_bytes(const pal_plan *plan)
-{
-    size_t n_byte = plan->row == plan->load_row ? 0 : table_bytes(plan->n_row);
-    for (int b = 0; b < plan->n_body; b++)
-        if (plan->body[b].solid) n_byte += plan->body[b].solid->n_byte;
-    return n_byte;
-}
-
-size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte)
-{
-    size_t used = 0;
-    if (n_byte > 0) text[0] = 0;
-    for (int i = 0; i < plan->n_row; i++) {
-        size_t left = used < n_byte ? n_byte - used : 0;
-        const pal_row *row = &plan->row[i];
-        used += (size_t)snprintf(left ? text + used : NULL, left, "%-8s %-16s %-16s %9.1f kB\n",
-                                 pal_stage_name(row->effect->stage), row->effect->name,
-                                 plan->body[plan->row_body[i]].name, 1e-3 * (double)row->n_byte);
-    }
-    return used;
 }

@@ -34,7 +34,7 @@ static double find_limit(pal_world *w, int sub)
         pal_step step = step_of(w, b);
         step.sub = sub;
         const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
-        if (step.body->frozen || !solve->effect->limit) continue;
+        if (step.body->frozen || step.body->asleep || !solve->effect->limit) continue;
         double limit = solve->effect->limit(solve->self, &step);
         step.body->dt_limit_s = limit;
         if (!(limit > 0))
@@ -155,16 +155,22 @@ static void make_tools(pal_world *w, const pal_scene *scene)
     }
 }
 
+static void show(pal_world *w, int b)
+{
+    pal_step step = step_of(w, b);
+    for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
+        pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
+        row->n_run++;
+        (void)row->effect->run(row->self, &step);
+    }
+    pal_arena_reset(w->scratch);
+    step.body->n_output++;
+    step.body->stale = false;
+}
+
 static void run_output(pal_world *w)
 {
-    for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = step_of(w, b);
-        for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
-            pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
-            (void)row->effect->run(row->self, &step);
-        }
-        pal_arena_reset(w->scratch);
-    }
+    for (int b = 0; b < w->plan.n_body; b++) show(w, b);
 }
 
 static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
@@ -237,6 +243,7 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     if (!b->outer) b->outer = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
     if (!b->outer) return PAL_ERR_MEMORY;
     pal_copy3(b->outer + 3 * node, force_N);
+    b->asleep = false;
     return PAL_ERR_OK;
 }
 
@@ -252,7 +259,7 @@ static void rest_body(pal_world *w, int b)
     memset(body->load, 0, n_load);
     if (body->outer) memset(body->outer, 0, n_load);
     pal_body_place(body);
-    body->frozen = false;
+    body->frozen = body->asleep = false;
     body->why[0] = 0;
     body->rescue = (pal_rescues){0};
     for (int i = 0; i < w->plan.n_row; i++) {
@@ -337,6 +344,7 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
         return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist", body);
     pal_material to = *material, was = world->material[body];
     PAL_TRY(pal_material_check(&to, note));
+    world->plan.body[body].asleep = false;
     pal_err err = apply_material(world, body, &to, note);
     if (!err) err = check_budget(world, note);
     /* constants are functions of the material, so putting the old one back puts everything back */
@@ -361,7 +369,36 @@ pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted
 
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note)
 {
+    if (body >= 0 && body < world->plan.n_body && brush && brush->kind != PAL_BRUSH_NONE)
+        world->plan.body[body].asleep = false;
     return pal_brush_rows_set(&world->brushes, &world->plan, body, slot, brush, note);
+}
+
+pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+                             pal_note *note)
+{
+    bool changed = false;
+    const pal_material *now = body >= 0 && body < PAL_BODY_MAX ? &world->material[body] : NULL;
+    PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, note, &changed));
+    if (!changed) return PAL_ERR_OK;
+    /* what the solver knows of its limit is of the rows before */
+    pal_world_moved(world, body);
+    pal_err err = check_budget(world, note);
+    if (err) {
+        /* it was within the budget without the row */
+        (void)pal_plan_switch(&world->plan, scene, body, row, false, now, NULL, &changed);
+        pal_world_moved(world, body);
+        (void)check_budget(world, NULL);
+    }
+    pal_world_moved(world, body);
+    return err;
+}
+
+void pal_world_watch(pal_world *world, bool watched)
+{
+    world->unwatched = !watched;
+    for (int b = 0; b < world->plan.n_body && watched; b++)
+        if (world->plan.body[b].stale && pal_body_finite(&world->plan.body[b])) show(world, b);
 }
 
 void pal_world_tidy(pal_world *world)
@@ -422,6 +459,7 @@ static void run_contact(pal_world *w, pal_step *step, int b)
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
+        row->n_run++;
         if (fails(w, body, row, row->effect->run(row->self, step))) return;
         row->spent_ns += pal_clock_ns() - before;
     }
@@ -438,8 +476,9 @@ static uint64_t force_ns(const pal_step *step)
 static void run_substep(pal_world *w, pal_step *shared)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
-        if (w->plan.body[b].frozen) continue;
+        if (w->plan.body[b].frozen || w->plan.body[b].asleep) continue;
         pal_step step = step_of(w, b);
+        step.body->stale = true;
         step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
         step.time_s = shared->time_s;
         step.heavy = shared->heavy && step.body->dt_limit_s < step.dt_s;
@@ -447,6 +486,7 @@ static void run_substep(pal_world *w, pal_step *shared)
         run_contact(w, &step, b);
         pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
+        solve->n_run++;
         if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
         /* nodes follow their points, for contact and for what comes after the step */
         if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_place(step.body);
@@ -464,16 +504,39 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         pal_step step = step_of(w, b);
         step.dt_s = dt_s;
         step.n_sub = 1;
+        bool output = stage == PAL_STAGE_OUTPUT, skips = output ? w->unwatched : step.body->asleep;
+        /* a body that fell asleep in this step is shown where it lies */
+        if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
             pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];
             /* a frozen body is shown where it stopped, as long as that is somewhere; its guard may put it back */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
             uint64_t before = pal_clock_ns();
+            row->n_run++;
             if (fails(w, step.body, row, row->effect->run(row->self, &step))) break;
             row->spent_ns += pal_clock_ns() - before;
         }
         pal_arena_reset(w->scratch);
+        if (output) step.body->n_output++, step.body->stale = false;
+    }
+}
+
+/* bodies at rest wake when something comes near in this step; what nobody looks at is brought up to date where tools
+ * may touch it */
+static void begin_step(pal_world *w, double dt_s)
+{
+    bool held = false;
+    for (int t = 0; t < w->tools.n_tool; t++) held |= w->tools.tool[t].present || w->tools.tool[t].ramp > 0;
+    for (int b = 0; b < w->plan.n_body; b++) {
+        pal_step step = step_of(w, b);
+        step.dt_s = dt_s, step.n_sub = 1;
+        for (int i = 0; i < w->plan.n_of[PAL_STAGE_GUARD][b] && step.body->asleep; i++) {
+            const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_GUARD][b] + i];
+            if (row->effect->wakes && row->effect->wakes(row->self, &step)) step.body->asleep = false;
+        }
+        bool touched = held && step.n_contact > 0 && !step.body->frozen && !step.body->asleep;
+        if (w->unwatched && touched && step.body->stale) show(w, b);
     }
 }
 
@@ -519,6 +582,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++) pal_tool_take(&w->tools.tool[t], w->has_asked[t] ? &w->asked[t] : NULL);
     w->row_err = PAL_ERR_OK;
+    begin_step(w, dt_s);
     run_substeps(w, dt_s);
     pal_tools_finish(&w->tools, w->n_substep);
     w->tick++;
@@ -573,6 +637,8 @@ pal_body *pal_world_body(pal_world *world, int body)
 void pal_world_moved(pal_world *world, int body)
 {
     const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    world->plan.body[body].asleep = false;
+    world->plan.body[body].stale = true;
     pal_body_place(&world->plan.body[body]);
     if (solve->effect->reset) solve->effect->reset(solve->self, &world->plan.body[body]);
     find_limit(world, 0);

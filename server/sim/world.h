@@ -16,6 +16,8 @@ typedef struct pal_row_info {
     const char *name, *body, *stage;
     size_t n_byte;
     uint64_t spent_ns; /* last step */
+    uint64_t n_run;    /* times it was run since load */
+    const char *why;   /* what in the scene calls for it: "bodies[0].effects[2]"; lives as long as the world */
 } pal_row_info;
 
 /* shown surface of a part; pointers borrow from the world and its scene and do not change while revision is the same */
@@ -77,6 +79,22 @@ pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *b
 /* rows whose last brush has gone out are taken out of the plan. After every step of a world that shall be repeatable to
  * the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
 void pal_world_tidy(pal_world *world);
+
+/* Switches a row off, or on again, in the running world. Off: the row is gone from the plan with its memory, as if the
+ * scene had no such entry; what it did goes on from where it is (x, v and all else stay, the row's energy leaves the
+ * sum: gravity off is work done). On: made anew from the scene's or the model's entry, with the material of now, in
+ * its old place of the plan; springs have their rest lengths. A solver that keeps patterns of the rows (implicit ones)
+ * is made anew with that, which takes as long as at load. A reset leaves switched rows as they are.
+ * scene: the one that the world was made from. Nothing and OK when it is so already. REFUSED (one sentence, nothing
+ * changed): no such body, no entry asks for such a row, the body's solver, what it shows, its last elastic row, a
+ * support that moves; BUDGET: too stiff for the step; MEMORY. Between steps; takes and frees heap memory. [sim] */
+pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+                             pal_note *note);
+
+/* Nobody looks at the world (false) or somebody does (true, as after create): while nobody does, OUTPUT rows are run
+ * only for bodies that a tool may touch in the coming step. Motion and hash know nothing of it. true brings what is
+ * shown up to date at once. [sim] */
+void pal_world_watch(pal_world *world, bool watched);
 
 /* A world made from an edited scene goes on where another is: its time, tools and poses, materials as they are by now
  * (but one that the edited body is too stiff or too light for), and x and v of all bodies that have as many points

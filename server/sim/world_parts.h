@@ -25,6 +25,7 @@ struct pal_world {
     pal_world_part part[PAL_BODY_MAX];
     double step_s, time_s, limit_s, rest_limit_s;
     int most_substep, n_substep;
+    bool unwatched; /* nobody looks: OUTPUT rows are run only where tools need them */
     uint64_t tick, step_ns, end_ns;
     pal_err row_err;       /* of the first row that failed in this step */
     pal_field_rows fields; /* put in while the world runs */

@@ -45,15 +45,19 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->rescue = body->rescue;
     to->n_rescue = pal_rescues_sum(&body->rescue);
     to->rescue_ns = body->rescue.ns;
+    to->asleep = body->asleep;
+    bool same = to->n_output == body->n_output; /* these are the positions that it has */
+    to->n_output = body->n_output;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
         copy_slots(body->shell, to);
-        for (int k = 0; k < body->n_active; k++) {
+        for (int k = 0; k < body->n_active && !same; k++) {
             size_t i = 3 * (size_t)body->active[k];
             for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->shown[i + c] + o[c]);
         }
         return;
     }
+    if (same) return;
     if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
         if (to->n_vertex > 0) memcpy(to->position_m, body->shown, 3 * sizeof(float) * (size_t)to->n_vertex);
         return;
@@ -156,7 +160,9 @@ void pal_world_row(const pal_world *world, int row, pal_row_info *out)
                           .body = world->plan.body[world->plan.row_body[row]].name,
                           .stage = pal_stage_name(r->effect->stage),
                           .n_byte = r->n_byte,
-                          .spent_ns = r->spent_ns};
+                          .spent_ns = r->spent_ns,
+                          .n_run = r->n_run,
+                          .why = r->why ? r->why : ""};
 }
 
 int pal_world_parts(const pal_world *world)

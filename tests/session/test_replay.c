@@ -61,6 +61,8 @@ static bool record(void)
         if (seq == 20) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = 0});
         if (seq == 96) pal_session_put_pose(s, 1, NULL);
         if (seq == 130) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift});
+        if (seq == 100 || seq == 120)
+            pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "gravity", .wanted = seq == 120});
         if (seq == 140) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1});
         if (seq < 150) tick = 0;
     }
@@ -79,7 +81,7 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     if (err) CHECK_FAIL("%s", note.text);
     CHECK(report.n_tick > 200);
     CHECK(report.n_pose > 10);
-    CHECK_INT(report.n_command, 7);
+    CHECK_INT(report.n_command, 9);
     CHECK(report.n_hash > 3);
     CHECK_INT(report.n_hash_equal, report.n_hash);
     CHECK(report.first_difference == UINT64_MAX);
@@ -153,7 +155,7 @@ static void broken_logs_are_refused_with_one_sentence(void)
         uint8_t value;
         const char *part;
     } fault[] = {{0, 'x', "not an input log"},
-                 {8, 4, "version 4"},
+                 {8, 5, "version 5"},
                  {13, 0xff, "steps between hashes"},
                  {24, (uint8_t)(whole[24] ^ 1), "another scene"},
                  {PAL_INPUT_HEADER, 77, "no record of kind 77"},
@@ -237,6 +239,8 @@ static void records_survive_the_round_trip_bit_by_bit(void)
          .step = 1ull << 42,
          .slot = 5,
          .brush = {PAL_BRUSH_CURVE, {1, 2, 3}, {4, 5, -0.0}, 0.1, 0.5, -7e200, {1e-300, 8, 9}, 10}},
+        {.kind = PAL_INPUT_ROW, .index = 2, .step = 1ull << 43, .wanted = true, .row = "tet_volume"},
+        {.kind = PAL_INPUT_ROW, .step = 1ull << 44, .row = "gravity"},
         {.kind = PAL_INPUT_HASH, .step = 1ull << 63, .hash = 0xfedcba9876543210u}};
     const int n_in = sizeof in / sizeof in[0];
     for (int k = 0; k < n_in; k++) pal_input_log_put(log, &in[k]);
@@ -253,6 +257,8 @@ static void records_survive_the_round_trip_bit_by_bit(void)
         CHECK(out.index == in[k].index && out.step == in[k].step && out.hash == in[k].hash);
         CHECK(!memcmp(&out.pose, &in[k].pose, sizeof out.pose));
         CHECK(!memcmp(&out.material, &in[k].material, sizeof out.material));
+        CHECK(out.wanted == in[k].wanted);
+        CHECK_TEXT(out.row, in[k].row);
         CHECK(out.slot == in[k].slot && out.brush.kind == in[k].brush.kind);
         CHECK(!memcmp(out.brush.at_m, in[k].brush.at_m, sizeof(pal_brush) - offsetof(pal_brush, at_m)));
     }

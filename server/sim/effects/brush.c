@@ -355,6 +355,13 @@ static void reset(void *self, const pal_body *body)
     for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].n_in = 0;
 }
 
+/* while there is a brush the row comes, stays and goes over time */
+static double settled_s(const void *self)
+{
+    (void)self;
+    return INFINITY;
+}
+
 static const pal_tangent tangent = {.multiply = multiply};
 
 const pal_effect pal_effect_brush = {.name = "brush",
@@ -364,4 +371,5 @@ const pal_effect pal_effect_brush = {.name = "brush",
                                      .stiffness = stiffness,
                                      .reset = reset,
                                      .tangent = &tangent,
+                                     .settled_s = settled_s,
                                      .destroy = destroy};

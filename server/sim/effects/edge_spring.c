@@ -112,7 +112,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     e->k_N_m = derived_k(e, e->young_Pa);
     PAL_TRY(find_young(e, build));
     PAL_TRY(allocate(e, build->arena));
-    PAL_TRY(pal_pack_make(build->body, build->arena));
+    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
     *self = e;
     return PAL_ERR_OK;
 }

@@ -239,6 +239,11 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     }
 }
 
+static double settled_s(const void *self)
+{
+    return ((const inflate *)self)->ramp_s;
+}
+
 static void reset(void *self, const pal_body *body)
 {
     (void)body;
@@ -251,4 +256,5 @@ const pal_effect pal_effect_inflate = {.name = "inflate",
                                        .run = run,
                                        .energy = energy,
                                        .stiffness = stiffness,
-                                       .reset = reset};
+                                       .reset = reset,
+                                       .settled_s = settled_s};

@@ -113,5 +113,11 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
+static double settled_s(const void *self)
+{
+    const moving_support *row = self;
+    return row->period_s > 0 ? INFINITY : row->rise_s;
+}
+
 const pal_effect pal_effect_moving_support = {
-    .name = "moving_support", .stage = PAL_STAGE_CONTACT, .make = make, .run = run};
+    .name = "moving_support", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .settled_s = settled_s};

@@ -78,7 +78,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
                             frame);
     row->world = frame[0] == 'w';
     turn_back(row);
-    PAL_TRY(pal_pack_make(build->body, build->arena));
+    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
     *self = row;
     return PAL_ERR_OK;
 }

@@ -128,6 +128,28 @@ static void put(pal_item *row, const char *key, double number)
     if (number >= 0) pal_item_put_number(row, key, number, NULL);
 }
 
+static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, pal_recipe *out)
+{
+    const pal_body_def *def = build->def;
+    /* the rows derive what the scene does not give, so that it follows a live material edit */
+    pal_item *row = out->row;
+    pal_item_init(row, item->path, "edge_spring");
+    put(row, "k_N_m", k->k_spring_N_m);
+    put(row++, "c_Ns_m", k->c_spring_Ns_m);
+    if (k->k_shape_N_m != 0) {
+        pal_item_init(row, item->path, "shape_spring");
+        put(row, "k_N_m", k->k_shape_N_m);
+        put(row, "c_Ns_m", k->c_shape_Ns_m);
+        if (k->frame) PAL_TRY(pal_item_put_text(row, "frame", k->frame, build->note));
+        row++;
+    }
+    if (def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
+    if (k->refine && k->shell.n_level > 1) pal_item_init(row++, item->path, "refine");
+    pal_item_init(row++, item->path, "rk4");
+    out->n_row = (int)(row - out->row);
+    return PAL_ERR_OK;
+}
+
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
 {
     const pal_body_def *def = build->def;
@@ -137,24 +159,14 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(check_surface(def, item->path, build->note));
     if (k.shell.mass_kg == 0) k.shell.mass_kg = surface_mass(def, k.thickness_m);
     PAL_TRY(make_shell(&k, item->path, build));
-
-    /* the rows derive what the scene does not give, so that it follows a live material edit */
-    pal_item *row = out->row;
-    pal_item_init(row, item->path, "edge_spring");
-    put(row, "k_N_m", k.k_spring_N_m);
-    put(row++, "c_Ns_m", k.c_spring_Ns_m);
-    if (k.k_shape_N_m != 0) {
-        pal_item_init(row, item->path, "shape_spring");
-        put(row, "k_N_m", k.k_shape_N_m);
-        put(row, "c_Ns_m", k.c_shape_Ns_m);
-        if (k.frame) PAL_TRY(pal_item_put_text(row, "frame", k.frame, build->note));
-        row++;
-    }
-    if (def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
-    if (k.refine && k.shell.n_level > 1) pal_item_init(row++, item->path, "refine");
-    pal_item_init(row++, item->path, "rk4");
-    out->n_row = (int)(row - out->row);
-    return PAL_ERR_OK;
+    return list_rows(&k, item, build, out);
 }
 
-const pal_model pal_model_adaptive_springs = {.name = "adaptive_springs", .build = build};
+static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    keys k;
+    PAL_TRY(read_keys(item, &k, build->note));
+    return list_rows(&k, item, build, out);
+}
+
+const pal_model pal_model_adaptive_springs = {.name = "adaptive_springs", .build = build, .list = list};

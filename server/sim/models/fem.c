@@ -184,6 +184,13 @@ static pal_err lump_mass(const pal_build *build)
     return PAL_ERR_OK;
 }
 
+static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    fem_choice choice;
+    PAL_TRY(read_keys(item, build, &choice));
+    return list_rows(item, build, &choice, out);
+}
+
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
@@ -203,4 +210,4 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     return pal_slots_make(body->x_rest, body->n_node, lattice_m, build->arena, &body->slots);
 }
 
-const pal_model pal_model_fem = {.name = "fem", .build = build};
+const pal_model pal_model_fem = {.name = "fem", .build = build, .list = list};

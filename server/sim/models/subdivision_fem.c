@@ -185,16 +185,11 @@ static pal_err make_body(const pal_item *item, pal_build *build)
     return show_boundary(item, build);
 }
 
-static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, pal_recipe *out)
 {
-    keys k;
-    out->n_row = 0;
-    PAL_TRY(read_keys(item, &k, build->note));
-    PAL_TRY(make_solid(&k, item, build));
-    PAL_TRY(make_body(item, build));
     pal_item *row = out->row;
     pal_item_init(row, item->path, "cell_elastic");
-    if (k.operator) PAL_TRY(pal_item_put_text(row, "operator", k.operator, build->note));
+    if (k->operator) PAL_TRY(pal_item_put_text(row, "operator", k->operator, build->note));
     row++;
     if (build->def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
     pal_item_init(row++, item->path, "central_cg");
@@ -202,4 +197,20 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     return PAL_ERR_OK;
 }
 
-const pal_model pal_model_subdivision_fem = {.name = "subdivision_fem", .build = build};
+static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    keys k;
+    PAL_TRY(read_keys(item, &k, build->note));
+    PAL_TRY(make_solid(&k, item, build));
+    PAL_TRY(make_body(item, build));
+    return list_rows(&k, item, build, out);
+}
+
+static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    keys k;
+    PAL_TRY(read_keys(item, &k, build->note));
+    return list_rows(&k, item, build, out);
+}
+
+const pal_model pal_model_subdivision_fem = {.name = "subdivision_fem", .build = build, .list = list};

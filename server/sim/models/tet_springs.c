@@ -94,19 +94,25 @@ static pal_err take_fill(pal_item *item, pal_build *build)
     return PAL_ERR_OK;
 }
 
+static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+{
+    out->n_row = 0;
+    for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
+        PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
+    if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
+    pal_item_init(&out->row[out->n_row++], item->path, "verlet");
+    return PAL_ERR_OK;
+}
+
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
     const pal_material *material = &build->def->material;
     pal_body *body = build->body;
-    out->n_row = 0;
     PAL_TRY(pal_spring_grid_check(build->def, build->note));
-    for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
-        PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
+    PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
     PAL_TRY(pal_item_done(item, build->note));
-    if (material->damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
-    pal_item_init(&out->row[out->n_row++], item->path, "verlet");
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
     memcpy(body->x_rest, mesh->tets.x, 3 * sizeof(double) * (size_t)body->n_node);
@@ -123,4 +129,4 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     return pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots);
 }
 
-const pal_model pal_model_tet_springs = {.name = "tet_springs", .build = build};
+const pal_model pal_model_tet_springs = {.name = "tet_springs", .build = build, .list = list};

@@ -43,4 +43,5 @@ const pal_effect pal_effect_implicit_euler = {.name = "implicit_euler",
                                               .reset = pal_implicit_reset,
                                               .implicit = true,
                                               .report = pal_implicit_report,
+                                              .keeps_rows = true,
                                               .destroy = pal_implicit_destroy};

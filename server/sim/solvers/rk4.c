@@ -89,7 +89,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     row->inverse_kg = PAL_NEW(build->arena, double, body->n_dof);
     row->led = PAL_NEW(build->arena, uint8_t, body->n_dof);
     if (!row->stiff || !row->damp || !row->memory || !row->load || !row->inverse_kg || !row->led) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_pack_make(build->body, build->arena));
+    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
     if (body->shell) {
         row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);

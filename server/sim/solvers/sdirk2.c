@@ -61,4 +61,5 @@ const pal_effect pal_effect_sdirk2 = {.name = "sdirk2",
                                       .reset = pal_implicit_reset,
                                       .implicit = true,
                                       .report = pal_implicit_report,
+                                      .keeps_rows = true,
                                       .destroy = pal_implicit_destroy};

@@ -296,6 +296,7 @@ static pal_err run_rows(pal_step *step, bool internal)
     for (int i = 0; i < step->n_force; i++) {
         pal_row *force = &step->force[i];
         if (force->effect->internal != internal || force->effect->drag) continue;
+        force->n_run++;
         PAL_TRY(force->effect->run(force->self, step));
         uint64_t now = pal_clock_ns();
         force->spent_ns += now - before;
@@ -647,4 +648,5 @@ const pal_effect pal_effect_static_newton = {.name = "static_newton",
                                              .reset = reset,
                                              .implicit = true,
                                              .report = report,
+                                             .keeps_rows = true,
                                              .destroy = destroy};
