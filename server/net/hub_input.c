@@ -147,6 +147,7 @@ static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
     static const char *const verbs[PAL_COMMAND_FIELD] = {"pause", "resume", "step", "reset", "material"};
     pal_command command = {.kind = PAL_COMMAND_COUNT};
     if (pal_hub_estimate_order(hub, c, order)) return; /* everybody may look */
+    if (pal_hub_plan_order(hub, c, order)) return;
     if (!pal_members_may_command(&c->room->members, c->id)) {
         pal_hub_complain(hub, c, "role", "a viewer gives no commands");
         return;

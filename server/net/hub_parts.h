@@ -126,6 +126,8 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: no
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out); /* rows and bodies */
+/* an order about rows or single bodies is dealt with; false: it is another one */
+bool pal_hub_plan_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
 /* hub_pages.c */
 void pal_hub_get(void *hub, const char *path, pal_reply *reply);
 #endif

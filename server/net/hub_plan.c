@@ -72,8 +72,47 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
     for (int p = 0; p < f->n_part && p < PAL_WIRE_PART_MAX; p++) {
         const pal_frame_part *part = &f->part[p];
         pal_wire_part_state *to = &w->state[w->n_state];
-        *to = (pal_wire_part_state){.part = (uint32_t)p, .frozen = part->frozen};
+        *to = (pal_wire_part_state){.part = (uint32_t)p,
+                                    .frozen = part->frozen,
+                                    .n_rescue = part->n_rescue,
+                                    .rescue_ms = (double)part->rescue_ns * 1e-6};
+        if (part->frozen) pal_plain_text(to->why, sizeof to->why, part->why);
         w->frozen |= part->frozen;
-        w->n_state += part->frozen;
+        w->n_state += part->frozen || part->n_rescue > 0;
     }
+}
+
+/* the order's body; -1: complained */
+static int body_named(pal_hub *hub, pal_client *c, const char *name)
+{
+    int body = body_of(c->room->session, name);
+    if (body < 0) pal_hub_complain(hub, c, "target", "there is no body %s", name);
+    return body;
+}
+
+static void give(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)
+{
+    pal_err err = pal_session_command(c->room->session, command);
+    if (err) pal_hub_complain(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
+}
+
+/* a body that stands still does so for everybody, so whoever sees it may bring it back */
+static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    int body = body_named(hub, c, order->target);
+    const pal_frame *f = c->room->stream->frame;
+    if (body < 0) return;
+    if (!pal_members_may_command(&c->room->members, c->id) && !(f && body < f->n_part && f->part[body].frozen))
+        pal_hub_complain(hub, c, "role", "a viewer resets nothing but a body that was stopped");
+    else
+        give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
+}
+
+bool pal_hub_plan_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    if (!strcmp(order->verb, "reset") && order->target[0]) {
+        reset_body(hub, c, order);
+        return true;
+    }
+    return false;
 }

@@ -1,10 +1,11 @@
 // The page: joins the worker's messages to stage, tools and panel. The socket lives in the worker; what it sends is kept
 // here and applied once per drawn picture.
+import { AccuracyPanel } from "./accuracy_panel.js";
 import { BodyMesh } from "./body_mesh.js";
 import { WRITERS } from "./exporters.js";
 import { keyMap } from "./keys.js";
 import { FIELDS, labels, missing, offered, rangeOf } from "./legend.js";
-import { PlanPanel } from "./plan_panel.js";
+import { PlanPanel, rowsOf, unwatchedLine } from "./plan_panel.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { ToolInput } from "./tool_input.js";
@@ -22,8 +23,9 @@ let told = 0;
 
 const stage = makeStage();
 const marks = new ToolMarks(stage, byId("labels"));
-const panel = new PlanPanel(document);
-const sculpt = new SculptPanel(document, ({ verb, args }) => worker.postMessage({ type: "control", message: { type: "command", verb, target: "", args } }), save);
+const panel = new PlanPanel(document, (verb, target, args = {}) => order({ verb, target, args }));
+const cost = new AccuracyPanel(document, (wish) => order(wish));
+const sculpt = new SculptPanel(document, ({ verb, args }) => order({ verb, target: "", args }), save);
 const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
 
 const state = {
@@ -48,6 +50,7 @@ const state = {
   wires: false, // lines of the triangles are shown
   /** @type {{low: number, high: number} | null} what the colours mean, null: no values yet */ range: null,
   /** @type {string[]} names of the plan's rows as the panel has them */ rows: [],
+  /** @type {{rows: string[], row_parts?: number[], row_whys?: string[]}} of hello or the last topology that had rows */ plan: { rows: [] },
 };
 
 const input = new ToolInput(
@@ -227,11 +230,33 @@ function followField() {
   if (!same) showLegend();
 }
 
-/** rows come and go with fields @param {string[]} names */
-function showRows(names) {
-  if (names.join() === state.rows.join()) return;
-  state.rows = names;
-  panel.plan(names);
+let shownRows = "";
+/** rows come and go with fields, switches and other methods */
+function showRows() {
+  const rows = rowsOf(state.plan, state.status), mayswitch = state.hello.you.role === "instructor" && state.plan.row_parts !== undefined;
+  const key = JSON.stringify([rows, mayswitch]);
+  if (key === shownRows) return;
+  shownRows = key;
+  state.rows = rows.filter((row) => row.on).map((row) => row.name);
+  panel.plan(rows, state.hello.parts, mayswitch);
+}
+
+/** @param {{verb: string, target: string, args: Record<string, number>}} wish */
+function order({ verb, target, args }) {
+  worker.postMessage({ type: "control", message: { type: "command", verb, target, args } });
+}
+
+/** @param {any} m status in which a body stands still */
+function stopped(m) {
+  const still = m.parts?.filter((/** @type {any} */ p) => p.frozen) ?? [];
+  const names = still.map((/** @type {any} */ p) => state.hello.parts[p.part]?.name ?? p.part).join(", ");
+  return still.length ? `${names}: stopped. ${still[0].why ?? ""} Reset brings it back.` : "The body diverged and was frozen. Reset brings it back.";
+}
+
+function showFigures() {
+  if (byId("panel").hidden || !state.status) return;
+  panel.status(state.status, state.here, state.hello.parts);
+  byId("unwatched").textContent = unwatchedLine({ field: state.field !== "none", estimate: cost.opened, estimates: state.hello.estimates === true, unwatched: state.status.unwatched ?? 0 });
 }
 
 /** @type {Record<string, (m: any) => void>} */
@@ -245,8 +270,11 @@ const control = {
     if (!again) stage.frameBox([m.box_min_m, m.box_max_m], m.up);
     input.radius = m.tools[Math.max(0, state.myTool)]?.radius_m ?? 0.02 * stage.size;
     keepParts(m.parts.length);
-    state.rows = m.rows;
-    panel.plan(m.rows);
+    state.plan = m;
+    state.status = null;
+    showRows();
+    cost.begin(m.parts, m.estimates === true, 1000 / m.step_rate_hz);
+    byId("cost-toggle").hidden = !m.estimates;
     sculpt.begin(m.box_min_m, m.box_max_m);
     offerSculpt();
     offerFields();
@@ -255,24 +283,35 @@ const control = {
   },
   topology(m) {
     state.hello.parts = m.parts;
+    if (m.rows?.length) {
+      state.plan = m;
+      state.status = null; // its rows were those of the plan before
+      showRows();
+    }
     sculpt.changed();
     keepParts(m.parts.length);
     offerSculpt();
   },
   answer(m) {
-    sculpt.answer(m);
+    if (!cost.answer(m)) sculpt.answer(m);
+  },
+  study(m) {
+    cost.study(m);
+  },
+  estimate(m) {
+    cost.takeEstimate(m);
   },
   status(m) {
     state.status = m;
-    showRows(m.rows?.length ? m.rows : state.hello.rows);
+    showRows();
     byId("pause").textContent = m.paused ? "Go on" : "Pause";
     byId("pause").setAttribute("aria-pressed", String(m.paused));
     byId("step").hidden = !m.paused;
-    if (m.frozen) notice("The body diverged and was frozen. Reset brings it back.");
+    if (m.frozen) notice(stopped(m));
     else if (!told) notice("");
     const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
     showState(m.frozen ? "lost" : "live", slow);
-    if (!byId("panel").hidden) panel.status(m, state.here, state.hello.parts);
+    showFigures();
   },
   members(m) {
     state.members = new Map(m.members.map((/** @type {any} */ p) => [p.id, p]));
@@ -287,7 +326,7 @@ const control = {
   },
   error(m) {
     if (m.code === "tool_taken") return;
-    if (["refused", "args", "role", "busy", "target"].includes(m.code) && sculpt.refused(m.text)) return;
+    if (["refused", "args", "role", "busy", "target"].includes(m.code) && (sculpt.refused(m.text) || cost.refused(m.text))) return;
     if (m.code === "field" && state.field !== "none") chooseField("none");
     notice(m.text, TOLD_MS);
   },
@@ -433,6 +472,7 @@ const modes = () => (sculpt.offered ? ["pull", "press", "sculpt"] : ["pull", "pr
 function setMode(mode) {
   if (!modes().includes(mode) && mode === "sculpt") return;
   input.mode = mode;
+  if (mode === "sculpt") openCost(false);
   input.letGo();
   byId("sculpt").hidden = mode !== "sculpt";
   byId("hint").classList.toggle("gone", mode === "sculpt" || byId("hint").classList.contains("gone"));
@@ -449,8 +489,18 @@ const togglePause = () => command(state.status?.paused ? "resume" : "pause");
 const togglePanel = () => {
   byId("panel").hidden = !byId("panel").hidden;
   byId("panel-toggle").setAttribute("aria-expanded", String(!byId("panel").hidden));
-  if (state.status) panel.status(state.status, state.here, state.hello.parts);
+  showFigures();
 };
+/** @param {boolean} opened */
+const openCost = (opened) => {
+  if (opened && !state.hello?.estimates) return;
+  if (opened && input.mode === "sculpt") setMode("pull"); // both stand at the left
+  byId("cost-panel").hidden = !opened;
+  byId("cost-toggle").setAttribute("aria-expanded", String(opened));
+  cost.open(opened);
+};
+const toggleCost = () => openCost(!cost.opened);
+byId("cost-toggle").onclick = toggleCost;
 byId("mode-pull").onclick = () => setMode("pull");
 byId("mode-press").onclick = () => setMode("press");
 byId("mode-sculpt").onclick = () => setMode("sculpt");
@@ -480,7 +530,7 @@ const toggleWires = () => {
   stage.dirty = true;
 };
 byId("mesh").onclick = toggleWires;
-const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), "3": () => setMode("sculpt"), " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
+const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), "3": () => setMode("sculpt"), "4": toggleCost, " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
 window.addEventListener("keydown", (e) => {
   const action = sculpt.key(e) ? () => {} : actionOf(e);
   if (action) {
@@ -513,6 +563,6 @@ byId("name").onchange = () => {
   connect();
 };
 // for tests and curious people: what the page shows, without touching it
-Object.defineProperty(window, "palpate", { value: { state, stage, input } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, cost } });
 connect();
 picture();

@@ -1,4 +1,5 @@
-// The panel: figures, the plan's rows with their milliseconds, what is active of bodies that adapt, members.
+// The panel: figures, the plan's rows with their milliseconds and switches, bodies that were stopped, rescued or sleep,
+// what is active of bodies that adapt, what nobody looks at, members.
 
 /** @param {number} bytes per second */
 function rate(bytes) {
@@ -21,16 +22,66 @@ export function activeLines(active, parts) {
   });
 }
 
+/** @typedef {{name: string, part: number, why: string, on: boolean, ms: number | null}} Row of the panel; ms: index in `row_ms`, null: off */
+
+/**
+ * The rows to list: those of the plan in order, then those that were switched off.
+ * @param {{rows: string[], row_parts?: number[], row_whys?: string[]}} plan of `hello` or `topology`
+ * @param {{rows?: string[], row_parts?: number[], off?: {row: string, part: number}[]} | null} status
+ * @returns {Row[]}
+ */
+export function rowsOf(plan, status) {
+  const key = (/** @type {string} */ name, /** @type {number} */ part) => `${name} ${part}`;
+  const why = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_whys?.[i] ?? ""]));
+  const now = status?.rows?.length ? status : plan;
+  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "" });
+  const on = (now.rows ?? []).map((name, i) => ({ ...row(name, now.row_parts?.[i] ?? 0), on: true, ms: i }));
+  const off = (status?.off ?? []).map((o) => ({ ...row(o.row, o.part), on: false, ms: null }));
+  return [...on, ...off];
+}
+
+/**
+ * Bodies of which there is something to tell, in sentences.
+ * @param {{part: number, frozen?: boolean, asleep?: boolean, why?: string, rescues?: number, rescue_ms?: number}[]} states `parts` of `status`
+ * @param {{name: string}[]} parts of `hello`
+ */
+export function bodyLines(states, parts) {
+  return states.map((s) => {
+    const said = s.frozen ? [s.why || "It left its bounds."] : [];
+    if (s.rescues) said.push(`${COUNT.format(s.rescues)} ${s.rescues === 1 ? "rescue" : "rescues"}, ${(s.rescue_ms ?? 0).toFixed(s.rescue_ms && s.rescue_ms < 1 ? 3 : 1)} ms in all.`);
+    const name = parts[s.part]?.name ?? String(s.part);
+    return { name, frozen: s.frozen === true, mark: s.frozen ? "stopped" : s.asleep ? "asleep" : "", said };
+  });
+}
+
+/**
+ * What is not computed because nobody looks, one sentence; empty when all of it is.
+ * @param {{field: boolean, estimate: boolean, estimates: boolean, unwatched: number}} looked
+ */
+export function unwatchedLine({ field, estimate, estimates, unwatched }) {
+  const idle = [...(field ? [] : ["colours"]), ...(estimate || !estimates ? [] : ["errors"])];
+  const said = idle.length ? `Not computed, nobody looks here: ${idle.join(", ")}.` : "";
+  const skins = unwatched > 0 ? `${COUNT.format(unwatched)} steps were not skinned while nobody watched.` : "";
+  return [said, skins].filter(Boolean).join(" ");
+}
+
 export class PlanPanel {
-  /** @param {Document} page */
-  constructor(page) {
+  /**
+   * @param {Document} page
+   * @param {(verb: string, target: string, args?: Record<string, number>) => void} order
+   */
+  constructor(page, order = () => {}) {
+    this.order = order;
+    this.bodies = /** @type {HTMLElement} */ (page.getElementById("bodies"));
+    this.unwatched = /** @type {HTMLElement} */ (page.getElementById("unwatched"));
+    this.told = ""; // of bodies
     this.figures = /** @type {HTMLElement} */ (page.getElementById("figures"));
     this.rows = /** @type {HTMLTableSectionElement} */ (page.querySelector("#rows tbody"));
     this.active = /** @type {HTMLElement} */ (page.getElementById("active"));
     this.members = /** @type {HTMLElement} */ (page.getElementById("members"));
     /** @type {Map<string, HTMLElement>} */
     this.values = new Map();
-    /** @type {{bar: HTMLElement, value: HTMLElement}[]} */
+    /** @type {{bar: HTMLElement, value: HTMLElement, ms: number | null}[]} */
     this.bars = [];
   }
 
@@ -47,20 +98,61 @@ export class PlanPanel {
     value.textContent = text;
   }
 
-  /** @param {string[]} names rows of the plan in order */
-  plan(names) {
+  /** @param {Row[]} rows @param {{name: string}[]} parts @param {boolean} switches may this member switch them? */
+  plan(rows, parts, switches) {
     this.rows.replaceChildren();
-    this.bars = names.map((name) => {
+    this.bars = rows.map(({ name, part, why, on, ms }) => {
       const row = this.rows.insertRow();
-      row.insertCell().textContent = name.replaceAll("_", " ");
+      row.title = why;
+      row.className = on ? "" : "off";
+      if (switches) row.append(this.switchOf(name, part, on));
+      const title = row.insertCell();
+      title.textContent = name.replaceAll("_", " ");
+      if (parts.length > 1 && parts[part]) title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
       const cell = row.insertCell();
       cell.className = "bar";
       const bar = document.createElement("i");
       cell.append(bar);
       const value = row.insertCell();
-      value.textContent = "–";
-      return { bar, value };
+      value.textContent = on ? "–" : "off";
+      return { bar, value, ms };
     });
+  }
+
+  /** @param {string} name @param {number} part @param {boolean} on */
+  switchOf(name, part, on) {
+    const cell = document.createElement("td"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
+    cell.className = "switch";
+    box.setAttribute("aria-label", `${name} is part of the plan`);
+    box.onchange = () => {
+      this.order("row", name, { part, on: box.checked ? 1 : 0 });
+      // it is as the server says: what it refuses stays
+      box.checked = on;
+      box.disabled = true;
+      setTimeout(() => (box.disabled = false), 3000);
+    };
+    cell.append(box);
+    return cell;
+  }
+
+  /** @param {ReturnType<typeof bodyLines>} lines */
+  bodyStates(lines) {
+    const told = JSON.stringify(lines);
+    if (told === this.told) return;
+    this.told = told;
+    this.bodies.replaceChildren(...lines.map(({ name, frozen, mark, said }) => {
+      const item = document.createElement("li"), title = document.createElement("b");
+      item.className = mark;
+      if (frozen) item.classList.add("frozen");
+      title.textContent = name;
+      item.append(title, mark ? ` ${mark}` : "", ...said.map((text) => Object.assign(document.createElement("p"), { textContent: text })));
+      if (frozen) {
+        const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
+        reset.onclick = () => this.order("reset", name);
+        item.append(reset);
+      }
+      return item;
+    }));
   }
 
   /**
@@ -80,9 +172,11 @@ export class PlanPanel {
     this.figure("received", rate(here.bytes_s));
     this.figure("vertices shown", here.vertices.toLocaleString("en"));
     this.activity(activeLines(s.active ?? [], parts));
+    this.bodyStates(bodyLines(s.parts ?? [], parts));
     const most = Math.max(1e-6, ...s.row_ms);
-    this.bars.forEach(({ bar, value }, i) => {
-      const ms = s.row_ms[i] ?? 0;
+    this.bars.forEach(({ bar, value, ms: at }) => {
+      if (at === null) return;
+      const ms = s.row_ms[at] ?? 0;
       bar.style.width = (100 * ms) / most + "%";
       value.textContent = ms.toFixed(3);
     });
