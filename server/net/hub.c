@@ -401,6 +401,7 @@ static void hub_tick(void *user)
         pal_stream_measure(hub->room[r].stream, now);
         pal_hub_tell_fields(&hub->room[r]);
         pal_hub_tell_estimates(&hub->room[r]);
+        pal_hub_count_unwatched(&hub->room[r]);
     }
     for (int i = 0; i < hub->most_clients; i++) {
         pal_client *c = &hub->client[i];

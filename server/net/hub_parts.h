@@ -56,9 +56,12 @@ typedef struct pal_hub_room {
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last asked for */
-    int n_estimate[PAL_BODY_MAX];        /* clients that look at an estimate */
-    bool told_estimate[PAL_BODY_MAX];    /* the session knows that some do */
-    const pal_priced_setting *setting;   /* what a study found, for body setting_body [n_setting]; NULL: no study */
+    /* steps of which nothing was shown because nobody was here; tick and OUTPUT runs when they were counted last */
+    uint64_t n_unwatched, seen_tick, seen_output;
+    bool left_alone;                   /* nobody was here then */
+    int n_estimate[PAL_BODY_MAX];      /* clients that look at an estimate */
+    bool told_estimate[PAL_BODY_MAX];  /* the session knows that some do */
+    const pal_priced_setting *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
     int n_setting, setting_body;
     int tier_users[PAL_STREAM_TIER];
     int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients that look at a field   */
@@ -125,6 +128,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: no
 /* hub_plan.c */
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);
+void pal_hub_count_unwatched(pal_hub_room *room);
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out); /* rows and bodies */
 /* an order about rows or single bodies is dealt with; false: it is another one */
 bool pal_hub_plan_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);

@@ -16,7 +16,8 @@ static int body_of(const pal_session *session, const char *name)
 }
 
 /* rows of the plan as the session was opened, as hello and topology name them */
-static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part)
+static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
+                          char (*why)[PAL_WIRE_WHY_BYTES])
 {
     int n = pal_session_rows(session);
     uint32_t n_row = 0;
@@ -24,6 +25,7 @@ static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME
         pal_row_info row;
         pal_session_row(session, r, &row);
         pal_plain_text(name[r], PAL_WIRE_NAME_BYTES, row.name);
+        pal_plain_text(why[r], PAL_WIRE_WHY_BYTES, row.why);
         part[r] = body_of(session, row.body);
     }
     return n_row;
@@ -31,12 +33,12 @@ static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME
 
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out)
 {
-    out->n_row = out->n_row_part = plan_rows(room->session, out->row, out->row_part);
+    out->n_row = out->n_row_part = out->n_row_why = plan_rows(room->session, out->row, out->row_part, out->row_why);
 }
 
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out)
 {
-    out->n_row = out->n_row_part = plan_rows(room->session, out->row, out->row_part);
+    out->n_row = out->n_row_part = out->n_row_why = plan_rows(room->session, out->row, out->row_part, out->row_why);
 }
 
 /* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
@@ -74,12 +76,29 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
         pal_wire_part_state *to = &w->state[w->n_state];
         *to = (pal_wire_part_state){.part = (uint32_t)p,
                                     .frozen = part->frozen,
+                                    .asleep = part->asleep,
                                     .n_rescue = part->n_rescue,
                                     .rescue_ms = (double)part->rescue_ns * 1e-6};
         if (part->frozen) pal_plain_text(to->why, sizeof to->why, part->why);
         w->frozen |= part->frozen;
-        w->n_state += part->frozen || part->n_rescue > 0;
+        w->n_state += part->frozen || part->asleep || part->n_rescue > 0;
     }
+    w->n_unwatched = room->n_unwatched;
+}
+
+/* steps since the last call of which nothing was shown, if nobody has looked since */
+void pal_hub_count_unwatched(pal_hub_room *room)
+{
+    const pal_frame *f = room->stream->frame;
+    uint64_t n_output = 0;
+    if (!f) return;
+    for (int p = 0; p < f->n_part; p++)
+        if (f->part[p].n_output > n_output) n_output = f->part[p].n_output;
+    uint64_t n_step = f->tick > room->seen_tick ? f->tick - room->seen_tick : 0;
+    uint64_t n_shown = n_output > room->seen_output ? n_output - room->seen_output : 0;
+    if (room->left_alone && n_step > n_shown) room->n_unwatched += n_step - n_shown;
+    room->seen_tick = f->tick, room->seen_output = n_output;
+    room->left_alone = room->members.n_member == 0;
 }
 
 /* the order's body; -1: complained */
@@ -108,11 +127,42 @@ static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
         give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
 }
 
+/* what the world refuses is a sentence in `note` of status, as with materials and brushes */
+static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    pal_command command = {.kind = PAL_COMMAND_ROW, .body = -1};
+    int on = -1;
+    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    if (!m || m->role != PAL_MEMBER_INSTRUCTOR) {
+        pal_hub_complain(hub, c, "role", "only an instructor switches rows");
+        return;
+    }
+    for (uint32_t i = 0; i < order->n_arg; i++) {
+        const pal_wire_arg *arg = &order->arg[i];
+        if (!strcmp(arg->key, "on")) on = arg->value != 0;
+        if (!strcmp(arg->key, "part") && arg->value >= 0 && arg->value < c->room->stream->n_part)
+            command.body = (int)arg->value;
+    }
+    if (order->n_arg != 2 || on < 0 || command.body < 0) {
+        pal_hub_complain(hub, c, "args", "row takes part (0 to %d) and on", c->room->stream->n_part - 1);
+        return;
+    }
+    if (strlen(order->target) >= sizeof command.row) {
+        pal_hub_complain(hub, c, "target", "there is no row %s", order->target);
+        return;
+    }
+    command.wanted = on == 1;
+    strcpy(command.row, order->target);
+    give(hub, c, "row", &command);
+}
+
 bool pal_hub_plan_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 {
     if (!strcmp(order->verb, "reset") && order->target[0]) {
         reset_body(hub, c, order);
         return true;
     }
-    return false;
+    if (strcmp(order->verb, "row")) return false;
+    switch_row(hub, c, order);
+    return true;
 }

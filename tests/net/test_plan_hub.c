@@ -1,0 +1,184 @@
+/* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
+#include "server/net/server.h"
+#include "tests/net/mem_client.h"
+#include "tests/net/small_scene.h"
+
+#include <time.h>
+
+static small_scene organ;
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pal_transport *road;
+static uint64_t now_ns;
+
+static void hurt(void *user, pal_world *next, const pal_world *before)
+{
+    (void)user, (void)before;
+    pal_world_body(next, 0)->x[31] = NAN;
+}
+
+/* a session that goes on from another one in a state that no guard lets pass */
+static void begin_hurt(void)
+{
+    pal_session *first = session;
+    pal_note note = {""};
+    if (pal_session_open_after(first, &organ.scene, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_session_follow(session, first, hurt, NULL, &note)) CHECK_FAIL("does not follow: %s", note.text);
+    pal_session_close(first);
+}
+
+static void begin(bool hurts)
+{
+    pal_session *sessions[1];
+    pal_note note = {""};
+    gate = pal_server_gate_create();
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
+    pal_server_options net = {.road = "mem"};
+    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (hurts) begin_hurt();
+    sessions[0] = session;
+    if (pal_server_open(&net, sessions, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    pal_server_connect(server, gate);
+    road = pal_server_transport(server);
+    now_ns = 1000000000ull;
+}
+
+static void end(void)
+{
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+}
+
+/* half a second of the hub's time, so that every turn is a tick */
+static void turn(mem_client *a, mem_client *b)
+{
+    now_ns += 500000000ull;
+    pal_server_turn(server, now_ns);
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+    nanosleep(&(struct timespec){0, 2000000}, NULL);
+}
+
+#define UNTIL(condition, a, b)                                                                                         \
+    do {                                                                                                               \
+        for (int turns = 0; !(condition) && turns < 10000; turns++) turn(a, b);                                        \
+        CHECK(condition);                                                                                              \
+    } while (0)
+
+static int find(uint32_t n, char (*row)[PAL_WIRE_NAME_BYTES], const char *name)
+{
+    for (uint32_t r = 0; r < n; r++)
+        if (!strcmp(row[r], name)) return (int)r;
+    return -1;
+}
+
+#define ROW(name, on)                                                                                                  \
+    "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"" name "\",\"args\":{\"part\":0,\"on\":" #on "}}"
+
+static void rows_say_whose_they_are_and_what_called_for_them(void)
+{
+    mem_client ada;
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2, &ada, NULL);
+    const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
+    CHECK(h->n_row > 3 && h->n_row_part == h->n_row && h->n_row_why == h->n_row);
+    for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->row_part[r] == 0 && h->row_why[r][0]);
+    const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
+    CHECK(s->n_row_name == 0 && s->n_off == 0 && s->n_state == 0);
+    CHECK_INT(s->n_row, h->n_row);
+    mem_end(&ada);
+    end();
+}
+
+static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
+{
+    static mem_client ada, bo;
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2 && bo.n_text[PAL_CONTROL_STATUS] > 0, &ada, &bo);
+    pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
+    const pal_wire_status *a = &ada.last[PAL_CONTROL_STATUS].status, *b = &bo.last[PAL_CONTROL_STATUS].status;
+    REQUIRE(find(h->n_row, h->row, "tet_volume") >= 0);
+
+    mem_text(&ada, ROW("tet_volume", 0));
+    UNTIL(a->n_off == 1 && b->n_off == 1, &ada, &bo);
+    CHECK_TEXT(a->off[0].row, "tet_volume");
+    CHECK_INT(a->off[0].part, 0);
+    CHECK_INT(a->n_row, h->n_row - 1);
+    CHECK_INT(a->n_row_name, h->n_row - 1);
+    CHECK_INT(a->n_row_part, a->n_row_name);
+    CHECK(find(a->n_row_name, (char(*)[PAL_WIRE_NAME_BYTES])a->row, "tet_volume") < 0);
+
+    mem_text(&ada, ROW("tet_volume", 1));
+    UNTIL(a->n_off == 0 && b->n_off == 0, &ada, &bo);
+    CHECK_INT(a->n_row, h->n_row);
+    CHECK_INT(a->n_row_name, 0); /* the plan of hello again */
+
+    /* what the world refuses changes nothing and is said in the status */
+    uint64_t n_refused = a->n_refused;
+    mem_text(&ada, ROW("no_such_row", 0));
+    UNTIL(a->n_refused == n_refused + 1 && a->note[0], &ada, &bo);
+    CHECK(strstr(a->note, "no_such_row"));
+    CHECK_INT(a->n_row, h->n_row);
+    mem_end(&ada), mem_end(&bo);
+    end();
+}
+
+static void others_do_not_and_bad_orders_are_refused(void)
+{
+    static const char *const bad[] = {
+        ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"tet_volume\"}",
+        "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"a\",\"args\":{\"part\":1,\"on\":0}}",
+        "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
+    static const char *const said[] = {"only an instructor switches rows", "row takes part (0 to 0) and on",
+                                       "row takes part (0 to 0) and on", "there is no body liver"};
+    static mem_client ada, bo;
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    turn(&ada, &bo);
+    for (int i = 0; i < 4; i++) {
+        mem_client *who = i == 0 ? &bo : &ada;
+        int before = who->n_text[PAL_CONTROL_ERROR];
+        mem_text(who, bad[i]);
+        UNTIL(who->n_text[PAL_CONTROL_ERROR] > before, &ada, &bo);
+        CHECK_TEXT(who->last[PAL_CONTROL_ERROR].problem.text, said[i]);
+    }
+    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_off, 0);
+    mem_end(&ada), mem_end(&bo);
+    end();
+}
+
+static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
+{
+    static mem_client cy;
+    begin(true);
+    mem_join(&cy, road, "Cy", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
+    UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
+    CHECK(s->state[0].frozen && s->state[0].n_rescue == 1);
+    CHECK(strstr(s->state[0].why, "is no number"));
+    mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
+    UNTIL(!s->frozen && s->n_state == 0, &cy, NULL);
+    CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);
+    mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
+    UNTIL(cy.n_text[PAL_CONTROL_ERROR] == 1, &cy, NULL);
+    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].problem.text, "a viewer resets nothing but a body that was stopped");
+    mem_end(&cy);
+    end();
+}
+
+int main(void)
+{
+    if (!small_scene_make(&organ, "small")) return 1;
+    RUN(rows_say_whose_they_are_and_what_called_for_them);
+    RUN(an_instructor_switches_a_row_off_and_on_and_all_hear_of_it);
+    RUN(others_do_not_and_bad_orders_are_refused);
+    RUN(everybody_resets_what_was_stopped_and_a_viewer_nothing_else);
+    pal_prepared_free(&organ.mesh);
+    return check_report();
+}
