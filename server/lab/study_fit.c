@@ -1,0 +1,67 @@
+/* Springs fitted to the study's reference: homogeneous constants of edges and volumes, by the adjoint. */
+#include "server/base/vec3.h"
+#include "server/lab/calibrate.h"
+#include "server/lab/study_parts.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_EVALUATIONS = 60 };
+
+/* the reference's rest under a load, in the problem's frame */
+static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
+{
+    const pal_prepared *mesh = job->scene->body[0].mesh;
+    size_t n = 3 * (size_t)job->n_probe;
+    *out = (pal_samples){job->n_probe, malloc(n * sizeof(double)), malloc(n * sizeof(double))};
+    if (!out->x || !out->u) return PAL_ERR_MEMORY;
+    for (int i = 0; i < job->n_probe; i++) pal_add3(out->x + 3 * i, job->probe + 3 * i, mesh->surface.origin_m);
+    memcpy(out->u, job->still[load], n * sizeof(double));
+    return PAL_ERR_OK;
+}
+
+static pal_err fit(const pal_calibration *calibration, pal_setting *setting, pal_note *note)
+{
+    pal_calibration_info info;
+    pal_fit_result result;
+    const pal_fit_options options = {.most_evaluation = MOST_EVALUATIONS};
+    pal_calibration_info_of(calibration, &info);
+    double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
+    if (!theta) return PAL_ERR_MEMORY;
+    memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
+    pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, note);
+    for (int k = 0; k < info.n_kind && !err; k++) {
+        if (info.kind[k] == PAL_SPRING_DISTANCE) setting->k_distance_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_AREA) setting->k_area_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_VOLUME) setting->k_volume_J = exp(theta[k]);
+    }
+    free(theta);
+    return err;
+}
+
+pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
+{
+    pal_samples samples[PAL_STUDY_LOADS] = {{0}};
+    pal_calibrate_case cases[PAL_STUDY_LOADS];
+    pal_calibrate_options options;
+    pal_calibration *calibration = NULL;
+    pal_err err = PAL_ERR_OK;
+    pal_calibrate_default(&options);
+    options.voxel.resolution = setting->size;
+    options.without_area = true;
+    for (int k = 0; k < job->n_load && !err; k++) {
+        err = take_samples(job, k, &samples[k]);
+        cases[k] = (pal_calibrate_case){
+            .load_case = job->load[k], .samples = &samples[k], .truth_name = "reference", .fit = true};
+    }
+    if (job->problem->n_support == 0)
+        err = pal_note_set(note, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
+    if (!err)
+        err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, job->n_load, &options,
+                                     &calibration, note);
+    if (!err) err = fit(calibration, setting, note);
+    pal_calibration_destroy(calibration);
+    for (int k = 0; k < job->n_load; k++) pal_samples_free(&samples[k]);
+    return err;
+}
