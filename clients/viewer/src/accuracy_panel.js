@@ -7,7 +7,7 @@ import { frontOf, knobOrder, layOut, milliseconds, millimetres, neighbourWords, 
 /** @typedef {import("./accuracy_plot.js").Point} Point */
 /** @typedef {{verb: string, target: string, args: Record<string, number>}} Order */
 
-const BOX = { left: 40, right: 302, top: 10, bottom: 168 };
+const BOX = { left: 40, right: 302, top: 20, bottom: 172 };
 const WAIT_MS = 60000; // meshes of many voxels take their time; an answer that does not come is not waited for any longer
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -157,7 +157,7 @@ export class AccuracyPanel {
       ...plot.xTicks.flatMap(({ at, text }) => [this.shape("line", { x1: at, x2: at, y1: top, y2: bottom, class: "grid" }), this.shape("text", { x: at, y: bottom + 13, class: "tick", "text-anchor": "middle" }, text)]),
       ...plot.yTicks.flatMap(({ at, text }) => [this.shape("line", { x1: left, x2: right, y1: at, y2: at, class: "grid" }), this.shape("text", { x: left - 5, y: at + 3.5, class: "tick", "text-anchor": "end" }, text)]),
       this.shape("text", { x: right, y: bottom + 26, class: "tick", "text-anchor": "end" }, "ms per step"),
-      this.shape("text", { x: 11, y: top + 40, class: "tick", "text-anchor": "end", transform: `rotate(-90 11 ${top})`, dx: 0, dy: 0 }, "error, mm"),
+      this.shape("text", { x: 2, y: top - 9, class: "tick" }, "error, mm"),
     ];
   }
 

@@ -10,6 +10,9 @@
  * @typedef {{low: number, high: number}} Range of one axis, powers of ten and round parts of them
  */
 
+/** errors below this are drawn here: a body at rest errs by rounding, which is nobody's scale */
+export const LEAST_M = 1e-8;
+
 /** colours of methods in the order in which they come; told apart on dark ground with any colour vision */
 export const METHOD_COLOURS = Object.freeze(["#5cb8ff", "#ffb45c", "#62d39a", "#e08bd8", "#f2e36b", "#b0bec8"]);
 
@@ -109,9 +112,9 @@ export function layOut(points, estimate, box) {
   const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) => p !== null && positive(p.ms) && positive(p.error_m);
   const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
   const msRange = logRange([...shown.map((p) => /** @type {number} */ (p?.ms)), ...(positive(estimate?.ms) ? [estimate.ms] : [])]);
-  const errorRange = logRange(shown.map((p) => 1e3 * /** @type {number} */ (p?.error_m)));
+  const errorRange = logRange(shown.map((p) => 1e3 * Math.max(LEAST_M, /** @type {number} */ (p?.error_m))));
   const x = (/** @type {number} */ ms) => logPlace(ms, msRange, box.left, box.right);
-  const y = (/** @type {number} */ m) => logPlace(1e3 * m, errorRange, box.bottom, box.top);
+  const y = (/** @type {number} */ m) => logPlace(1e3 * Math.max(LEAST_M, m), errorRange, box.bottom, box.top);
   const methods = [...new Set(good.map((p) => p.method))];
   return {
     methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),

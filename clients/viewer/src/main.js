@@ -23,7 +23,10 @@ let told = 0;
 
 const stage = makeStage();
 const marks = new ToolMarks(stage, byId("labels"));
-const panel = new PlanPanel(document, (verb, target, args = {}) => order({ verb, target, args }));
+const panel = new PlanPanel(document, (verb, target, args = {}) => {
+  if (verb === "row") rowAsked = { refused: state.status?.refused ?? 0, until: performance.now() + TOLD_MS };
+  order({ verb, target, args });
+});
 const cost = new AccuracyPanel(document, (wish) => order(wish));
 const sculpt = new SculptPanel(document, ({ verb, args }) => order({ verb, target: "", args }), save);
 const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
@@ -253,6 +256,15 @@ function stopped(m) {
   return still.length ? `${names}: stopped. ${still[0].why ?? ""} Reset brings it back.` : "The body diverged and was frozen. Reset brings it back.";
 }
 
+/** what the world refuses of rows is counted and said in the status @type {{refused: number, until: number} | null} */
+let rowAsked = null;
+/** @param {any} m status */
+function rowRefused(m) {
+  if (!rowAsked) return;
+  if (m.refused > rowAsked.refused && m.note) notice(m.note, TOLD_MS);
+  if (m.refused > rowAsked.refused || performance.now() > rowAsked.until) rowAsked = null;
+}
+
 function showFigures() {
   if (byId("panel").hidden || !state.status) return;
   panel.status(state.status, state.here, state.hello.parts);
@@ -311,6 +323,7 @@ const control = {
     else if (!told) notice("");
     const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
     showState(m.frozen ? "lost" : "live", slow);
+    rowRefused(m);
     showFigures();
   },
   members(m) {

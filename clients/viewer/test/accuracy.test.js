@@ -68,6 +68,8 @@ test("without a study the live point has a plot of its own; without an error it 
   const unknown = layOut(POINTS, estimate({ error_m: undefined }), BOX);
   assert.equal(unknown.live?.y, null);
   assert.equal(layOut([], null, BOX).live, null);
+  const resting = layOut([], estimate({ error_m: 4e-17 }), BOX);
+  assert.ok(resting.errorRange.low >= 1e-6 && resting.errorRange.high <= 1e-3, "rounding is no scale");
 });
 
 test("parts of the error are shares of their sum, and what nobody knows is no part", () => {
