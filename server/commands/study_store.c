@@ -26,7 +26,7 @@ static const number_key number[] = {
     {"step_s", AT(priced.setting.step_s), 0, 0.1, false},
     {"tolerance", AT(priced.setting.tolerance), 0, 1, false},
     {"k_distance_J", AT(priced.setting.k_distance_J), 0, 1e300, false},
-    {"k_area_J", AT(priced.setting.k_area_J), 0, 1e300, false},
+    {"k_area_J", AT(priced.setting.k_area_J), -1, 1e300, false},
     {"k_volume_J", AT(priced.setting.k_volume_J), 0, 1e300, false},
     {"ms", AT(priced.ms), 0, 1e12, true},
     {"error_m", AT(priced.error_m), 0, 1e300, true},
@@ -63,16 +63,17 @@ static const char *text_at(const pal_study_point *p, int k)
 
 /* ---- what a study is of ---- */
 
-static uint64_t add_bytes(uint64_t sum, const void *bytes, size_t n_byte)
+uint64_t pal_study_sum(uint64_t before, const void *bytes, size_t n_byte)
 {
     const unsigned char *at = bytes;
+    uint64_t sum = before ? before : 0xcbf29ce484222325u;
     for (size_t i = 0; i < n_byte; i++) sum = (sum ^ at[i]) * 0x100000001b3u;
     return sum;
 }
 
 static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
 {
-    return value ? add_bytes(sum, value, n * sizeof *value) : add_bytes(sum, "-", 1);
+    return value ? pal_study_sum(sum, value, n * sizeof *value) : pal_study_sum(sum, "-", 1);
 }
 
 static uint64_t add_region(uint64_t sum, const pal_region *r)
@@ -83,7 +84,7 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
     if (r->kind != PAL_REGION_LABEL) sum = add_numbers(add_numbers(sum, r->low_m, 3), r->high_m, 3);
     if (r->kind == PAL_REGION_LABEL) {
         sum = add_numbers(add_numbers(sum, r->low_m, 3), r->spacing_m, 3);
-        if (r->label) sum = add_bytes(sum, r->label, n);
+        if (r->label) sum = pal_study_sum(sum, r->label, n);
     }
     if (r->kind != PAL_REGION_GRID) return sum;
     sum = add_numbers(add_numbers(sum, r->grid_young_Pa, n), r->grid_poisson, n);
@@ -92,14 +93,14 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
 
 const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
 {
-    uint64_t sum = 0xcbf29ce484222325u;
+    uint64_t sum = 0;
     const pal_material *m = &body->material;
     const double own[] = {m->young_Pa,    m->poisson,      m->density_kg_m3, m->damping_1_s,
                           body->n_region, body->n_support, body->n_stroke};
     const pal_surface *s = &body->mesh->surface;
     sum = add_numbers(sum, own, sizeof own / sizeof *own);
-    sum = add_bytes(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
-    sum = add_bytes(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
+    sum = pal_study_sum(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
+    sum = pal_study_sum(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
     if (body->cells) sum = add_numbers(sum, body->cells->x, 3 * (size_t)body->cells->n_vertex);
     for (int k = 0; k < body->n_region; k++) sum = add_region(sum, &body->region[k]);
     for (int k = 0; k < body->n_support; k++) {
@@ -157,7 +158,7 @@ static void put_point(cJSON *list, const pal_study_point *p)
     cJSON_AddStringToObject(o, "err", pal_err_name(p->err));
 }
 
-static cJSON *as_tree(const pal_study_file *file)
+cJSON *pal_study_file_tree(const pal_study_file *file)
 {
     const pal_study *s = &file->study;
     cJSON *root = cJSON_CreateObject(), *of;
@@ -174,6 +175,7 @@ static cJSON *as_tree(const pal_study_file *file)
     put_number(of, "index", file->index);
     cJSON_AddStringToObject(of, "shape", file->shape);
     cJSON_AddStringToObject(of, "loads", file->loads);
+    cJSON_AddStringToObject(of, "digest", file->digest);
     cJSON_AddStringToObject(of, "methods", file->methods);
     cJSON_AddStringToObject(root, "command", file->command);
     put_number(root, "n_all", file->n_all);
@@ -185,7 +187,7 @@ static cJSON *as_tree(const pal_study_file *file)
 
 pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_note *note)
 {
-    cJSON *root = as_tree(file);
+    cJSON *root = pal_study_file_tree(file);
     char *json = root ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (!json) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for its text", path);
@@ -267,11 +269,11 @@ static pal_err get_number(const pal_json *json, const cJSON *object, const char 
     return PAL_ERR_OK;
 }
 
-static pal_err get_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int high,
-                         int *out)
+static pal_err get_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int low,
+                         int high, int *out)
 {
     PAL_TRY(need(json, object, path, key));
-    return pal_json_count(json, object, path, key, 0, high, out);
+    return pal_json_count(json, object, path, key, low, high, out);
 }
 
 static pal_err get_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,
@@ -310,9 +312,9 @@ static pal_err get_point(const pal_json *json, const cJSON *object, const char *
         PAL_TRY(
             get_text(json, object, path, text[k].key, text[k].may_be_empty, (char *)out + text[k].at, text[k].n_byte));
     for (int k = 0; k < N_NUMBER; k++) PAL_TRY(get_number(json, object, path, &number[k], (char *)out + number[k].at));
-    PAL_TRY(get_count(json, object, path, "size", 1024, &out->priced.setting.size));
-    PAL_TRY(get_count(json, object, path, "nodes", 1 << 30, &out->n_node));
-    PAL_TRY(get_count(json, object, path, "substeps", 1 << 30, &out->n_substep));
+    PAL_TRY(get_count(json, object, path, "size", -1, 1024, &out->priced.setting.size));
+    PAL_TRY(get_count(json, object, path, "nodes", 0, 1 << 30, &out->n_node));
+    PAL_TRY(get_count(json, object, path, "substeps", 0, 1 << 30, &out->n_substep));
     PAL_TRY(get_bool(json, object, path, "front", &out->priced.front));
     PAL_TRY(get_err(json, object, path, &out->err));
     bool measured = isfinite(out->priced.ms) && isfinite(out->priced.error_m);
@@ -323,14 +325,15 @@ static pal_err get_point(const pal_json *json, const cJSON *object, const char *
 
 static pal_err get_of(const pal_json *json, const cJSON *root, pal_study_file *file)
 {
-    static const char *const known[] = {"body", "index", "shape", "loads", "methods", NULL};
+    static const char *const known[] = {"body", "index", "shape", "loads", "digest", "methods", NULL};
     PAL_TRY(need(json, root, "", "of"));
     const cJSON *of = cJSON_GetObjectItemCaseSensitive(root, "of");
     PAL_TRY(pal_json_object(json, of, "of", known));
     PAL_TRY(get_text(json, of, "of", "body", true, file->body, sizeof file->body));
-    PAL_TRY(get_count(json, of, "of", "index", PAL_BODY_MAX - 1, &file->index));
+    PAL_TRY(get_count(json, of, "of", "index", 0, PAL_BODY_MAX - 1, &file->index));
     PAL_TRY(get_text(json, of, "of", "shape", false, file->shape, sizeof file->shape));
     PAL_TRY(get_text(json, of, "of", "loads", true, file->loads, sizeof file->loads));
+    PAL_TRY(get_text(json, of, "of", "digest", true, file->digest, sizeof file->digest));
     return get_text(json, of, "of", "methods", true, file->methods, sizeof file->methods);
 }
 
@@ -365,7 +368,7 @@ static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file 
         PAL_TRY(get_number(json, root, "", &own[k], (char *)s + own[k].at));
     PAL_TRY(get_of(json, root, file));
     PAL_TRY(get_text(json, root, "", "command", true, file->command, sizeof file->command));
-    PAL_TRY(get_count(json, root, "", "n_all", PAL_STUDY_POINTS, &file->n_all));
+    PAL_TRY(get_count(json, root, "", "n_all", 0, PAL_STUDY_POINTS, &file->n_all));
     PAL_TRY(get_bool(json, root, "", "whole", &file->whole));
     return get_points(json, root, s);
 }

@@ -19,7 +19,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[k];
         if (p->priced.ms < 0 || isinf(p->priced.ms) || p->priced.error_m < 0 || isinf(p->priced.error_m)) abort();
-        if (!p->priced.setting.model[0] || p->priced.setting.size < 0) abort();
+        if (!p->priced.setting.model[0] || p->priced.setting.size < -1) abort();
         if (order[k] < 0 || order[k] >= s->n_point) abort();
     }
     int n = pal_study_settings(s, list);

@@ -35,6 +35,7 @@ static pal_study_file *random_file(int n)
     snprintf(f->body, sizeof f->body, "the liver");
     snprintf(f->shape, sizeof f->shape, "0123456789abcdef");
     snprintf(f->loads, sizeof f->loads, "three presses, 0.5 s");
+    snprintf(f->digest, sizeof f->digest, "fedcba9876543210");
     snprintf(f->methods, sizeof f->methods, "fem,tet_springs");
     snprintf(f->command, sizeof f->command, "palpate study 'a b' --quick");
     f->index = 3, f->n_all = 200, f->whole = false;
@@ -132,7 +133,7 @@ static void what_is_no_study_is_refused_by_its_place(void)
         {"0123456789abcdef", "0123456789abcdef0", "of.shape: 17 bytes of text, more than 16"},
         {"\"model\":\t\"fem\"", "\"model\": \"\"", "points[0].model: is empty"},
         {"\"model\":\t\"tet_springs\"", "\"model\": 4", "points[1].model: is not a text"},
-        {"\"size\":\t1", "\"size\": -1", "points[1].size: -1 is outside"},
+        {"\"size\":\t1", "\"size\": -2", "points[1].size: -2 is outside"},
         {"\"step_s\":\t0,", "\"step_s\": 1,", "points[0].step_s: 1 is outside 0 .. 0.1"},
         {"\"step_s\":\t0,", "\"step_s\": null,", "points[0].step_s: is not a number"},
         {"\"ms\":\tnull", "\"ms\": -2", "points[0].ms: -2 is outside"},

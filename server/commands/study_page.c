@@ -1,0 +1,319 @@
+/* Studies as table, drawing and page. */
+#include "server/commands/study_page.h"
+
+#include "server/lab/plot.h"
+#include "server/mesh/mesh_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { METHODS = 12, FRONT_LABELS = 40 };
+
+const char *pal_study_method(const pal_setting *setting, char out[PAL_SETTING_TEXT])
+{
+    bool calibrated = setting->k_distance_J > 0;
+    snprintf(out, PAL_SETTING_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
+             calibrated ? " calibrated" : "");
+    return out;
+}
+
+static bool is_measured(const pal_study_point *p)
+{
+    return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
+}
+
+static double step_of(const pal_study *study, const pal_study_point *p)
+{
+    return p->priced.setting.step_s > 0 ? p->priced.setting.step_s : study->step_s;
+}
+
+bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
+{
+    return is_measured(p) && 1e-3 * p->priced.ms <= step_of(study, p);
+}
+
+/* ---- table ---- */
+
+/* a cell of the table; "-" when the number is not known */
+static void print_cell(FILE *to, int width, const char *format, double value)
+{
+    char text[32] = "-";
+    if (isfinite(value)) snprintf(text, sizeof text, format, value);
+    fprintf(to, " %*s", width, text);
+}
+
+void pal_study_print(const pal_study_file *file, FILE *to)
+{
+    const pal_study *s = &file->study;
+    int order[PAL_STUDY_POINTS], n_bad = 0;
+    char text[PAL_SETTING_TEXT];
+    fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
+    fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
+            1e3 * s->most_m);
+    fprintf(to, "%1s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "ms", "p95", "live", "rest RMS", "most mm",
+            "RMS %", "most %", "way mm", "nodes", "steps", "setting");
+    pal_study_order(s, order);
+    for (int k = 0; k < s->n_point; k++) {
+        const pal_study_point *p = &s->point[order[k]];
+        if (!is_measured(p)) {
+            n_bad++;
+            continue;
+        }
+        fprintf(to, "%1s", p->priced.front ? "*" : "");
+        print_cell(to, 8, "%.3f", p->priced.ms);
+        print_cell(to, 8, "%.3f", p->ms_p95);
+        fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
+        print_cell(to, 9, "%.4f", 1e3 * p->static_rms_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->static_most_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->most_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->most_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->way_most_m);
+        fprintf(to, " %8d %6d  %s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text));
+    }
+    fprintf(to,
+            "* the front: nothing else is both cheaper and nearer. Live: a step takes no longer than it lasts. Steps: "
+            "sub-steps.\n");
+    for (int k = 0; k < s->n_point && n_bad > 0; k++) {
+        const pal_study_point *p = &s->point[k];
+        if (!is_measured(p))
+            fprintf(to, "not measured: %s: %s\n", pal_setting_text(&p->priced.setting, text),
+                    p->why[0] ? p->why : pal_err_text(p->err));
+    }
+}
+
+/* ---- drawing ---- */
+
+/* the knobs of a point on the front, as short as its mark allows */
+static void knobs_of(const pal_study *study, const pal_study_point *p, char *out, size_t n_byte)
+{
+    const pal_setting *s = &p->priced.setting;
+    bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
+    int n = s->size > 0 ? snprintf(out, n_byte, "%d %s", s->size,
+                                   voxels         ? "voxels"
+                                   : s->size == 1 ? "level"
+                                                  : "levels")
+                        : snprintf(out, n_byte, "as it is");
+    double step = step_of(study, p);
+    if (fabs(step - study->step_s) > 1e-9 && step > 0)
+        n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
+    if (s->tolerance > 0 && (size_t)n < n_byte) snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
+}
+
+/* what a drawing of a study borrows */
+typedef struct series {
+    char name[METHODS][PAL_SETTING_TEXT];
+    int n_method, n[METHODS], n_front;
+    double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
+    double front_x[PAL_STUDY_POINTS], front_y[PAL_STUDY_POINTS];
+    char knobs[FRONT_LABELS][64], title[160], live[64], own[80];
+    pal_plot_label label[FRONT_LABELS];
+    int n_label;
+} series;
+
+static void add_point(series *s, const pal_study *study, const pal_study_point *p)
+{
+    char name[PAL_SETTING_TEXT];
+    int k = 0;
+    pal_study_method(&p->priced.setting, name);
+    while (k < s->n_method && strcmp(s->name[k], name) != 0) k++;
+    if (k == s->n_method) {
+        if (s->n_method == METHODS) return;
+        memcpy(s->name[s->n_method++], name, sizeof name);
+    }
+    s->x[k][s->n[k]] = p->priced.ms;
+    s->y[k][s->n[k]++] = 1e3 * p->priced.error_m;
+    if (!p->priced.front) return;
+    s->front_x[s->n_front] = p->priced.ms;
+    s->front_y[s->n_front++] = 1e3 * p->priced.error_m;
+    if (s->n_label == FRONT_LABELS) return;
+    knobs_of(study, p, s->knobs[s->n_label], sizeof *s->knobs);
+    s->label[s->n_label] = (pal_plot_label){p->priced.ms, 1e3 * p->priced.error_m, s->knobs[s->n_label]};
+    s->n_label++;
+}
+
+pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_note *note)
+{
+    const pal_study *study = &file->study;
+    int order[PAL_STUDY_POINTS];
+    series *s = calloc(1, sizeof *s);
+    if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    pal_study_order(study, order);
+    for (int k = 0; k < study->n_point; k++)
+        if (is_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
+    snprintf(s->title, sizeof s->title, "%s: what accuracy costs", study->name);
+    snprintf(s->live, sizeof s->live, "real time, %.3g ms", 1e3 * study->step_s);
+    snprintf(s->own, sizeof s->own, "the reference itself, %.2g mm", 1e3 * study->reference_m);
+    pal_plot plot = {.title = s->title,
+                     .x_label = "milliseconds of a step, median",
+                     .y_label = "largest error, mm",
+                     .log_x = true,
+                     .log_y = true,
+                     .wide = 980,
+                     .high = 560,
+                     .n_guide = 2,
+                     .n_label = s->n_label,
+                     .label = s->label};
+    plot.guide[0] = (pal_plot_guide){.vertical = true, .at = 1e3 * study->step_s, .text = s->live};
+    plot.guide[1] = (pal_plot_guide){.at = 1e3 * study->reference_m, .text = s->own};
+    plot.curve[plot.n_curve++] =
+        (pal_curve){.name = "the front", .n = s->n_front, .x = s->front_x, .y = s->front_y, .bare = true, .ink = true};
+    for (int k = 0; k < s->n_method; k++)
+        plot.curve[plot.n_curve++] =
+            (pal_curve){.name = s->name[k], .n = s->n[k], .x = s->x[k], .y = s->y[k], .dots = true};
+    pal_err err = pal_plot_text(&plot, svg, n_byte, note);
+    free(s);
+    return err;
+}
+
+/* ---- page ---- */
+
+static void put_text(FILE *to, const char *text)
+{
+    for (; *text; text++)
+        if (*text == '<')
+            fputs("&lt;", to);
+        else if (*text == '>')
+            fputs("&gt;", to);
+        else if (*text == '&')
+            fputs("&amp;", to);
+        else if (*text == '"')
+            fputs("&quot;", to);
+        else
+            fputc(*text, to);
+}
+
+static void put_fact(FILE *to, const char *name, const char *text)
+{
+    fprintf(to, "<dt>%s</dt><dd>", name);
+    put_text(to, text);
+    fputs("</dd>\n", to);
+}
+
+static void put_number(FILE *to, const char *form, double value)
+{
+    fputs("<td class=\"n\">", to);
+    if (isfinite(value)) fprintf(to, form, value);
+    fputs("</td>", to);
+}
+
+static void put_row(FILE *to, const pal_study *s, const pal_study_point *p)
+{
+    char text[PAL_SETTING_TEXT];
+    bool measured = is_measured(p);
+    fprintf(to, "<tr%s><td>%s</td><td>",
+            p->priced.front ? " class=\"front\""
+            : measured      ? ""
+                            : " class=\"bad\"",
+            p->priced.front ? "&#9733;" : "");
+    put_text(to, pal_setting_text(&p->priced.setting, text));
+    if (!measured) {
+        fputs("<br>", to);
+        put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
+    }
+    fputs("</td>", to);
+    put_number(to, "%.3f", p->priced.ms);
+    put_number(to, "%.3f", p->ms_p95);
+    fprintf(to, "<td>%s</td>", !measured ? "" : pal_study_is_live(s, p) ? "yes" : "no");
+    put_number(to, "%.4f", 1e3 * p->priced.error_m);
+    put_number(to, "%.4f", 1e3 * p->static_rms_m);
+    put_number(to, "%.4f", 1e3 * p->static_most_m);
+    put_number(to, "%.2f", 1e2 * p->static_rms_m / s->most_m);
+    put_number(to, "%.2f", 1e2 * p->static_most_m / s->most_m);
+    put_number(to, "%.4f", 1e3 * p->way_rms_m);
+    put_number(to, "%.4f", 1e3 * p->way_most_m);
+    fprintf(to, "<td class=\"n\">%d</td><td class=\"n\">%d</td>", p->n_node, p->n_substep);
+    put_number(to, "%.2f", p->prepare_s);
+    put_number(to, "%.3f", p->predicted_ms);
+    put_number(to, "%.4f", 1e3 * p->predicted_m);
+    fputs("</tr>\n", to);
+}
+
+static const char head[] =
+    "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
+    "body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:1180px;margin:1.5em auto;padding:0 1em}\n"
+    "h1{font-size:1.5em;margin:0 0 .5em}svg{max-width:100%;height:auto}\n"
+    "dl{display:grid;grid-template-columns:max-content 1fr;gap:.15em 1em;margin:0 0 1em}dt{color:#666}dd{margin:0}\n"
+    ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px}\n"
+    "th,td{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd;vertical-align:top}\n"
+    "th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:#fff}td{white-space:nowrap}\n"
+    "td.n{text-align:right;font-variant-numeric:tabular-nums}\n"
+    "tr.front{background:#fff6dc}tr.bad{color:#888}tr.bad td{white-space:normal}p{color:#555}\n</style>\n<title>";
+
+/* a click on a heading sorts by it, another one the other way; empty cells stay last */
+static const char sorting[] =
+    "<script>\ndocument.querySelectorAll('th').forEach((th,c)=>th.addEventListener('click',()=>{\n"
+    "const body=document.querySelector('tbody'),way=th.dataset.way==='1'?-1:1;th.dataset.way=String(way);\n"
+    "const key=r=>r.cells[c].textContent.trim();\n"
+    "const rows=[...body.rows].sort((a,b)=>{const s=key(a),t=key(b);if(!s||!t)return s?-1:t?1:0;\n"
+    "const n=Number(s)-Number(t);return way*(Number.isNaN(n)?s.localeCompare(t):n)});\n"
+    "body.append(...rows)}));\n</script>\n";
+
+static void put_page(FILE *to, const pal_study_file *file, const char *svg)
+{
+    static const char *const column[] = {
+        "",       "setting",    "ms",     "ms p95", "live",      "error mm",  "rest RMS mm", "rest mm",    "rest RMS %",
+        "rest %", "way RMS mm", "way mm", "nodes",  "sub-steps", "made in s", "foreseen ms", "foreseen mm"};
+    const pal_study *s = &file->study;
+    char text[200];
+    int order[PAL_STUDY_POINTS];
+    fputs(head, to);
+    put_text(to, s->name);
+    fputs(": what accuracy costs</title></head><body>\n<h1>", to);
+    put_text(to, s->name);
+    fputs(": what accuracy costs</h1>\n<dl>\n", to);
+    put_fact(to, "machine", s->machine);
+    put_fact(to, "reference", s->reference);
+    snprintf(text, sizeof text, "%.3g mm; the most that moves %.4g mm, the body %.4g mm across", 1e3 * s->reference_m,
+             1e3 * s->most_m, 1e3 * s->size_m);
+    put_fact(to, "its own error", text);
+    put_fact(to, "loads", file->loads);
+    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_all, file->whole ? "" : ", broken off");
+    put_fact(to, "settings", text);
+    put_fact(to, "made by", file->command);
+    fputs("</dl>\n", to);
+    fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
+    fputs("<p>&#9733; the front: nothing else is both cheaper and nearer. Live: a step takes no longer than it lasts. "
+          "Error: the largest distance from the reference, at rest or on the way.</p>\n"
+          "<div class=\"wide\"><table><thead><tr>",
+          to);
+    for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
+    fputs("</tr></thead><tbody>\n", to);
+    pal_study_order(s, order);
+    for (int k = 0; k < s->n_point; k++) put_row(to, s, &s->point[order[k]]);
+    fputs("</tbody></table></div>\n", to);
+    fputs(sorting, to);
+    fputs("</body></html>\n", to);
+}
+
+static pal_err write_page(const pal_study_file *file, const char *svg, const char *path, pal_note *note)
+{
+    char *bytes = NULL;
+    size_t n_byte = 0;
+    FILE *to = open_memstream(&bytes, &n_byte);
+    if (!to) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    put_page(to, file, svg);
+    bool whole = !ferror(to);
+    whole = fclose(to) == 0 && whole;
+    pal_err err = whole ? pal_file_write(path, bytes, n_byte, note)
+                        : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    free(bytes);
+    return err;
+}
+
+pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_note *note)
+{
+    char path[PAL_STUDY_PATH + 8], *svg = NULL;
+    size_t n_byte = 0;
+    snprintf(path, sizeof path, "%s.csv", stem);
+    PAL_TRY(pal_study_file_csv(file, path, note));
+    pal_err err = pal_study_draw(file, &svg, &n_byte, note);
+    if (err && err != PAL_ERR_REFUSED) return err;
+    snprintf(path, sizeof path, "%s.svg", stem);
+    err = svg ? pal_file_write(path, svg, n_byte, note) : PAL_ERR_OK;
+    snprintf(path, sizeof path, "%s.html", stem);
+    if (!err) err = write_page(file, svg, path, note);
+    free(svg);
+    return err;
+}
