@@ -14,6 +14,8 @@ static const pal_command_entry command[] = {
     {"solve", "solve a load case with finite elements and compare it with a reference", command_solve},
     {"calibrate", "fit springs to finite elements or measured displacements, and write a scene of them",
      command_calibrate},
+    {"study", "what accuracy costs: settings of a body with error and milliseconds, and the one to serve",
+     command_study},
     {"bench", "measure mesh preparation, springs, calibration and protocol on this machine", command_bench},
 };
 enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };

@@ -6,6 +6,7 @@
 #include "server/commands/median.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
+#include "server/commands/study_pick.h"
 #include "server/sim/effect.h"
 #include "server/sim/shell.h"
 #include "server/sim/solid.h"
@@ -70,12 +71,28 @@ static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
     cJSON_AddNumberToObject(body, "solid_bytes", (double)solid->n_byte);
 }
 
-static cJSON *as_json(const pal_scene *scene, pal_world *world, cost *c)
+/* the setting that was picked from the study, and what is to be known about that */
+static void add_setting(cJSON *o, const pal_studied *studied)
 {
+    char text[PAL_SETTING_TEXT];
+    if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
+    if (studied->picked < 0) return;
+    const pal_priced_setting *p = &studied->file->study.point[studied->picked].priced;
+    cJSON *picked = cJSON_AddObjectToObject(o, "picked");
+    cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
+    cJSON_AddStringToObject(picked, "setting", pal_setting_text(&p->setting, text));
+    cJSON_AddNumberToObject(picked, "ms", p->ms);
+    cJSON_AddNumberToObject(picked, "error_m", p->error_m);
+}
+
+static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
+{
+    const pal_scene *scene = studied->scene;
     cJSON *o = cJSON_CreateObject();
     double step_ms = pal_median(c->step_ms, c->n_step);
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddStringToObject(o, "name", scene->name);
+    add_setting(o, studied);
     cJSON_AddNumberToObject(o, "step_s", scene->step_s);
     cJSON_AddNumberToObject(o, "substeps", pal_world_substeps(world));
     cJSON_AddNumberToObject(o, "limit_s", pal_world_limit_s(world));
@@ -135,8 +152,11 @@ static void print_solid(const pal_body_def *def, const pal_body *b)
            b->surface->n_tri, 1e-6 * (double)b->solid->n_byte);
 }
 
-static void print(const pal_scene *scene, pal_world *world, cost *c)
+static void print(const pal_studied *studied, pal_world *world, cost *c)
 {
+    const pal_scene *scene = studied->scene;
+    if (studied->said[0]) printf("%s\n", studied->said);
+    if (studied->warn[0]) printf("%s\n", studied->warn);
     for (int b = 0; b < scene->n_body; b++) {
         const pal_shell *shell = pal_world_body(world, b)->shell;
         if (shell) {
@@ -181,20 +201,23 @@ int command_plan(int argc, char **argv)
     pal_world *world = NULL;
     pal_note note = {""}, why = {""};
     static cost measured;
+    pal_studied studied = {0};
     pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note);
-    if (!err && (err = pal_world_create(&loaded->scene, &why, &world)))
+    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &note);
+    if (!err && (err = pal_world_create(studied.scene, &why, &world)))
         pal_note_set(&note, err, "%s: %s", word[0], why.text);
     pal_report_progress("measure", 0, &common);
-    if (!err) err = measure(world, loaded->scene.step_s, &measured);
+    if (!err) err = measure(world, studied.scene->step_s, &measured);
     pal_report_progress(NULL, 0, &common);
     if (err)
         code = pal_report_refusal(&common, err, &note);
     else if (common.json)
-        code = pal_report_json(&common, as_json(&loaded->scene, world, &measured));
+        code = pal_report_json(&common, as_json(&studied, world, &measured));
     else
         code = 0;
-    if (!err && !common.json && !common.quiet) print(&loaded->scene, world, &measured);
+    if (!err && !common.json && !common.quiet) print(&studied, world, &measured);
     pal_world_destroy(world);
+    pal_studied_close(&studied);
     pal_scene_free(loaded);
     return code;
 }

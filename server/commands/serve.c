@@ -6,6 +6,7 @@
 #include "server/commands/commands.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
+#include "server/commands/study_pick.h"
 #include "server/mesh/mesh_file.h"
 #include "server/net/server.h"
 
@@ -38,7 +39,11 @@ typedef struct serve_run {
     pal_surface_scene surface; /* how bare surfaces are prepared */
     int n;
     pal_loaded_scene *scene[MOST_SESSIONS];
+    const char *word[MOST_SESSIONS];    /* as it was given; NULL: none                     */
+    pal_studied studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
     pal_session *session[MOST_SESSIONS];
+    const pal_priced_setting *setting[MOST_SESSIONS]; /* what the server borrows of them */
+    int n_setting[MOST_SESSIONS], setting_body[MOST_SESSIONS];
     pal_server_gate *gate;
     pal_server *server;
     lcm_child lcm[MOST_SESSIONS];
@@ -96,7 +101,7 @@ static pal_err load_input(serve_run *run, const char *path, pal_note *note)
     else
         PAL_TRY(pal_scene_procedural(&run->surface, out, &report, note));
     if (is_surface) tell_surface(run, path, &report);
-    run->n++;
+    run->word[run->n++] = path;
     return PAL_ERR_OK;
 }
 
@@ -112,12 +117,27 @@ static void make_unique(serve_run *run, int index)
         }
 }
 
+/* the settings that scenes ask for, and what their sessions may switch to */
+static pal_err open_studies(serve_run *run, pal_note *note)
+{
+    for (int i = 0; i < run->n; i++) {
+        pal_studied *s = &run->studied[i];
+        const pal_scene *scene = &run->scene[i]->scene;
+        *s = (pal_studied){.scene = scene, .picked = -1};
+        if (!run->word[i]) continue;
+        PAL_TRY(pal_studied_open(run->word[i], scene, s, note));
+        if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
+        if (s->said[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->said);
+    }
+    return PAL_ERR_OK;
+}
+
 static pal_err open_sessions(serve_run *run, pal_note *note)
 {
     char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
-        const pal_scene *scene = &run->scene[i]->scene;
+        const pal_scene *scene = run->studied[i].scene;
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
@@ -129,12 +149,20 @@ static pal_err open_sessions(serve_run *run, pal_note *note)
 static pal_err open_server(serve_run *run, pal_note *note)
 {
     char folder[PATH_MAX + 32];
+    for (int i = 0; i < run->n; i++) {
+        run->setting[i] = run->studied[i].setting;
+        run->n_setting[i] = run->studied[i].n_setting;
+        run->setting_body[i] = run->studied[i].body;
+    }
     pal_server_options options = {.listen = run->config.listen,
                                   .port = run->config.port,
                                   .allow_remote = run->config.allow_remote,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
-                                  .most_clients = run->config.most_clients};
+                                  .most_clients = run->config.most_clients,
+                                  .setting = run->setting,
+                                  .n_setting = run->n_setting,
+                                  .setting_body = run->setting_body};
     PAL_TRY(pal_server_open(&options, run->session, run->n, note, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");
@@ -318,6 +346,7 @@ static pal_err run_all(serve_run *run, pal_note *note)
 {
     sigset_t signals;
     block_signals(&signals);
+    PAL_TRY(open_studies(run, note));
     PAL_TRY(open_sessions(run, note));
     PAL_TRY(open_server(run, note));
     PAL_TRY(find_lcm(run, note));
@@ -336,6 +365,7 @@ static void close_all(serve_run *run)
     pal_server_close(run->server);
     for (int i = 0; i < run->n; i++) pal_session_close(run->session[i]);
     pal_server_gate_destroy(run->gate);
+    for (int i = 0; i < run->n; i++) pal_studied_close(&run->studied[i]);
     for (int i = 0; i < run->n; i++) pal_scene_free(run->scene[i]);
 }
 

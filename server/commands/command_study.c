@@ -1,0 +1,522 @@
+/* `palpate study`: what accuracy costs. Settings of a body are measured one after the other against a converged
+ * reference and kept after each, so that a run that ends goes on; then the cheapest within an error, or the most
+ * accurate in a time, is named and written as a scene. */
+#include "server/base/clock.h"
+#include "server/base/machine.h"
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/commands/study_input.h"
+#include "server/commands/study_page.h"
+#include "server/commands/study_pick.h"
+#include "server/mesh/mesh_file.h"
+
+#include <limits.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char about[] =
+    "Measures one body under the same loads in many settings (method, element, law, resolution, step, tolerance), "
+    "each\n"
+    "with its error against a converged reference and the milliseconds of a live step, and marks those that nothing\n"
+    "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
+    "three places; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
+    "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
+    ".svg and a page .html. Ctrl-C ends after the setting under way; the same command goes on where it was.\n"
+    "--within and --budget name a setting, and with -o write a scene of it; when the study is there already, nothing\n"
+    "is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or \"budget\": {\"step_ms\": 4} is served "
+    "and\n"
+    "planned with the setting that the study beside it gives.\n"
+    "Example: palpate study liver/scene.json --within 1mm -o liver_1mm\n"
+    "Example: palpate study deploy/problems/beam.json --case tip --out beam_study --budget 4ms -o beam_4ms\n";
+
+enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
+
+typedef struct study_run {
+    pal_flag_common common;
+    pal_study_question question;
+    pal_study_wish wish;
+    const char *methods, *folder, *scene; /* scene: -o */
+    bool again;
+    pal_study_input input;
+    char stem[PAL_STUDY_PATH], path[MOST_PATH]; /* of the study's files, study.json itself */
+    pal_study_file *file;                       /* as it is kept */
+    pal_study *before;                          /* measured before; NULL: none */
+    int n_before, n_new;
+    double first_s; /* clock when the first new setting began */
+    char doing[160];
+    pal_err kept; /* of the last writing */
+    pal_note kept_note;
+    int picked; /* -1: none was asked for */
+    char written[MOST_PATH];
+} study_run;
+
+/* ---- Ctrl-C ---- */
+
+static volatile sig_atomic_t stop_asked;
+
+static void on_stop(int number)
+{
+    (void)number;
+    stop_asked = 1;
+}
+
+/* the first is a wish, the next one ends the process */
+static void watch_stop(void)
+{
+    struct sigaction action = {.sa_handler = on_stop, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+/* ---- words ---- */
+
+/* "1mm", "4 ms": a number above 0 and its unit, in that of the table's factors. False: it is none */
+static bool read_amount(const char *text, const char *const *unit, const double *factor, double *out)
+{
+    char *end;
+    double number = strtod(text, &end);
+    if (end == text || !isfinite(number) || number <= 0) return false;
+    while (*end == ' ') end++;
+    for (int k = 0; unit[k]; k++)
+        if (!strcmp(end, unit[k])) {
+            *out = number / factor[k];
+            return *out > 0 && isfinite(*out);
+        }
+    return false;
+}
+
+/* what is wrong with the words; NULL: nothing */
+static const char *take_words(study_run *run, const char *within, const char *budget)
+{
+    static const char *const length[] = {"mm", "um", "\xc2\xb5m", "cm", "m", NULL};
+    static const double length_factor[] = {1e3, 1e6, 1e6, 1e2, 1};
+    static const char *const span[] = {"ms", "us", "\xc2\xb5s", "s", NULL};
+    static const double span_factor[] = {1, 1e3, 1e3, 1e-3};
+    static const char *const model[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
+    if (within && !read_amount(within, length, length_factor, &run->wish.within_m))
+        return "--within: is not a length above 0 with its unit, mm, um, cm or m, as 1mm";
+    if (budget && !read_amount(budget, span, span_factor, &run->wish.budget_ms))
+        return "--budget: is not a time above 0 with its unit, ms, us or s, as 4ms";
+    if (run->scene && !within && !budget) return "-o: which setting is to be written? --within or --budget says it";
+    if (run->methods && strlen(run->methods) >= sizeof run->file->methods) return "--methods: is too long";
+    for (const char *at = run->methods; at && *at;) {
+        size_t n = strcspn(at, ",");
+        int k = 0;
+        while (model[k] && (strlen(model[k]) != n || strncmp(at, model[k], n) != 0)) k++;
+        if (!model[k] || (at[n] && !at[n + 1]))
+            return "--methods: has a word that is not fem, tet_springs, adaptive_springs or subdivision_fem";
+        at += n + (at[n] == ',');
+    }
+    if (run->methods && !run->methods[0]) return "--methods: names none";
+    return NULL;
+}
+
+/* the command as it was typed, words with blanks in quotes */
+static void take_command(pal_study_file *file, int argc, char **argv)
+{
+    size_t n = (size_t)snprintf(file->command, sizeof file->command, "palpate");
+    for (int k = 0; k < argc && n < sizeof file->command; k++) {
+        bool plain = argv[k][0] && strspn(argv[k], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                                                   "_-+=.,:/@%") == strlen(argv[k]);
+        n += (size_t)snprintf(file->command + n, sizeof file->command - n, plain ? " %s" : " '%s'", argv[k]);
+    }
+    for (char *c = file->command; *c; c++)
+        if ((unsigned char)*c < 0x20 || (unsigned char)*c > 0x7e) *c = '?';
+}
+
+/* ---- what was measured before ---- */
+
+/* is it of the same body, loads and machine? */
+static pal_err check_same(const study_run *run, const pal_study_file *old, pal_note *note)
+{
+    const pal_study_file *now = run->file;
+    const char *what = NULL;
+    char detail[300] = "";
+    if (strcmp(old->shape, now->shape) != 0 || old->index != now->index)
+        what = "another body", snprintf(detail, sizeof detail, "%s of %s", old->body, old->study.name);
+    else if (strcmp(old->loads, now->loads) != 0)
+        what = "other loads", snprintf(detail, sizeof detail, "%s", old->loads);
+    else if (strcmp(old->digest, now->digest) != 0)
+        what = "other loads, samples or steps", snprintf(detail, sizeof detail, "%s", old->loads);
+    else if (strcmp(old->study.machine, now->study.machine) != 0)
+        what = "another machine", snprintf(detail, sizeof detail, "%s", old->study.machine);
+    if (!what) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
+                        run->path, what, detail);
+}
+
+/* were all methods that are asked for swept? */
+static bool covers(const pal_study_file *old, const char *methods)
+{
+    char word[PAL_NAME];
+    if (!old->whole || !old->methods[0]) return old->whole;
+    if (!methods) return false;
+    for (const char *at = methods; *at;) {
+        size_t n = strcspn(at, ",");
+        snprintf(word, sizeof word, "%.*s", (int)n, at);
+        if (!pal_study_method_in(old->methods, word)) return false;
+        at += n + (at[n] == ',');
+    }
+    return true;
+}
+
+/* when those that are asked for now are swept as well, the study has both */
+static void join_methods(pal_study_file *now, const pal_study_file *old)
+{
+    char both[2 * sizeof now->methods];
+    if (!old->whole || !now->methods[0]) return;
+    snprintf(both, sizeof both, "%s,%s", old->methods, now->methods);
+    if (strlen(both) < sizeof now->methods) memcpy(now->methods, both, strlen(both) + 1);
+}
+
+/* *whole: nothing is left to be measured */
+static pal_err look_before(study_run *run, bool *whole, pal_note *note)
+{
+    pal_study_file *old = NULL;
+    pal_note why = {""};
+    *whole = false;
+    if (run->again || access(run->path, F_OK)) return PAL_ERR_OK;
+    pal_err err = pal_study_file_read(run->path, &old, &why);
+    if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
+    err = check_same(run, old, note);
+    if (!err && covers(old, run->methods)) {
+        *whole = true;
+        run->n_before = old->study.n_point;
+        *run->file = *old;
+    } else if (!err) {
+        join_methods(run->file, old);
+        run->before = malloc(sizeof *run->before);
+        if (!run->before) err = pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+        if (!err) *run->before = old->study, run->n_before = old->study.n_point;
+    }
+    free(old);
+    return err;
+}
+
+/* ---- measuring ---- */
+
+static bool has_setting(const pal_study *study, const pal_setting *setting)
+{
+    for (int k = 0; k < study->n_point; k++)
+        if (pal_setting_same(&study->point[k].priced.setting, setting)) return true;
+    return false;
+}
+
+/* what the engine has now, and what was measured before and is not among that, as it is kept */
+static void take_study(study_run *run, const pal_study *study)
+{
+    pal_study *to = &run->file->study;
+    char name[PAL_NAME];
+    memcpy(name, to->name, sizeof name);
+    *to = *study;
+    if (!to->name[0]) memcpy(to->name, name, sizeof name);
+    pal_machine_name(to->machine);
+    for (int k = 0; run->before && k < run->before->n_point && to->n_point < PAL_STUDY_POINTS; k++)
+        if (!has_setting(study, &run->before->point[k].priced.setting))
+            to->point[to->n_point++] = run->before->point[k];
+    pal_study_front(to);
+}
+
+/* the file after every point: a kill loses the one that is under way */
+static bool keep(const pal_study *study, int n_all, void *user)
+{
+    study_run *run = user;
+    take_study(run, study);
+    bool is_new = study->n_point > 0 &&
+                  !(run->before && has_setting(run->before, &study->point[study->n_point - 1].priced.setting));
+    run->n_new += is_new;
+    run->file->n_all = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
+    run->file->whole = false;
+    run->kept = pal_study_file_write(run->file, run->path, &run->kept_note);
+    return !run->kept && !stop_asked;
+}
+
+static bool show(const char *what, double fraction, void *user)
+{
+    study_run *run = user;
+    char text[240], left[48] = "", share[24] = "";
+    double now = pal_clock_s();
+    const pal_study_file *f = run->file;
+    if (run->n_new == 0) run->first_s = now;
+    if (run->n_new > 0 && f->n_all > f->study.n_point) {
+        double rest = (now - run->first_s) / run->n_new * (f->n_all - f->study.n_point);
+        snprintf(left, sizeof left, rest < 90 ? ", about %.0f s left" : ", about %.0f min left",
+                 rest < 90 ? rest : rest / 60);
+    }
+    if (fraction > 0) snprintf(share, sizeof share, " %.0f %%", 100 * fraction);
+    if (run->n_new > 0)
+        snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_all, what, share, left);
+    else
+        snprintf(text, sizeof text, "%s%s", what, share);
+    pal_report_progress(text, 0, &run->common);
+    /* a setting under way is finished; before there is one, there is nothing to lose */
+    return !(stop_asked && run->n_new == 0);
+}
+
+static pal_err measure(study_run *run, pal_note *note)
+{
+    const char *method[PAL_STUDY_METHODS] = {NULL};
+    char words[sizeof run->file->methods] = "", *save = NULL;
+    pal_study *out = calloc(1, sizeof *out);
+    pal_study_options o = {.body = run->input.body,
+                           .seconds = run->question.seconds,
+                           .quick = run->question.quick,
+                           .samples = run->input.has_samples ? &run->input.samples : NULL,
+                           .before = run->before,
+                           .done = keep,
+                           .progress = show,
+                           .user = run};
+    if (!out) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+    snprintf(words, sizeof words, "%s", run->methods ? run->methods : "");
+    for (char *w = strtok_r(words, ",", &save); w && o.n_method < PAL_STUDY_METHODS; w = strtok_r(NULL, ",", &save))
+        method[o.n_method++] = w;
+    o.method = o.n_method ? method : NULL;
+    const pal_study_input *in = &run->input;
+    pal_note why = {""};
+    pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &why)
+                              : pal_study_scene(in->scene, &o, out, &why);
+    if (!err || out->n_point > 0) take_study(run, out);
+    if (run->kept) {
+        err = run->kept;
+        *note = run->kept_note;
+    } else if (err) {
+        pal_note_set(note, err, "%s: %s", run->question.word, why.text);
+    }
+    run->file->n_all = err ? run->file->n_all : run->file->study.n_point;
+    run->file->whole = !err;
+    free(out);
+    return err;
+}
+
+/* ---- the scene that is asked for ---- */
+
+/* is `path` the scene that was read? */
+static bool is_source(const study_run *run, const char *path)
+{
+    char own[PATH_MAX], other[PATH_MAX], source[MOST_PATH];
+    snprintf(source, sizeof source, "%s/scene.json", run->question.word);
+    const char *read = access(source, F_OK) ? run->question.word : source;
+    return realpath(path, own) && realpath(read, other) && !strcmp(own, other);
+}
+
+/* "out.json" or a folder -> the file of the scene */
+static pal_err scene_path(study_run *run, pal_note *note)
+{
+    size_t n = strlen(run->scene);
+    bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
+    int size = snprintf(run->written, sizeof run->written, json ? "%s" : "%s/scene.json", run->scene);
+    if (size < 0 || (size_t)size >= PAL_STUDY_PATH - 16)
+        return pal_note_set(note, PAL_ERR_REFUSED, "-o: %.80s...: the path is too long", run->scene);
+    if (is_source(run, run->written))
+        return pal_note_set(note, PAL_ERR_REFUSED, "-o: %.300s is the scene itself", run->written);
+    return PAL_ERR_OK;
+}
+
+/* the study goes with the scene that was made of it, so that it can be switched live */
+static pal_err copy_study(const study_run *run, const pal_scene *scene, pal_note *note)
+{
+    char stem[PAL_STUDY_PATH], path[MOST_PATH];
+    pal_study_file *copy = malloc(sizeof *copy);
+    if (!copy) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+    *copy = *run->file;
+    pal_study_shape(&scene->body[run->input.body], copy->shape);
+    pal_err err = pal_study_stem(run->written, NULL, stem, note);
+    if (!err) snprintf(path, sizeof path, "%s.json", stem);
+    if (!err) err = pal_study_file_write(copy, path, note);
+    free(copy);
+    return err;
+}
+
+static pal_err write_scene(study_run *run, pal_note *note)
+{
+    const pal_study *study = &run->file->study;
+    const pal_priced_setting *p = &study->point[run->picked].priced;
+    pal_setting setting = p->setting;
+    pal_set_scene *set = NULL;
+    pal_note why = {""};
+    if (setting.step_s == 0) setting.step_s = study->step_s;
+    pal_err err = pal_setting_make(run->input.scene, run->input.body, &setting, &why, &set);
+    if (err) return pal_note_set(note, err, "-o: %s", why.text);
+    pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
+    if (!loaded) {
+        pal_set_scene_free(set);
+        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
+    }
+    loaded->scene = set->scene;
+    loaded->scene.max_error_m = loaded->scene.budget_ms = 0;
+    snprintf(loaded->scene.accuracy, sizeof loaded->scene.accuracy,
+             "within %.3g mm, %.2g %% of the largest displacement, of %.40s", 1e3 * p->error_m,
+             1e2 * p->error_m / study->most_m, study->reference);
+    size_t n = strlen(run->scene);
+    bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
+    err = json ? pal_scene_save_file(loaded, run->scene, note) : pal_scene_save(loaded, run->scene, note);
+    if (!err) err = copy_study(run, &set->scene, note);
+    free(loaded);
+    pal_set_scene_free(set);
+    return err;
+}
+
+static pal_err answer(study_run *run, pal_note *note)
+{
+    char text[400];
+    const pal_study *study = &run->file->study;
+    const char *methods = run->methods ? run->methods : "";
+    if (!(run->wish.within_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
+    run->picked = pal_study_serving(study, methods, &run->wish);
+    if (run->picked >= 0) return run->scene ? write_scene(run, note) : PAL_ERR_OK;
+    pal_study_none(study, methods, &run->wish, text, sizeof text);
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", run->question.word, text);
+}
+
+/* ---- saying ---- */
+
+static int n_files(const study_run *run, char file[FILES][MOST_PATH])
+{
+    static const char *const ending[] = {"json", "csv", "svg", "html"};
+    int n = 0;
+    for (int k = 0; k < 4; k++) {
+        snprintf(file[n], MOST_PATH, "%.*s.%s", PAL_STUDY_PATH, run->stem, ending[k]);
+        if (!access(file[n], F_OK)) n++;
+    }
+    if (run->scene && run->picked >= 0) memcpy(file[n++], run->written, MOST_PATH);
+    return n;
+}
+
+static void print(const study_run *run)
+{
+    char text[PAL_SETTING_TEXT], asked[80], file[FILES][MOST_PATH];
+    const pal_study *study = &run->file->study;
+    if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_all);
+    pal_study_print(run->file, stdout);
+    if (run->picked >= 0) {
+        const pal_priced_setting *p = &study->point[run->picked].priced;
+        printf("%s: %s, %.3g mm off in %.3g ms\n", pal_study_wish_text(&run->wish, asked),
+               pal_setting_text(&p->setting, text), 1e3 * p->error_m, p->ms);
+    }
+    int n = n_files(run, file);
+    for (int k = 0; k < n; k++) printf("wrote %s\n", file[k]);
+    if (run->scene && run->picked >= 0) printf("palpate serve %s\n", run->scene);
+}
+
+static cJSON *as_json(const study_run *run)
+{
+    char text[PAL_SETTING_TEXT], file[FILES][MOST_PATH];
+    cJSON *o = pal_study_file_tree(run->file), *list;
+    if (!o) return NULL;
+    cJSON_AddBoolToObject(o, "ok", true);
+    cJSON_AddNumberToObject(o, "measured_before", run->n_before);
+    cJSON_AddNumberToObject(o, "measured", run->n_new);
+    if (run->picked >= 0) {
+        const pal_priced_setting *p = &run->file->study.point[run->picked].priced;
+        cJSON *picked = cJSON_AddObjectToObject(o, "picked");
+        cJSON_AddNumberToObject(picked, "point", run->picked);
+        cJSON_AddStringToObject(picked, "setting", pal_setting_text(&p->setting, text));
+        cJSON_AddNumberToObject(picked, "ms", p->ms);
+        cJSON_AddNumberToObject(picked, "error_m", p->error_m);
+    }
+    list = cJSON_AddArrayToObject(o, "files");
+    int n = n_files(run, file);
+    for (int k = 0; k < n; k++) cJSON_AddItemToArray(list, cJSON_CreateString(file[k]));
+    return o;
+}
+
+/* ---- the whole ---- */
+
+static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
+{
+    bool whole;
+    if (run->scene) PAL_TRY(scene_path(run, note));
+    if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
+    PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, note));
+    snprintf(run->path, sizeof run->path, "%s.json", run->stem);
+    PAL_TRY(pal_study_input_open(&run->question, &run->input, note));
+    pal_study_input_describe(&run->input, &run->question, run->file);
+    snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
+    pal_machine_name(run->file->study.machine);
+    run->file->study.step_s = run->input.scene->step_s;
+    take_command(run->file, argc, argv);
+    PAL_TRY(look_before(run, &whole, note));
+    if (!whole) {
+        pal_err err = measure(run, note);
+        /* also what was broken off can be looked at */
+        pal_note why = {""};
+        pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &why) : 0;
+        if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &why);
+        if (err && stop_asked)
+            return pal_note_set(note, PAL_ERR_STATE,
+                                "stopped with %d of %d settings kept in %.200s; the same command goes on",
+                                run->file->study.n_point, run->file->n_all, run->path);
+        if (err) return err;
+        if (kept) return pal_note_set(note, kept, "%s", why.text);
+    }
+    return answer(run, note);
+}
+
+static int start(study_run *run, int argc, char **argv)
+{
+    pal_note note = {""};
+    run->file = calloc(1, sizeof *run->file);
+    run->picked = -1;
+    watch_stop();
+    pal_err err = run->file ? work(run, argc, argv, &note) : PAL_ERR_MEMORY;
+    pal_report_progress(NULL, 0, &run->common);
+    int code = err                ? pal_report_refusal(&run->common, err, &note)
+               : run->common.json ? pal_report_json(&run->common, as_json(run))
+                                  : 0;
+    if (!err && !run->common.json && !run->common.quiet) print(run);
+    pal_study_input_close(&run->input);
+    free(run->file);
+    free(run->before);
+    return code;
+}
+
+int command_study(int argc, char **argv)
+{
+    static study_run run;
+    const char *within = NULL, *budget = NULL, *unit = NULL;
+    pal_surface_scene surface = {.label = -1};
+    run = (study_run){.question = {.seconds = 0.5, .options = &surface}};
+    const pal_flag flag[] = {
+        {"--within", "LENGTH", PAL_FLAG_TEXT, &within, 0, 0,
+         "names the cheapest setting whose error, with the reference's own, is no more: 1mm, 300um"},
+        {"--budget", "TIME", PAL_FLAG_TEXT, &budget, 0, 0,
+         "names the most accurate setting whose step takes no more: 4ms; with --within the cheapest that keeps both"},
+        {"-o", "SCENE", PAL_FLAG_TEXT, &run.scene, 0, 0,
+         "writes that setting as a scene for palpate serve, a folder or FILE.json, and the study beside it"},
+        {"--methods", "WORD[,WORD...]", PAL_FLAG_TEXT, &run.methods, 0, 0,
+         "fem, tet_springs, adaptive_springs, subdivision_fem (all that fit the body)"},
+        {"--case", "ID", PAL_FLAG_TEXT, &run.question.load_case, 0, 0,
+         "load case of a problem, or one of its references, whose CSV is then the truth at rest (the first load case)"},
+        {"--body", "NAME", PAL_FLAG_TEXT, &run.question.body, 0, 0, "body of a scene (the first)"},
+        {"--reference", "FILE.csv", PAL_FLAG_TEXT, &run.question.samples, 0, 0,
+         "x,y,z,ux,uy,uz of the first load at rest, in place of finite elements of our own"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &run.question.seconds, 0.01, 60,
+         "how long the first load is followed (0.5)"},
+        {"--quick", NULL, PAL_FLAG_SWITCH, &run.question.quick, 0, 0,
+         "few settings and a coarser reference, to see what comes out"},
+        {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "where the study's files go (beside the scene)"},
+        {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "starts over in place of going on with what is there"},
+        {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a bare surface: m, cm, mm, um, in (guessed)"},
+    };
+    const pal_flag_table table = {.usage = "study SCENE|PROBLEM.json [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .least_operand = 1,
+                                  .most_operand = 1};
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.question.word, &n);
+    if (code >= 0) return code;
+    const char *sentence = take_words(&run, within, budget);
+    surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
+    if (!sentence && unit && surface.unit_m == 0) sentence = "--units: is not m, cm, mm, um or in";
+    if (sentence) {
+        fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", argv[0], sentence, argv[0]);
+        return 2;
+    }
+    return start(&run, argc, argv);
+}
