@@ -6,7 +6,7 @@
 #include "server/commands/median.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
-#include "server/commands/study_pick.h"
+#include "server/commands/studied_scene.h"
 #include "server/sim/effect.h"
 #include "server/sim/shell.h"
 #include "server/sim/solid.h"

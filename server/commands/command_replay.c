@@ -3,7 +3,7 @@
 #include "server/commands/commands.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
-#include "server/commands/study_pick.h"
+#include "server/commands/studied_scene.h"
 #include "server/session/replay.h"
 
 #include <stdio.h>

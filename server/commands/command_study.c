@@ -5,9 +5,9 @@
 #include "server/base/machine.h"
 #include "server/commands/commands.h"
 #include "server/commands/report.h"
+#include "server/commands/studied_scene.h"
 #include "server/commands/study_input.h"
 #include "server/commands/study_page.h"
-#include "server/commands/study_pick.h"
 #include "server/mesh/mesh_file.h"
 
 #include <limits.h>
@@ -38,7 +38,7 @@ enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
 typedef struct study_run {
     pal_flag_common common;
     pal_study_question question;
-    pal_study_wish wish;
+    pal_setting_wish wish;
     const char *methods, *folder, *scene; /* scene: -o */
     bool again;
     pal_study_input input;
@@ -295,13 +295,25 @@ static pal_err measure(study_run *run, pal_note *note)
 
 /* ---- the scene that is asked for ---- */
 
-/* is `path` the scene that was read? */
-static bool is_source(const study_run *run, const char *path)
+/* the folder of a file, as it really is; false: it is not there yet */
+static bool real_folder(const char *path, char out[PATH_MAX])
+{
+    char folder[MOST_PATH];
+    const char *slash = strrchr(path, '/');
+    snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+    return realpath(folder, out) != NULL;
+}
+
+/* would its meshes replace those of the scene that was read? */
+static bool is_beside_source(const study_run *run, const char *path)
 {
     char own[PATH_MAX], other[PATH_MAX], source[MOST_PATH];
+    size_t n = strlen(run->question.word);
     snprintf(source, sizeof source, "%s/scene.json", run->question.word);
-    const char *read = access(source, F_OK) ? run->question.word : source;
-    return realpath(path, own) && realpath(read, other) && !strcmp(own, other);
+    bool folder = !access(source, F_OK);
+    bool json = n > 5 && !strcmp(run->question.word + n - 5, ".json");
+    if (!folder && !json) return false;
+    return real_folder(path, own) && real_folder(folder ? source : run->question.word, other) && !strcmp(own, other);
 }
 
 /* "out.json" or a folder -> the file of the scene */
@@ -312,8 +324,10 @@ static pal_err scene_path(study_run *run, pal_note *note)
     int size = snprintf(run->written, sizeof run->written, json ? "%s" : "%s/scene.json", run->scene);
     if (size < 0 || (size_t)size >= PAL_STUDY_PATH - 16)
         return pal_note_set(note, PAL_ERR_REFUSED, "-o: %.80s...: the path is too long", run->scene);
-    if (is_source(run, run->written))
-        return pal_note_set(note, PAL_ERR_REFUSED, "-o: %.300s is the scene itself", run->written);
+    if (is_beside_source(run, run->written))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "-o: %.300s lies beside what is read, whose meshes it could replace: name another folder",
+                            run->written);
     return PAL_ERR_OK;
 }
 
@@ -395,11 +409,12 @@ static void print(const study_run *run)
     pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
         const pal_priced_setting *p = &study->point[run->picked].priced;
-        printf("%s: %s, %.3g mm off in %.3g ms\n", pal_study_wish_text(&run->wish, asked),
+        printf("%s: %s, %.3g mm off in %.3g ms\n", pal_setting_wish_text(&run->wish, asked),
                pal_setting_text(&p->setting, text), 1e3 * p->error_m, p->ms);
     }
     int n = n_files(run, file);
-    for (int k = 0; k < n; k++) printf("wrote %s\n", file[k]);
+    for (int k = 0; k < n; k++)
+        printf("%s %s\n", run->n_new > 0 || !strcmp(file[k], run->written) ? "wrote" : "kept in", file[k]);
     if (run->scene && run->picked >= 0) printf("palpate serve %s\n", run->scene);
 }
 
@@ -431,10 +446,10 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
 {
     bool whole;
     if (run->scene) PAL_TRY(scene_path(run, note));
-    if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
     PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, note));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
     PAL_TRY(pal_study_input_open(&run->question, &run->input, note));
+    if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
     pal_study_input_describe(&run->input, &run->question, run->file);
     snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
     pal_machine_name(run->file->study.machine);
@@ -447,10 +462,13 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
         pal_note why = {""};
         pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &why) : 0;
         if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &why);
+        int n = run->file->study.n_point > run->n_before ? run->file->study.n_point : run->n_before;
+        if (err && stop_asked && n == 0)
+            return pal_note_set(note, PAL_ERR_STATE, "stopped before the first setting was measured");
         if (err && stop_asked)
             return pal_note_set(note, PAL_ERR_STATE,
-                                "stopped with %d of %d settings kept in %.200s; the same command goes on",
-                                run->file->study.n_point, run->file->n_all, run->path);
+                                "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
+                                run->file->n_all > n ? run->file->n_all : n, run->path);
         if (err) return err;
         if (kept) return pal_note_set(note, kept, "%s", why.text);
     }
@@ -483,15 +501,17 @@ int command_study(int argc, char **argv)
     run = (study_run){.question = {.seconds = 0.5, .options = &surface}};
     const pal_flag flag[] = {
         {"--within", "LENGTH", PAL_FLAG_TEXT, &within, 0, 0,
-         "names the cheapest setting whose error, with the reference's own, is no more: 1mm, 300um"},
+         "names the cheapest setting whose error, with the reference's own, is no more: 1mm,\n300um"},
         {"--budget", "TIME", PAL_FLAG_TEXT, &budget, 0, 0,
-         "names the most accurate setting whose step takes no more: 4ms; with --within the cheapest that keeps both"},
+         "names the most accurate setting whose step takes no more: 4ms; with --within the cheapest that\n"
+         "keeps both"},
         {"-o", "SCENE", PAL_FLAG_TEXT, &run.scene, 0, 0,
-         "writes that setting as a scene for palpate serve, a folder or FILE.json, and the study beside it"},
+         "writes that setting as a scene for palpate serve, a folder or FILE.json, and the\nstudy beside it"},
         {"--methods", "WORD[,WORD...]", PAL_FLAG_TEXT, &run.methods, 0, 0,
          "fem, tet_springs, adaptive_springs, subdivision_fem (all that fit the body)"},
         {"--case", "ID", PAL_FLAG_TEXT, &run.question.load_case, 0, 0,
-         "load case of a problem, or one of its references, whose CSV is then the truth at rest (the first load case)"},
+         "load case of a problem, or one of its references, whose CSV is then the truth at\n"
+         "rest (the first load case)"},
         {"--body", "NAME", PAL_FLAG_TEXT, &run.question.body, 0, 0, "body of a scene (the first)"},
         {"--reference", "FILE.csv", PAL_FLAG_TEXT, &run.question.samples, 0, 0,
          "x,y,z,ux,uy,uz of the first load at rest, in place of finite elements of our own"},

@@ -238,6 +238,7 @@ static const char head[] =
     ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px}\n"
     "th,td{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd;vertical-align:top}\n"
     "th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:#fff}td{white-space:nowrap}\n"
+    "th:nth-child(n+3),td:nth-child(n+3){text-align:right}\n"
     "td.n{text-align:right;font-variant-numeric:tabular-nums}\n"
     "tr.front{background:#fff6dc}tr.bad{color:#888}tr.bad td{white-space:normal}p{color:#555}\n</style>\n<title>";
 

@@ -1,20 +1,21 @@
 /* The setting that a scene asks for (accuracy.max_error_mm, budget.step_ms), picked from the study kept beside it.
  * Thread: [load]. */
-#ifndef PAL_COMMANDS_STUDY_PICK_H
-#define PAL_COMMANDS_STUDY_PICK_H
+#ifndef PAL_COMMANDS_STUDIED_SCENE_H
+#define PAL_COMMANDS_STUDIED_SCENE_H
 #include "server/commands/study_store.h"
 
 /* what is asked for; 0: not asked */
-typedef struct pal_study_wish {
+typedef struct pal_setting_wish {
     double within_m, budget_ms;
-} pal_study_wish;
+} pal_setting_wish;
 /* "within 1 mm", "in at most 4 ms", "within 1 mm in at most 4 ms"; returns out */
-const char *pal_study_wish_text(const pal_study_wish *wish, char out[80]);
+const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80]);
 /* pal_study_pick among the methods (words with commas, "": all); index of the point, -1: none serves */
-int pal_study_serving(const pal_study *study, const char *methods, const pal_study_wish *wish);
+int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish);
 /* "none of the 48 settings is within 1 mm: the nearest is fem ..., 1.3 mm in 5.2 ms"; for a study in which none serves
  */
-void pal_study_none(const pal_study *study, const char *methods, const pal_study_wish *wish, char *out, size_t n_byte);
+void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out,
+                    size_t n_byte);
 
 /* a scene as it runs */
 typedef struct pal_studied {

@@ -1,5 +1,5 @@
 /* Picking from a study that is kept beside a scene. */
-#include "server/commands/study_pick.h"
+#include "server/commands/studied_scene.h"
 
 #include "server/base/machine.h"
 
@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *pal_study_wish_text(const pal_study_wish *wish, char out[80])
+const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80])
 {
     bool within = wish->within_m > 0, budget = wish->budget_ms > 0;
     int n = within ? snprintf(out, 80, "within %g mm", 1e3 * wish->within_m) : 0;
@@ -38,7 +38,7 @@ static pal_study *only(const pal_study *study, const char *methods)
     return out;
 }
 
-int pal_study_serving(const pal_study *study, const char *methods, const pal_study_wish *wish)
+int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish)
 {
     pal_study *some = only(study, methods);
     if (!some) return -1;
@@ -50,7 +50,7 @@ int pal_study_serving(const pal_study *study, const char *methods, const pal_stu
 }
 
 /* is a nearer to the wish than b? Within the budget by error, else by time */
-static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_study_wish *wish)
+static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_setting_wish *wish)
 {
     if (wish->within_m > 0 && wish->budget_ms > 0) {
         bool a_in = a->priced.ms <= wish->budget_ms, b_in = b->priced.ms <= wish->budget_ms;
@@ -60,7 +60,7 @@ static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const 
     return wish->within_m > 0 ? a->priced.error_m < b->priced.error_m : a->priced.ms < b->priced.ms;
 }
 
-void pal_study_none(const pal_study *study, const char *methods, const pal_study_wish *wish, char *out, size_t n_byte)
+void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out, size_t n_byte)
 {
     char asked[80], text[PAL_SETTING_TEXT], own[48] = "";
     const pal_study_point *best = NULL;
@@ -71,7 +71,7 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_study
         n++;
         if (!best || is_nearer(p, best, wish)) best = p;
     }
-    pal_study_wish_text(wish, asked);
+    pal_setting_wish_text(wish, asked);
     if (wish->within_m > 0 && study->reference_m > 0)
         snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
     if (!best)
@@ -97,12 +97,12 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
     return pal_note_set(note, PAL_ERR_REFUSED, "%s: is of another body than this scene's, or of other material", path);
 }
 
-static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_study_wish *wish,
+static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_setting_wish *wish,
                     pal_studied *out, pal_note *note)
 {
     char asked[80], text[PAL_SETTING_TEXT], none[360];
     const pal_study *study = &out->file->study;
-    pal_study_wish_text(wish, asked);
+    pal_setting_wish_text(wish, asked);
     out->picked = pal_study_serving(study, "", wish);
     if (out->picked < 0) {
         pal_study_none(study, "", wish, none, sizeof none);
@@ -124,7 +124,7 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
 pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_note *note)
 {
     char stem[PAL_STUDY_PATH], path[PAL_STUDY_PATH + 8], machine[PAL_MACHINE_TEXT], asked[80];
-    const pal_study_wish wish = {scene->max_error_m, scene->budget_ms};
+    const pal_setting_wish wish = {scene->max_error_m, scene->budget_ms};
     bool wanted = wish.within_m > 0 || wish.budget_ms > 0;
     pal_note why = {""};
     *out = (pal_studied){.scene = scene, .picked = -1};
@@ -134,8 +134,8 @@ pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *
     if (!out->file && wanted)
         return pal_note_set(note, err ? err : PAL_ERR_REFUSED,
                             "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
-                            pal_study_wish_text(&wish, asked), err ? "and " : "but there is no ", err ? why.text : path,
-                            word, err ? " --again" : "");
+                            pal_setting_wish_text(&wish, asked), err ? "and " : "but there is no ",
+                            err ? why.text : path, word, err ? " --again" : "");
     if (!out->file) {
         if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", why.text);
         return PAL_ERR_OK;

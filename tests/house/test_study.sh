@@ -1,0 +1,220 @@
+#!/bin/sh
+# palpate study as a person runs it: what it says and writes, that it goes on after Ctrl-C and measures nothing twice,
+# that what it names is a scene which plan and serve take, that a scene which asks for an accuracy gets it, and that bad
+# input is refused in one line. Quick studies of a small body: figures are in tests/lab and tests/accuracy. Prints
+# "N passed, N failed"; exit 1 when a check failed.
+# usage: test_study.sh PALPATE
+set -u
+palpate=$(realpath "$1")
+problems=$(realpath "$(dirname "$0")/../../deploy/problems")
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+passed=0 failed=0 bad=0
+
+check() { # check SENTENCE CONDITION...: the condition is a command
+    what=$1
+    shift
+    if "$@"; then return 0; fi
+    echo "  $name: $what"
+    bad=1
+}
+run() { # run ARGS...: into out, err, code
+    timeout 300 "$palpate" "$@" >out 2>err </dev/null
+    code=$?
+}
+begin() { name=$1 bad=0; }
+end() {
+    if [ "$bad" -eq 0 ]; then
+        passed=$((passed + 1))
+        echo "ok   $name"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $name"
+        sed 's/^/    err: /' err
+    fi
+}
+code_is() { [ "$code" -eq "$1" ]; }
+lines_are() { [ "$(wc -l <"$1" | tr -d ' ')" -eq "$2" ]; }
+is_empty() { [ ! -s "$1" ]; }
+has() { grep -q -- "$2" "$1"; }
+number() { # number KEY FILE: the first number of that key
+    sed -n "s/.*\"$1\":[[:space:]]*\(-\{0,1\}[0-9][0-9.e+-]*\)[,}].*/\1/p" "$2" | head -n 1
+}
+count() { grep -o "$1" "$2" | wc -l | tr -d ' '; }
+at_most() { awk "BEGIN { exit !($1 <= $2) }" </dev/null; } # at_most A B: numbers
+refuse() {                                                  # refuse CODE TEXT ARGS...
+    wanted=$1 text=$2
+    shift 2
+    begin "refuses: $text"
+    run "$@"
+    check "exit code $code, wanted $wanted" code_is "$wanted"
+    check "more or less than one line on stderr" lines_are err 1
+    check "stderr does not say \"$text\"" has err "$text"
+    check "something is on stdout" is_empty out
+    end
+}
+
+beam=$problems/beam.json
+
+# ---- words ----
+refuse 2 "nothing to work on" study
+refuse 2 "within: is not a length" study "$beam" --within 1
+refuse 2 "within: is not a length" study "$beam" --within 1ms
+refuse 2 "within: is not a length" study "$beam" --within 0mm
+refuse 2 "within: is not a length" study "$beam" --within -1mm
+refuse 2 "within: is not a length" study "$beam" --within nanmm
+refuse 2 "budget: is not a time" study "$beam" --budget 4mm
+refuse 2 "budget: is not a time" study "$beam" --budget ""
+refuse 2 "which setting is to be written" study "$beam" -o x
+refuse 2 "methods: has a word that is not" study "$beam" --methods fem,femur
+refuse 2 "methods: has a word that is not" study "$beam" --methods fem,
+refuse 2 "seconds: 0 is outside" study "$beam" --seconds 0
+refuse 1 "no load case or reference \"none\"; known are tip, tip_far, hang, timoshenko" study "$beam" --case none --out o
+refuse 1 "a problem has one body" study "$beam" --body liver --out o
+refuse 1 "none.csv" study "$beam" --reference none.csv --out o
+refuse 1 "nowhere.json" study nowhere.json --out o
+begin "nothing is made for what is refused"
+check "a folder was made" [ ! -e o ]
+end
+
+# ---- a quick study, broken off and gone on with ----
+begin "Ctrl-C keeps what was measured and says how to go on"
+# in a group of its own and with the interrupt not ignored, as a terminal starts it
+setsid sh -c 'trap - INT; exec "$@"' sh "$palpate" study "$beam" --quick --out o --json >out 2>err </dev/null &
+child=$!
+for _ in $(seq 600); do
+    if [ -s o/study.json ]; then break; fi
+    sleep 0.1
+done
+kill -INT "$child"
+wait "$child"
+code=$?
+check "exit code $code" code_is 1
+check "stderr does not say that it goes on" has err "the same command goes on"
+check "stdout has not one line" lines_are out 1
+check "stdout is no refusal" has out '"code":"STATE"'
+check "it says it is whole" has o/study.json '"whole":[[:space:]]*false'
+before=$(count '"model"' o/study.json)
+check "no point was kept" [ "$before" -ge 1 ]
+cp o/study.json broken_off.json
+end
+
+begin "the same command goes on, measures nothing twice and writes all of its files"
+run study "$beam" --quick --out o --json
+check "exit code $code" code_is 0
+check "something is on stderr" is_empty err
+check "not one line" lines_are out 1
+check "$(number measured_before out) measured before, wanted $before" [ "$(number measured_before out)" = "$before" ]
+all=$(count '"model"' o/study.json)
+check "measured $(number measured out) of $all" [ "$(number measured out)" -eq "$((all - before))" ]
+check "it is not whole" has o/study.json '"whole":[[:space:]]*true'
+for file in study.json study.csv study.svg study.html; do check "no $file" [ -s o/$file ]; done
+check "the table has not a row a setting" lines_are o/study.csv "$((all + 1))"
+check "the page has not a row a setting" [ "$(count '<tr' o/study.html)" -eq "$((all + 1))" ]
+check "the page asks for other files" [ "$(grep -c -E '(src|href)=' o/study.html)" -eq 0 ]
+check "the drawing is not in the page" has o/study.html "<svg "
+check "no real time" has o/study.svg "real time"
+check "no front" has o/study.svg "the front"
+# what was measured before stands there to the bit
+first=$(number ms broken_off.json)
+check "the first milliseconds changed" has o/study.json "\"ms\":[[:space:]]*$first"
+end
+
+begin "a whole study is shown again without measuring"
+cp o/study.json whole.json
+run study "$beam" --quick --out o
+check "exit code $code" code_is 0
+check "it does not say what it had" has out "$all of $all measured before"
+check "no front" has out "^\*"
+check "the study changed" cmp -s o/study.json whole.json
+rows=$(grep -c -E '^[* ] +[0-9]' out)
+bad_rows=$(grep -c "^not measured: " out)
+check "$rows rows and $bad_rows not measured, wanted $all" [ "$((rows + bad_rows))" -eq "$all" ]
+# by ascending milliseconds
+check "not in the order of ms" sh -c "grep -E '^[* ] +[0-9]' out | cut -c 2-10 | sort -c -n"
+end
+
+refuse 1 "other loads" study "$beam" --quick --out o --seconds 0.2
+refuse 1 "other loads" study "$beam" --quick --out o --case tip_far
+refuse 1 "other loads" study "$beam" --out o
+sed 's/"machine":.*/"machine": "another one",/' whole.json >o/study.json
+refuse 1 "another machine (another one): --again starts over" study "$beam" --quick --out o
+sed 's/"shape":.*/"shape": "0000000000000000",/' whole.json >o/study.json
+refuse 1 "another body" study "$beam" --quick --out o
+head -c 1000 whole.json >o/study.json
+refuse 1 "again starts over" study "$beam" --quick --out o
+sed 's/"whole":.*/"whole": 3,/' whole.json >o/study.json
+refuse 1 "whole: is not true or false" study "$beam" --quick --out o
+cp whole.json o/study.json
+
+# ---- picking ----
+most=$(number most_m o/study.json)
+loose=$(awk "BEGIN { printf \"%.6gmm\", 1000 * $most }")
+begin "the cheapest within an error is written as a scene that plan takes"
+run study "$beam" --quick --out o --within "$loose" -o near --json
+check "exit code $code" code_is 0
+check "nothing was measured" [ "$(number measured out)" = 0 ]
+check "no setting" has out '"picked":{"point":'
+check "no scene" [ -s near/scene.json ]
+check "no study beside it" [ -s near/study.json ]
+check "does not say how far off it is" has near/scene.json '"accuracy":[[:space:]]*"within '
+run plan near --json
+check "plan: exit code $code" code_is 0
+check "plan: something is on stderr" is_empty err
+check "plan: the study is of another body" [ "$(grep -c study_warning out)" -eq 0 ]
+check "plan: picked without being asked" [ "$(grep -c '"picked"' out)" -eq 0 ]
+end
+
+begin "the most accurate in a time, and both, are named"
+run study "$beam" --quick --out o --budget 1s --json
+check "exit code $code" code_is 0
+accurate=$(sed -n 's/.*"picked":{[^}]*"error_m":\([0-9.e+-]*\).*/\1/p' out)
+run study "$beam" --quick --out o --budget 1s --within "$loose" --json
+check "exit code $code" code_is 0
+cheap=$(sed -n 's/.*"picked":{[^}]*"error_m":\([0-9.e+-]*\).*/\1/p' out)
+check "the cheapest ($cheap m) is nearer than the most accurate ($accurate m)" at_most "$accurate" "$cheap"
+end
+
+refuse 1 "is within 1e-06 mm: the nearest is" study "$beam" --quick --out o --within 1e-6mm -o far
+refuse 1 "in at most 1e-06 ms: the nearest is" study "$beam" --quick --out o --budget 1e-6ms
+check "a scene was written" [ ! -e far ]
+
+# ---- a scene that asks ----
+ask() { # ask NUMBER: the scene with max_error_mm
+    sed "s/\"accuracy\":.*/\"accuracy\": {\"max_error_mm\": $1, \"text\": \"asked\"},/" near/scene.json >near/ask.json
+    mv near/ask.json near/scene.json
+}
+ask "${loose%mm}"
+begin "a scene that asks for an accuracy is planned and served in the setting that the study gives"
+run plan near
+check "exit code $code" code_is 0
+check "plan does not say which" has out "picked of the .* settings of near/study.json (within"
+run plan near --json
+check "no setting in JSON" has out '"picked":{"body":'
+timeout 60 "$palpate" serve near --port 0 --json >out 2>err </dev/null &
+child=$!
+for _ in $(seq 300); do
+    if [ -s out ]; then break; fi
+    sleep 0.1
+done
+kill "$child"
+wait "$child"
+check "serve does not say which" has err "picked of the .* settings of near/study.json"
+check "serve did not start" has out '"ok":true'
+end
+refuse 1 "lies beside what is read" study near --quick --within 1mm -o near
+refuse 1 "lies beside what is read" study near/scene.json --quick --within 1mm -o ./near/../near/other.json
+ask 0.000001
+refuse 1 "palpate study near --again" plan near
+refuse 1 "none of the .* settings is within 1e-06 mm" serve near --port 0
+mv near/study.json elsewhere.json
+refuse 1 "but there is no near/study.json: run palpate study near" plan near
+refuse 1 "but there is no near/study.json: run palpate study near" serve near --port 0
+echo "{" >near/study.json
+refuse 1 "near/study.json: line 1" serve near --port 0
+sed 's/"shape":.*/"shape": "0000000000000000",/' elsewhere.json >near/study.json
+refuse 1 "of another body" plan near
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
