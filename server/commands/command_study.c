@@ -200,10 +200,13 @@ static pal_err look_before(study_run *run, bool *whole, pal_note *note)
 
 /* ---- measuring ---- */
 
-static bool has_setting(const pal_study *study, const pal_setting *setting)
+/* springs that could not be calibrated have the setting of those that were not to be: the error tells them apart */
+static bool has_point(const pal_study *study, const pal_study_point *point)
 {
-    for (int k = 0; k < study->n_point; k++)
-        if (pal_setting_same(&study->point[k].priced.setting, setting)) return true;
+    for (int k = 0; k < study->n_point; k++) {
+        const pal_study_point *p = &study->point[k];
+        if (p->err == point->err && pal_setting_same(&p->priced.setting, &point->priced.setting)) return true;
+    }
     return false;
 }
 
@@ -217,8 +220,7 @@ static void take_study(study_run *run, const pal_study *study)
     if (!to->name[0]) memcpy(to->name, name, sizeof name);
     pal_machine_name(to->machine);
     for (int k = 0; run->before && k < run->before->n_point && to->n_point < PAL_STUDY_POINTS; k++)
-        if (!has_setting(study, &run->before->point[k].priced.setting))
-            to->point[to->n_point++] = run->before->point[k];
+        if (!has_point(study, &run->before->point[k])) to->point[to->n_point++] = run->before->point[k];
     pal_study_front(to);
 }
 
@@ -227,8 +229,7 @@ static bool keep(const pal_study *study, int n_all, void *user)
 {
     study_run *run = user;
     take_study(run, study);
-    bool is_new = study->n_point > 0 &&
-                  !(run->before && has_setting(run->before, &study->point[study->n_point - 1].priced.setting));
+    bool is_new = study->n_point > 0 && !(run->before && has_point(run->before, &study->point[study->n_point - 1]));
     run->n_new += is_new;
     run->file->n_all = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
     run->file->whole = false;
