@@ -30,7 +30,7 @@ static double step_of(const pal_study *study, const pal_study_point *p)
 
 bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
 {
-    return is_measured(p) && 1e-3 * p->priced.ms <= step_of(study, p);
+    return is_measured(p) && 1e-3 * p->priced.ms <= study->step_s;
 }
 
 /* ---- table ---- */
@@ -72,8 +72,10 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to, " %8d %6d  %s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text));
     }
     fprintf(to,
-            "* the front: nothing else is both cheaper and nearer. Live: a step takes no longer than it lasts. Steps: "
-            "sub-steps.\n");
+            "* the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with shorter "
+            "steps so "
+            "many of them.\nLive: no more than that. Steps: sub-steps of one.\n",
+            1e3 * s->step_s);
     for (int k = 0; k < s->n_point && n_bad > 0; k++) {
         const pal_study_point *p = &s->point[k];
         if (!is_measured(p))
@@ -85,7 +87,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 /* ---- drawing ---- */
 
 /* the knobs of a point on the front, as short as its mark allows */
-static void knobs_of(const pal_study *study, const pal_study_point *p, char *out, size_t n_byte)
+static void knobs_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
     const pal_setting *s = &p->priced.setting;
     bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
@@ -97,7 +99,22 @@ static void knobs_of(const pal_study *study, const pal_study_point *p, char *out
     double step = step_of(study, p);
     if (fabs(step - study->step_s) > 1e-9 && step > 0)
         n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
-    if (s->tolerance > 0 && (size_t)n < n_byte) snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
+    if (s->tolerance > 0 && s->tolerance != usual && (size_t)n < n_byte)
+        snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
+}
+
+/* the tolerance that most settings have; 0: none has one */
+static double usual_tolerance(const pal_study *study)
+{
+    double usual = 0;
+    int most = 0;
+    for (int k = 0; k < study->n_point; k++) {
+        double t = study->point[k].priced.setting.tolerance;
+        int n = 0;
+        for (int i = 0; i < study->n_point; i++) n += study->point[i].priced.setting.tolerance == t;
+        if (t > 0 && n > most) most = n, usual = t;
+    }
+    return usual;
 }
 
 /* what a drawing of a study borrows */
@@ -106,9 +123,10 @@ typedef struct series {
     int n_method, n[METHODS], n_front;
     double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
     double front_x[PAL_STUDY_POINTS], front_y[PAL_STUDY_POINTS];
-    char knobs[FRONT_LABELS][64], title[160], live[64], own[80];
+    char knobs[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
     pal_plot_label label[FRONT_LABELS];
     int n_label;
+    double usual; /* tolerance that goes without saying */
 } series;
 
 static void add_point(series *s, const pal_study *study, const pal_study_point *p)
@@ -127,7 +145,7 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     s->front_x[s->n_front] = p->priced.ms;
     s->front_y[s->n_front++] = 1e3 * p->priced.error_m;
     if (s->n_label == FRONT_LABELS) return;
-    knobs_of(study, p, s->knobs[s->n_label], sizeof *s->knobs);
+    knobs_of(study, p, s->usual, s->knobs[s->n_label], sizeof *s->knobs);
     s->label[s->n_label] = (pal_plot_label){p->priced.ms, 1e3 * p->priced.error_m, s->knobs[s->n_label]};
     s->n_label++;
 }
@@ -139,13 +157,16 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
     series *s = calloc(1, sizeof *s);
     if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
     pal_study_order(study, order);
+    s->usual = usual_tolerance(study);
     for (int k = 0; k < study->n_point; k++)
         if (is_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
     snprintf(s->title, sizeof s->title, "%s: what accuracy costs", study->name);
     snprintf(s->live, sizeof s->live, "real time, %.3g ms", 1e3 * study->step_s);
+    snprintf(s->x_label, sizeof s->x_label, "milliseconds of computing for %.3g ms of the body's time, median",
+             1e3 * study->step_s);
     snprintf(s->own, sizeof s->own, "the reference itself, %.2g mm", 1e3 * study->reference_m);
     pal_plot plot = {.title = s->title,
-                     .x_label = "milliseconds of a step, median",
+                     .x_label = s->x_label,
                      .y_label = "largest error, mm",
                      .log_x = true,
                      .log_y = true,
@@ -275,10 +296,12 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
     fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
-    fputs("<p>&#9733; the front: nothing else is both cheaper and nearer. Live: a step takes no longer than it lasts. "
-          "Error: the largest distance from the reference, at rest or on the way.</p>\n"
-          "<div class=\"wide\"><table><thead><tr>",
-          to);
+    fprintf(to,
+            "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
+            "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
+            "at rest or on the way.</p>\n",
+            1e3 * s->step_s);
+    fputs("<div class=\"wide\"><table><thead><tr>", to);
     for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
     fputs("</tr></thead><tbody>\n", to);
     pal_study_order(s, order);

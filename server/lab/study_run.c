@@ -141,8 +141,10 @@ static void run(pal_study_job *job, pal_study_point *out)
         !ms ? PAL_ERR_MEMORY : pal_study_way(job, &out->priced.setting, job->own, ms, MOST_TIMES, &n_ms, out, &why);
     if (n_ms > 2 * WARM) {
         qsort(ms + WARM, (size_t)(n_ms - WARM), sizeof *ms, compare);
-        out->priced.ms = slope_at(ms + WARM, n_ms - WARM, 0.5);
-        out->ms_p95 = slope_at(ms + WARM, n_ms - WARM, 0.95);
+        /* shorter steps are more of them in the same time: what a step of the scene takes is what can be compared */
+        double share = job->out->step_s / out->priced.setting.step_s;
+        out->priced.ms = share * slope_at(ms + WARM, n_ms - WARM, 0.5);
+        out->ms_p95 = share * slope_at(ms + WARM, n_ms - WARM, 0.95);
     }
     free(ms);
     if (!err) compare_ways(job, out);

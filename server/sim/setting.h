@@ -28,7 +28,9 @@ typedef struct pal_setting {
 /* a setting with what it costs and how far off it is, as a study found (lab/study.h) */
 typedef struct pal_priced_setting {
     pal_setting setting;
-    double ms;      /* median of a step under load, on the machine of the study       */
+    double ms;      /* what a step of the scene as it was studied takes under load, median, on that machine; a setting
+                     * with a step of its own is priced by as many of them as go into that one: ms below the scene's
+                     * step is real time for all */
     double error_m; /* largest distance from the reference that the study saw         */
     bool front;     /* nothing else is both cheaper and nearer                         */
 } pal_priced_setting;
