@@ -1,16 +1,28 @@
-/* The parts of the error of one body. This file: its own scene and the steps ahead (time and algebraic parts). */
-#include "server/session/estimate_work.h"
+/* The parts of the error of one body: its own scene, the steps ahead (time and algebraic parts), the rests (the other
+ * parts). */
+#include "server/session/estimate_foresee.h"
+#include "server/session/estimate_rest.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/zz.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_AHEAD = 12 };
+enum { MOST_AHEAD = 12, MOST_SETTLE = 600, TIMED = 7 };
+static const double least_growth = 0.8, most_growth = 2.2;
 static const double ahead_s = 0.1, ahead_ms = 400, tight = 1e-9;
+/* springs are at rest when they move by less of the largest displacement */
+static const double still = 2e-3, most_ratio = 0.8, settle_s = 1.5;
+static const double usual_tolerance = 1e-2; /* of implicit solvers */
+/* of displacements at nodes: 1.2 to 2.1 is observed (numerics.md). Taken for anything from 1 to 2 it is off by a factor
+ * of 0.55 to 1.64; what three meshes tell was farther off, as the coarsest is four times as coarse as a live one */
+static const double order = 1.5;
+/* hexahedra with all points and tetrahedra of four nodes lock above */
+static const double locks_above = 0.47;
 
 struct pal_estimate_work {
     const _Atomic bool *stop;
@@ -18,8 +30,14 @@ struct pal_estimate_work {
     pal_estimate_state state;
     pal_world *live;        /* as it runs                                                     */
     pal_world *exact;       /* the same with a solver that leaves next to nothing; NULL: it solves nothing */
-    int order;              /* of the solver in time */
     double *first, *second; /* [n_dof][3] */
+    /* springs: voxels that finite elements may stand on; n_hex 0: those of the scene's mesh */
+    pal_prepared voxels;
+    bool springs, locks;
+    pal_rest fine, coarse, model; /* world NULL: there is none */
+    pal_foresight foresight;
+    bool priced; /* what more nodes cost has been measured, or cannot be */
+    char note[160];
 };
 
 static bool stopped(const pal_estimate_work *w)
@@ -103,7 +121,12 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
     pal_world_body(w->live, 0)->load_cap_N = INFINITY;
     const char *solver = solver_of(w->live)->effect->name;
     bool implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2"), cg = !strcmp(solver, "central_cg");
-    w->order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
+    pal_foresight *f = &w->foresight;
+    f->implicit = implicit;
+    f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
+    f->growth = f->decade = NAN;
+    f->order = order;
+    f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : usual_tolerance;
     if (!implicit && !cg) return PAL_ERR_OK;
     pal_item *item = &w->scene->body[0].solver, was = *item;
     if (!item->name[0]) pal_item_init(item, "solver", solver);
@@ -113,6 +136,74 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
     *item = was;
     if (!err) pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
     return err;
+}
+
+/* ---- bodies at rest ---- */
+
+static void say(pal_estimate_work *w, const char *text)
+{
+    size_t n = strlen(w->note);
+    snprintf(w->note + n, sizeof w->note - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+static const char *model_text(const pal_body_def *def, const char *key, const char *otherwise)
+{
+    for (int i = 0; i < def->model.n_value; i++)
+        if (!strcmp(def->model.value[i].key, key)) return def->model.value[i].text;
+    return otherwise;
+}
+
+static bool nearly_incompressible(const pal_body_def *def)
+{
+    bool found = def->material.poisson > locks_above;
+    for (int k = 0; k < def->n_region; k++) {
+        const pal_region *r = &def->region[k];
+        found = found || r->poisson > locks_above;
+        for (int i = 0; r->kind == PAL_REGION_GRID && r->grid_poisson && i < r->n[0] * r->n[1] * r->n[2]; i++)
+            found = found || r->grid_poisson[i] > locks_above;
+    }
+    return found;
+}
+
+/* the hexahedra that a body of springs does not have; nothing where it is of no voxels */
+static void find_voxels(pal_estimate_work *w)
+{
+    pal_body_def *def = &w->scene->body[0];
+    w->voxels = *def->mesh;
+    memset(&w->voxels.hexes, 0, sizeof w->voxels.hexes);
+    if (def->mesh->hexes.n_hex == 0 && !pal_hexes_find(&def->mesh->tets, &w->voxels.hexes, NULL))
+        def->mesh = &w->voxels;
+}
+
+/* a mesh or law that cannot be had leaves its part unknown */
+static pal_err make_rests(pal_estimate_work *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    pal_body_def *def = &w->scene->body[0];
+    const char *element = NULL, *law = NULL;
+    pal_note note = {""};
+    w->springs = !strcmp(def->model.name, "tet_springs");
+    if (!w->springs && strcmp(def->model.name, "fem")) {
+        say(w, "discretisation and model: not known of control cells");
+        return PAL_ERR_OK;
+    }
+    if (w->springs) find_voxels(w);
+    bool hexes = def->mesh->hexes.n_hex > 0;
+    if (w->springs) element = hexes ? "hex8_bbar" : "tet4", law = "corotational";
+    const char *is = element ? element : model_text(def, "element", hexes ? "hex8_bbar" : "tet4");
+    w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
+    pal_err err = pal_rest_make(w->scene, body, element, law, &note, &w->fine);
+    if (err) {
+        say(w, note.text);
+        return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
+    }
+    if (stopped(w)) return PAL_ERR_STATE;
+    err = pal_rest_coarser(w->scene, body, element, law, &note, &w->coarse);
+    if (err) say(w, note.text);
+    if (stopped(w)) return PAL_ERR_STATE;
+    bool neo = !strcmp(model_text(def, "law", ""), "neo_hookean");
+    if (!w->springs && !neo && pal_rest_make(w->scene, body, NULL, "neo_hookean", &note, &w->model)) say(w, note.text);
+    return PAL_ERR_OK;
 }
 
 static pal_err take_state(pal_estimate_work *w)
@@ -130,6 +221,7 @@ static pal_err take_state(pal_estimate_work *w)
 static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body, pal_note *note)
 {
     PAL_TRY(make_scene(w, scene, body, note));
+    pal_setting_of(scene, body, &w->foresight.setting);
     PAL_TRY(make_live(w, note));
     if (pal_world_body(w->live, 0)->shell)
         return pal_note_set(
@@ -138,6 +230,7 @@ static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body,
             "it against its finest level)",
             w->scene->body[0].name);
     PAL_TRY(take_state(w));
+    PAL_TRY(make_rests(w));
     return stopped(w) ? PAL_ERR_STATE : PAL_ERR_OK;
 }
 
@@ -161,6 +254,8 @@ void pal_estimate_work_close(pal_estimate_work *w)
     if (!w) return;
     pal_world_destroy(w->live);
     pal_world_destroy(w->exact);
+    pal_rest_free(&w->fine), pal_rest_free(&w->coarse), pal_rest_free(&w->model);
+    pal_hexes_free(&w->voxels.hexes);
     free(w->scene);
     free(w->state.x), free(w->state.v), free(w->state.load);
     free(w->first), free(w->second);
@@ -223,12 +318,14 @@ static pal_err set_state(pal_world *world, const pal_estimate_state *s)
     return PAL_ERR_OK;
 }
 
-/* n steps of dt_s from the state -> x; false: stopped or not possible */
-static bool go_ahead(const pal_estimate_work *w, pal_world *world, int n, double dt_s, double *x)
+/* n steps of dt_s from the state -> x, and what one took; false: stopped or not possible */
+static bool go_ahead(const pal_estimate_work *w, pal_world *world, int n, double dt_s, double *x, double *ms)
 {
     const pal_body *body = pal_world_body(world, 0);
     bool good = !set_state(world, &w->state);
+    uint64_t began = pal_clock_thread_ns();
     for (int i = 0; i < n && good; i++) good = !stopped(w) && !pal_world_step(world, dt_s);
+    *ms = 1e-6 * (double)(pal_clock_thread_ns() - began) / n;
     memcpy(x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
     return good && pal_body_finite(body);
 }
@@ -247,12 +344,138 @@ static void look_ahead(pal_estimate_work *w, pal_estimate *out)
     int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
     int n = (int)fmin(fmin(MOST_AHEAD, ceil(ahead_s / step_s)), fmax(1, ahead_ms / (4 * ms)));
     pal_world *exact = w->exact ? w->exact : w->live;
+    double live_ms = NAN, exact_ms = NAN, half_ms;
     out->algebraic_m = w->exact ? NAN : 0;
-    if (w->exact && !go_ahead(w, w->live, n, step_s, w->first)) return;
-    if (!go_ahead(w, exact, n * n_sub, step_s / n_sub, w->second)) return;
+    if (w->exact && !go_ahead(w, w->live, n, step_s, w->first, &live_ms)) return;
+    if (!go_ahead(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
     if (w->exact) out->algebraic_m = most_between(w->first, w->second, n_dof);
-    if (!go_ahead(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first)) return;
-    out->time_m = most_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->order));
+    if (!go_ahead(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
+    if (w->exact && n_sub == 1)
+        w->foresight.decade = pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->foresight.tolerance / tight));
+    out->time_m = most_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->foresight.solver_order));
+}
+
+/* a few steps of a world from rest under the loads it has; what one took, the median, ms; NaN: they went wrong */
+static double time_steps(pal_world *world, double step_s)
+{
+    pal_body *body = pal_world_body(world, 0);
+    float ms[TIMED];
+    memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_dof);
+    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    pal_world_moved(world, 0);
+    for (int k = 0; k < TIMED; k++) {
+        uint64_t began = pal_clock_thread_ns();
+        if (pal_world_step(world, step_s)) return NAN;
+        ms[k] = 1e-6f * (float)(pal_clock_thread_ns() - began);
+    }
+    qsort(ms, TIMED, sizeof *ms, rising);
+    return (double)ms[TIMED / 2];
+}
+
+/* growth: the body's own method on the coarse mesh and on this one, under the same loads, once */
+static void price_size(pal_estimate_work *w)
+{
+    pal_world *small = NULL;
+    if (w->priced || !w->coarse.known) return;
+    w->priced = true;
+    pal_scene *scene = malloc(sizeof *scene);
+    if (!scene) return;
+    *scene = *w->coarse.scene;
+    scene->body[0].model = w->scene->body[0].model;
+    scene->body[0].solver = w->scene->body[0].solver;
+    if (!pal_world_create(scene, NULL, &small)) {
+        const pal_body *loaded = pal_world_look(w->coarse.world, 0);
+        pal_body *body = pal_world_body(small, 0);
+        body->load_cap_N = INFINITY;
+        for (int i = 0; i < body->n_node && body->n_node == loaded->n_node; i++)
+            (void)pal_world_load(small, 0, i, loaded->outer + 3 * (size_t)i);
+        double coarse = time_steps(small, scene->step_s), fine = time_steps(w->live, scene->step_s);
+        double times = (double)w->state.n_node / body->n_node;
+        if (coarse > 0 && fine > 0 && times > 1)
+            w->foresight.growth = fmin(fmax(log(fine / coarse) / log(times), least_growth), most_growth);
+    }
+    pal_world_destroy(small);
+    free(scene);
+}
+
+/* ---- the rests ---- */
+
+static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
+{
+    pal_zz zz;
+    if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->zz_percent = zz.percent;
+    if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) return;
+    double most = 0;
+    for (int k = 0; k < w->coarse.n_common; k++) {
+        size_t i = 3 * (size_t)w->coarse.common[k];
+        most = fmax(most, pal_dist3(w->fine.x + i, w->coarse.x + i));
+    }
+    out->discretisation_m = most / (exp2(order) - 1);
+}
+
+/* goes on by what is left of a way whose pieces shrink by `ratio` */
+static void jump(pal_world *world, const double *from, double ratio)
+{
+    pal_body *body = pal_world_body(world, 0);
+    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += ratio / (1 - ratio) * (body->x[i] - from[i]);
+    pal_world_moved(world, 0);
+}
+
+/* where springs come to rest from the state: they are stopped whenever they begin to slow down, every other time put
+ * where the stops seem to lead, until a stop is where the last one was -> first; false: not in the time there is */
+static bool settle_springs(pal_estimate_work *w)
+{
+    pal_body *body = pal_world_body(w->live, 0);
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    double energy_J = 0, last_m = 0, began_s = 1e-9 * (double)pal_clock_thread_ns();
+    if (set_state(w->live, &w->state)) return false;
+    memset(body->v, 0, n_byte);
+    memcpy(w->first, body->x, n_byte);
+    for (int k = 0; k < MOST_SETTLE && 1e-9 * (double)pal_clock_thread_ns() - began_s < settle_s; k++) {
+        if (stopped(w) || pal_world_step(w->live, w->scene->step_s)) return false;
+        double now_J = pal_body_kinetic_J(body);
+        bool slows = now_J < energy_J;
+        energy_J = slows ? 0 : now_J;
+        if (!slows) continue;
+        double way = most_between(w->first, body->x, body->n_dof);
+        bool still_there = way <= still * most_between(body->x, body->x_rest, body->n_dof);
+        memset(body->v, 0, n_byte);
+        bool leads = !still_there && way < most_ratio * last_m;
+        if (leads) jump(w->live, w->first, way / last_m);
+        last_m = leads ? 0 : way;
+        memcpy(w->first, body->x, n_byte);
+        if (still_there) return true;
+    }
+    return false;
+}
+
+static void compare_models(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
+{
+    int n = w->state.n_node;
+    if (w->springs) {
+        if (settle_springs(w))
+            out->model_m = most_between(w->first, w->fine.x, n);
+        else
+            snprintf(out->note, sizeof out->note, "model: the springs came to no rest under these loads");
+        return;
+    }
+    if (!w->model.world)
+        out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
+    else if (pal_rest_find(&w->model, &w->state, body, w->fine.x, w->stop))
+        out->model_m = most_between(w->model.x, w->fine.x, n);
+}
+
+static void find_rests(pal_estimate_work *w, pal_estimate *out)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    if (!w->fine.world) return;
+    if (!pal_rest_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
+        snprintf(out->note, sizeof out->note, "no rest was found under these loads");
+        return;
+    }
+    out->locking = w->locks;
+    discretise(w, body, out);
+    if (!stopped(w)) compare_models(w, body, out);
 }
 
 static double largest_move(const pal_estimate_work *w)
@@ -285,8 +508,11 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
                           .model_m = NAN,
                           .zz_percent = NAN,
                           .ms = median_ms(&w->state)};
+    memcpy(out->note, w->note, sizeof out->note);
     look_ahead(w, out);
+    if (!stopped(w)) find_rests(w, out);
     sum_up(out);
-    if (isnan(out->discretisation_m)) snprintf(out->note, sizeof out->note, "discretisation and model: not known");
+    if (!stopped(w)) price_size(w);
+    pal_estimate_foresee(&w->foresight, out);
     return !stopped(w);
 }

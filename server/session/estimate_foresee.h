@@ -1,0 +1,24 @@
+/* The neighbours of a running body's setting: the next lower and higher choice on each knob, with what they are
+ * foreseen to cost and to leave. Private to estimate_*.c. Thread: any.
+ *
+ * size: half and twice; a step's time goes with n^growth, n being 8 times the nodes, the part of discretisation with
+ *   h^order. step (implicit solvers): half and twice; a step takes as long, the part of time goes with step^solver
+ *   order. tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, the time by what a
+ *   decade was measured to cost. */
+#ifndef PAL_SESSION_ESTIMATE_FORESEE_H
+#define PAL_SESSION_ESTIMATE_FORESEE_H
+#include "server/session/estimate.h"
+
+typedef struct pal_foresight {
+    pal_setting setting; /* as it is */
+    double growth;       /* of a step's time with the nodes; NaN: not known, no neighbours in size */
+    double order;        /* of the elements */
+    bool implicit;       /* the knobs step and tolerance mean something */
+    int solver_order;    /* in time */
+    double tolerance;    /* of the solver as it is */
+    double decade;       /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
+} pal_foresight;
+
+/* fills neighbour from ms and the parts that out has; those whose ms or error_m cannot be foreseen are left out */
+void pal_estimate_foresee(const pal_foresight *from, pal_estimate *out);
+#endif
