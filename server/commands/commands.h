@@ -22,6 +22,7 @@ int command_bench(int argc, char **argv);
 int command_solve(int argc, char **argv);
 int command_calibrate(int argc, char **argv);
 int command_study(int argc, char **argv);
+int command_torture(int argc, char **argv);
 
 /* the benches behind `palpate bench NAME`: print a table, or with json one object; the result is the exit code */
 int bench_mesh(const char *ply_path_or_null, bool json);

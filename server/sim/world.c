@@ -310,6 +310,9 @@ void pal_world_follow(pal_world *world, const pal_world *before, int edited, con
         bool known = b == edited || (body->n_dof == from->n_dof && !body->shell);
         if (known && to_x) memcpy(body->x, to_x, n_byte);
         if (known && to_v) memcpy(body->v, to_v, n_byte);
+        /* what is held from now on stands still */
+        for (int i = 0; i < body->n_dof; i++)
+            if (body->held[i] == 1) pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
         pal_body_place(body);
         body->frozen = from->frozen;
         memcpy(body->why, from->why, sizeof body->why);

@@ -1,0 +1,150 @@
+/* `palpate torture SCENE`: the insults of lab/torture.h on a user's own scene, what happened and whether that is within
+ * the criterion. Exit code 1 when something failed or could not be judged. */
+#include "server/commands/commands.h"
+#include "server/commands/report.h"
+#include "server/commands/scene_arg.h"
+#include "server/commands/torture_picture.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* a number that JSON has; others are left out */
+static void add_number(cJSON *o, const char *key, double value)
+{
+    if (isfinite(value)) cJSON_AddNumberToObject(o, key, value);
+}
+
+static cJSON *result_json(const pal_torture_result *r)
+{
+    static const char *const verdict[] = {"passed", "failed", "undecided", "skipped"};
+    cJSON *o = cJSON_CreateObject(), *rescue = cJSON_AddObjectToObject(o, "rescues");
+    const struct {
+        const char *key;
+        uint64_t n;
+    } count[] = {{"capped", r->rescue.n_capped},   {"clamped", r->rescue.n_clamped},
+                 {"heavy", r->rescue.n_heavy},     {"tangled", r->rescue.n_tangled},
+                 {"search", r->rescue.n_search},   {"slipped", r->rescue.n_slipped},
+                 {"stopped", r->rescue.n_stopped}, {"ns", r->rescue.ns}};
+    cJSON_AddStringToObject(o, "name", r->name);
+    cJSON_AddStringToObject(o, "what", r->what);
+    cJSON_AddStringToObject(o, "criterion", r->criterion);
+    cJSON_AddStringToObject(o, "verdict", verdict[r->verdict]);
+    cJSON_AddStringToObject(o, "happened", r->note);
+    cJSON_AddBoolToObject(o, "finite", r->finite);
+    cJSON_AddBoolToObject(o, "stopped", r->frozen);
+    add_number(o, "energy_excess", r->energy);
+    add_number(o, "energy_limit", r->limit);
+    add_number(o, "left_S", r->left_S);
+    add_number(o, "back_s", r->back_s);
+    add_number(o, "simulated_s", r->simulated_s);
+    add_number(o, "cpu_s", r->took_s);
+    for (size_t k = 0; k < sizeof count / sizeof count[0]; k++)
+        cJSON_AddNumberToObject(rescue, count[k].key, (double)count[k].n);
+    return o;
+}
+
+static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options, const pal_torture_report *report)
+{
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddBoolToObject(o, "ok", report->n_failed + report->n_undecided == 0);
+    cJSON_AddStringToObject(o, "name", scene->name);
+    cJSON_AddNumberToObject(o, "seed", (double)options->seed);
+    cJSON_AddBoolToObject(o, "rests", report->rests);
+    add_number(o, "settle_s", report->settle_s);
+    add_number(o, "cpu_s", report->took_s);
+    cJSON_AddNumberToObject(o, "passed", report->n_passed);
+    cJSON_AddNumberToObject(o, "failed", report->n_failed);
+    cJSON_AddNumberToObject(o, "undecided", report->n_undecided);
+    cJSON_AddNumberToObject(o, "skipped", report->n_skipped);
+    cJSON *list = cJSON_AddArrayToObject(o, "insults");
+    for (int k = 0; k < report->n; k++) cJSON_AddItemToArray(list, result_json(&report->result[k]));
+    return o;
+}
+
+static void print_result(const pal_torture_result *r)
+{
+    char energy[24] = "-", left[24] = "-", rescue[64] = "";
+    if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
+    if (isfinite(r->left_S)) snprintf(left, sizeof left, "%.2g", 100 * r->left_S);
+    uint64_t n = pal_rescues_sum(&r->rescue);
+    if (n > 0)
+        snprintf(rescue, sizeof rescue, " (%llu rescues, %.3g ms)", (unsigned long long)n, 1e-6 * (double)r->rescue.ns);
+    printf("%-11s %-14s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, left,
+           r->simulated_s, r->took_s, r->note, rescue);
+    if (r->verdict != PAL_VERDICT_FAILED) return;
+    printf("%26s%s\n%26sasked: %s\n", "", r->what, "", r->criterion);
+}
+
+static void print(const pal_scene *scene, const pal_torture_report *report)
+{
+    printf("%s: %s\n\n", scene->title, report->rests ? "comes to rest by itself" : "DOES NOT COME TO REST by itself");
+    printf("%-11s %-14s %9s %9s %8s %7s  %s\n", "insult", "verdict", "energy +", "% S left", "sim s", "cpu s",
+           "what happened");
+    for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
+    printf("\n%d passed, %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
+           report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
+}
+
+static bool show(const char *what, double fraction, void *user)
+{
+    pal_report_progress(what, fraction, user);
+    return true;
+}
+
+static void list_insults(char *text, size_t n_byte)
+{
+    size_t used = 0;
+    for (int k = 0; k < pal_insults() && used < n_byte; k++)
+        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", pal_insult_name(k), pal_insult_what(k));
+}
+
+int command_torture(int argc, char **argv)
+{
+    static char about[4096];
+    const char *picture = NULL, *only = NULL;
+    double seed = 1, seconds = 60;
+    const pal_flag flag[] = {
+        {"--seed", "N", PAL_FLAG_NUMBER, &seed, 0, 1e15, "of what is drawn at random (1)"},
+        {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "one insult alone"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6, "processor time that all of them may take (60)"},
+        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "energy over time, a plot for each"}};
+    int head = snprintf(about, sizeof about,
+                        "Does to a scene what is known to break simulations, one after another, "
+                        "and says what happened.\nExit code 1 when something fails its criterion "
+                        "or cannot be judged in the time.\n\n");
+    list_insults(about + head, sizeof about - (size_t)head);
+    const pal_flag_table table = {.usage = "torture SCENE [flags]",
+                                  .about = about,
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  .least_operand = 1,
+                                  .most_operand = 1};
+    pal_flag_common common;
+    const char *word[1];
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    if (code >= 0) return code;
+    pal_torture_options options;
+    pal_torture_default(&options);
+    options.seed = (uint64_t)seed, options.most_s = seconds, options.only = only;
+    options.progress = show, options.user = &common;
+    pal_loaded_scene *loaded = NULL;
+    pal_note note = {""}, why = {""};
+    pal_torture_report *report = calloc(1, sizeof *report);
+    pal_err err = report ? pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note) : PAL_ERR_MEMORY;
+    if (!err && (err = pal_torture(&loaded->scene, &options, report, &why)))
+        pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    pal_report_progress(NULL, 0, &common);
+    if (!err && picture) err = pal_torture_picture(report, loaded->scene.title, picture, &note);
+    if (err) {
+        code = pal_report_refusal(&common, err, &note);
+    } else {
+        code = common.json ? pal_report_json(&common, as_json(&loaded->scene, &options, report)) : 0;
+        if (!common.json && !common.quiet) print(&loaded->scene, report);
+        if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
+    }
+    pal_scene_free(loaded);
+    free(report);
+    return code;
+}

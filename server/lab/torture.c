@@ -1,0 +1,597 @@
+/* The rig that insults run on: rest, watched steps, coming back, verdicts. */
+#include "server/lab/torture.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/lab/torture_parts.h"
+#include "server/num/polar.h"
+#include "server/num/random.h"
+#include "server/sim/elastic_hex.h"
+#include "server/sim/shell.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
+static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double settle_most_s = 30;
+
+static const char rule_back[] = "finite, not stopped, energy no more than put in + 1 %, rest within 0.1 % S";
+static const char rule_shape[] = "finite, energy never above the insult's + 1 %, rest within 0.1 % S in 10 s; "
+                                 "springs: bounded, back after a reset";
+static const char rule_blown[] = "the same in 25 s, or stopped by finite_guard beyond its reach and back after a reset";
+static const char rule_refused[] = "refused, not a bit of the state changed";
+
+static const pal_insult insults[] = {
+    {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_insult_teleport},
+    {"inside", "a tool appears in the middle of the body", rule_back, pal_insult_inside},
+    {"pressed", "two tools press the body against each other", rule_back, pal_insult_pressed},
+    {"meganewton", "1e6 N on one vertex for 1 s, then gone", rule_back, pal_insult_meganewton},
+    {"flat", "all free nodes in one plane", rule_shape, pal_insult_flat},
+    {"point", "all free nodes on one point", rule_shape, pal_insult_point},
+    {"mirrored", "all free nodes mirrored", rule_shape, pal_insult_mirrored},
+    {"shuffled", "all free nodes anywhere in the box", rule_shape, pal_insult_shuffled},
+    {"blown_up", "all free nodes a hundred times as far apart", rule_blown, pal_insult_blown_up},
+    {"stretched", "all free nodes eight times as far apart", rule_shape, pal_insult_stretched},
+    {"dt_x10", "steps ten times as long after a blow", "as at rest; explicit: or refused beyond the budget",
+     pal_insult_long_step},
+    {"dt_x100", "steps a hundred times as long after a blow", "as at rest; explicit: or refused beyond the budget",
+     pal_insult_longer_step},
+    {"numbers", "poses, loads, materials and steps of NaN, Inf and 1e300", rule_refused, pal_insult_numbers},
+    {"poisoned", "a NaN in the state of one body", "that body alone stops, says which node, and is reset alone",
+     pal_insult_poisoned},
+    {"supports", "what is held is let go and held elsewhere while deformed, then back",
+     "energy rises by at most 1 % at a switch, comes to rest", pal_insult_supports},
+    {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
+     pal_insult_stiffer},
+    {"random", "300 steps of random poses, grabs, loads, materials and brushes, good and bad",
+     "finite, not stopped, rest within 0.1 % S", pal_insult_random},
+    {"hour", "an hour at rest under load", "drift below 1e-6 S, kinetic energy below 1e-9 of what is stored",
+     pal_insult_hour},
+};
+enum { N_INSULT = sizeof insults / sizeof insults[0] };
+
+int pal_insults(void)
+{
+    return N_INSULT;
+}
+
+const char *pal_insult_name(int insult)
+{
+    return insults[insult].name;
+}
+
+const char *pal_insult_what(int insult)
+{
+    return insults[insult].what;
+}
+
+const char *pal_verdict_name(pal_verdict verdict)
+{
+    static const char *const name[] = {"passed", "FAILED", "undecided", "does not apply"};
+    return name[verdict];
+}
+
+void pal_torture_default(pal_torture_options *options)
+{
+    *options = (pal_torture_options){.seed = 1, .most_s = 60};
+}
+
+/* ---- what insults say ---- */
+
+void pal_rig_say(pal_rig *rig, const char *format, ...)
+{
+    char *text = rig->out->note;
+    size_t used = strlen(text), room = sizeof rig->out->note;
+    va_list list;
+    va_start(list, format);
+    if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
+    if (used < room) vsnprintf(text + used, room - used, format, list);
+    va_end(list);
+}
+
+void pal_rig_skip(pal_rig *rig, const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    vsnprintf(rig->out->note, sizeof rig->out->note, format, list);
+    va_end(list);
+    rig->out->verdict = PAL_VERDICT_SKIPPED;
+}
+
+void pal_rig_fail(pal_rig *rig, const char *format, ...)
+{
+    char text[200];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    pal_rig_say(rig, "%s", text);
+    rig->out->verdict = PAL_VERDICT_FAILED;
+}
+
+double pal_rig_random(pal_rig *rig)
+{
+    return pal_random_unit(rig->options->seed, rig->count++);
+}
+
+/* ---- measures ---- */
+
+/* points that are there in every state of a body: of one that adapts those of its coarsest level */
+static int common_points(const pal_body *body)
+{
+    return body->shell ? body->shell->levels.n_vertex[0] : body->n_dof;
+}
+
+static bool is_free(const pal_body *body)
+{
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->held[i]) return false;
+    return true;
+}
+
+static double held_rms(const pal_body *body, const double *rest)
+{
+    int n = common_points(body);
+    double sum = 0;
+    for (int i = 0; i < 3 * n; i++) sum += (body->x[i] - rest[i]) * (body->x[i] - rest[i]);
+    return sqrt(sum / n);
+}
+
+/* after the best rigid motion */
+static double free_rms(const pal_body *body, const double *rest)
+{
+    int n = common_points(body);
+    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9], sum = 0;
+    for (int i = 0; i < n; i++) {
+        pal_axpy3(c, 1.0 / n, body->x + 3 * (size_t)i);
+        pal_axpy3(o, 1.0 / n, rest + 3 * (size_t)i);
+    }
+    for (int i = 0; i < n; i++)
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                f[3 * a + b] += (body->x[3 * (size_t)i + (size_t)a] - c[a]) * (rest[3 * (size_t)i + (size_t)b] - o[b]);
+    pal_polar_turn(f, q, 100);
+    pal_quat_matrix(q, r);
+    for (int i = 0; i < n; i++) {
+        double from[3], to[3];
+        pal_sub3(from, rest + 3 * (size_t)i, o);
+        pal_mul33(to, r, from);
+        pal_add3(to, to, c);
+        sum += pow(pal_dist3(to, body->x + 3 * (size_t)i), 2);
+    }
+    return sqrt(sum / n);
+}
+
+double pal_rig_left(const pal_rig *rig)
+{
+    double most = 0;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        double rms = is_free(body) ? free_rms(body, rig->rest[b]) : held_rms(body, rig->rest[b]);
+        if (!(rms / body->size_m <= most)) most = rms / body->size_m;
+    }
+    return most;
+}
+
+/* of lasting loads since rest, as they act: shortened to the cap */
+static double work_J(const pal_body *body)
+{
+    double sum = 0;
+    for (int k = 0; k < pal_body_nodes(body) && body->outer; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        double size = pal_norm3(body->outer + i), way[3];
+        if (!(size > 0)) continue;
+        pal_sub3(way, body->d + i, body->node_rest + i);
+        sum += fmin(1, body->load_cap_N / size) * pal_dot3(body->outer + i, way);
+    }
+    return sum;
+}
+
+double pal_rig_energy(const pal_rig *rig)
+{
+    double sum = pal_world_energy_J(rig->world);
+    for (int b = 0; b < rig->scene->n_body; b++) sum -= work_J(pal_world_body(rig->world, b));
+    return sum;
+}
+
+/* cubes and their split store other energies in the same shape: the larger one */
+static double shape_energy(const pal_rig *rig)
+{
+    double now = pal_rig_energy(rig);
+    for (int i = 0; i < pal_world_rows(rig->world); i++) {
+        const pal_row *row = pal_world_effect(rig->world, i);
+        pal_hex_row *hex = strcmp(row->effect->name, "hex_elastic") ? NULL : row->self;
+        if (!hex || !hex->split) continue;
+        hex->tangled = !hex->tangled;
+        now = fmax(now, pal_rig_energy(rig));
+        hex->tangled = !hex->tangled;
+    }
+    return now;
+}
+
+void pal_rig_rebase(pal_rig *rig)
+{
+    rig->base_J = shape_energy(rig);
+    rig->allowed_J = 0;
+    rig->scale_J = fmax(rig->scale_J, fabs(pal_world_energy_J(rig->world) - rig->rest_J));
+}
+
+void pal_rig_moved(pal_rig *rig)
+{
+    for (int b = 0; b < rig->scene->n_body; b++) pal_world_moved(rig->world, b);
+    pal_rig_rebase(rig);
+}
+
+bool pal_rig_springs(const pal_rig *rig)
+{
+    for (int b = 0; b < rig->scene->n_body; b++)
+        if (!strcmp(rig->scene->body[b].model.name, "tet_springs")) return true;
+    return false;
+}
+
+double pal_rig_cap_N(const pal_rig *rig, int b)
+{
+    const pal_body *body = pal_world_body(rig->world, b);
+    double mass = 0;
+    for (int i = 0; i < body->n_node; i++) mass += body->node_mass_kg[i];
+    return fmin(body->load_cap_N, 9.81 * mass);
+}
+
+int pal_rig_far_node(const pal_rig *rig, int b)
+{
+    const pal_body *body = pal_world_body(rig->world, b);
+    double from[3] = {0, 0, 0}, most = -1;
+    int n = 0, far = pal_body_point(body, 0);
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->held[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
+    for (int k = 0; k < pal_body_nodes(body) && n == 0; k++)
+        pal_axpy3(from, 1.0 / pal_body_nodes(body), body->node_rest + 3 * (size_t)pal_body_point(body, k));
+    if (n > 0) pal_scale3(from, 1.0 / n, from);
+    for (int k = 0; k < pal_body_nodes(body); k++) {
+        int i = pal_body_point(body, k);
+        double way = pal_dist3(body->node_rest + 3 * (size_t)i, from);
+        if (way > most) most = way, far = i;
+    }
+    return far;
+}
+
+void pal_rig_box(const pal_rig *rig, int b, double low_m[3], double high_m[3])
+{
+    const pal_body *body = pal_world_body(rig->world, b);
+    for (int c = 0; c < 3; c++) low_m[c] = INFINITY, high_m[c] = -INFINITY;
+    for (int k = 0; k < pal_body_nodes(body); k++)
+        for (int c = 0; c < 3; c++) {
+            double at = body->d[3 * (size_t)pal_body_point(body, k) + (size_t)c] + body->offset_m[c];
+            low_m[c] = fmin(low_m[c], at), high_m[c] = fmax(high_m[c], at);
+        }
+}
+
+/* RMS speed of the fastest body over its S, 1/s */
+static double speed_S_s(const pal_rig *rig)
+{
+    double most = 0;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        double sum = 0;
+        for (int k = 0; k < body->n_active; k++) {
+            const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
+            sum += pal_dot3(v, v);
+        }
+        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->size_m;
+        if (!(speed <= most)) most = speed;
+    }
+    return most;
+}
+
+/* ---- watched steps ---- */
+
+/* every n-th step; when the room is full every second sample goes */
+static void sample(pal_rig *rig)
+{
+    pal_torture_result *out = rig->out;
+    if (++rig->since < rig->n_skip) return;
+    rig->since = 0;
+    if (out->n_sample == PAL_TORTURE_SAMPLES) {
+        for (int i = 0; i < PAL_TORTURE_SAMPLES / 2; i++)
+            out->time_s[i] = out->time_s[2 * i], out->energy_J[i] = out->energy_J[2 * i];
+        out->n_sample /= 2;
+        rig->n_skip *= 2;
+    }
+    out->time_s[out->n_sample] = out->simulated_s;
+    out->energy_J[out->n_sample++] = pal_world_energy_J(rig->world) - rig->rest_J;
+}
+
+static uint64_t count_splits(const pal_rig *rig)
+{
+    uint64_t n = 0;
+    for (int b = 0; b < rig->scene->n_body; b++) n += pal_world_body(rig->world, b)->rescue.n_split;
+    return n;
+}
+
+static void look(pal_rig *rig)
+{
+    pal_torture_result *out = rig->out;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        out->finite &= pal_body_finite(body);
+        if (body->frozen && !out->frozen) pal_rig_say(rig, "%s stopped: %s", body->name, body->why);
+        out->frozen |= body->frozen;
+    }
+    double energy = pal_world_energy_J(rig->world);
+    rig->scale_J = fmax(rig->scale_J, fabs(energy - rig->rest_J));
+    /* cubes and their split store other energies in one shape */
+    uint64_t n_split = count_splits(rig);
+    if (n_split != rig->n_split) rig->base_J = fmax(rig->base_J, pal_rig_energy(rig));
+    rig->n_split = n_split;
+    rig->excess_J = fmax(rig->excess_J, pal_rig_energy(rig) - rig->base_J - rig->allowed_J);
+    sample(rig);
+}
+
+bool pal_rig_step(pal_rig *rig, double dt_s)
+{
+    pal_err err = pal_world_step(rig->world, dt_s);
+    pal_world_tidy(rig->world);
+    rig->err = err;
+    if (err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED) return false;
+    rig->out->simulated_s += dt_s;
+    look(rig);
+    rig->late = 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s;
+    return rig->out->finite && !rig->out->frozen && !rig->late;
+}
+
+bool pal_rig_run(pal_rig *rig, double seconds)
+{
+    int n = (int)ceil(seconds / rig->scene->step_s);
+    for (int i = 0; i < n; i++)
+        if (!pal_rig_step(rig, rig->scene->step_s)) return false;
+    return true;
+}
+
+void pal_rig_relax(pal_rig *rig, double seconds)
+{
+    pal_torture_result *out = rig->out;
+    double begin = out->simulated_s, hold_s = 0.25, still_s = 0;
+    int n = (int)ceil(seconds / rig->scene->step_s);
+    out->back_s = INFINITY;
+    rig->needs_rest = true;
+    for (int i = 0; i < n && out->finite && !out->frozen && !rig->late; i++) {
+        if (!pal_rig_step(rig, rig->scene->step_s)) break;
+        double left = pal_rig_left(rig), now = out->simulated_s - begin;
+        if (!(left <= back_S))
+            out->back_s = INFINITY;
+        else if (isinf(out->back_s))
+            out->back_s = now;
+        if (now - out->back_s >= hold_s) break;
+        /* what does not move any more will not come back either */
+        still_s = speed_S_s(rig) <= still_S_s ? still_s + rig->scene->step_s : 0;
+        if (still_s > 2 * hold_s) break;
+    }
+    out->left_S = pal_rig_left(rig);
+}
+
+/* ---- rest ---- */
+
+/* runs until nothing moves; false: it still does */
+static bool settle(pal_rig *rig, double *took_s)
+{
+    const double step = rig->scene->step_s;
+    double still_s = 0, t = 0;
+    for (; t < settle_most_s && still_s < 0.25; t += step) {
+        if (pal_world_step(rig->world, step) || 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s) return false;
+        still_s = speed_S_s(rig) <= still_S_s ? still_s + step : 0;
+    }
+    *took_s = t;
+    return still_s >= 0.25;
+}
+
+static void keep(pal_rig *rig, double **to)
+{
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        memcpy(to[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    rig->rest_J = pal_world_energy_J(rig->world);
+}
+
+/* the scene at rest, as if nothing had been: a new world, as solvers keep factors of what they have seen */
+static bool back_to_rest(pal_rig *rig)
+{
+    double took_s;
+    pal_world *fresh = NULL;
+    if (pal_world_create(rig->scene, NULL, &fresh)) return false;
+    pal_world_destroy(rig->world);
+    rig->world = fresh;
+    if (rig->anew) {
+        bool still = settle(rig, &took_s);
+        if (still) keep(rig, rig->rest);
+        return still;
+    }
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        pal_body *body = pal_world_body(rig->world, b);
+        memcpy(body->x, rig->rest[b], 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_world_moved(rig->world, b);
+    }
+    return true;
+}
+
+/* ---- verdicts ---- */
+
+static void sum_rescues(pal_rig *rig)
+{
+    pal_rescues *to = &rig->out->rescue;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_rescues *from = &pal_world_body(rig->world, b)->rescue;
+        to->n_capped += from->n_capped, to->n_clamped += from->n_clamped, to->n_heavy += from->n_heavy;
+        to->n_tangled += from->n_tangled, to->n_split += from->n_split, to->n_search += from->n_search;
+        to->n_slipped += from->n_slipped, to->n_stopped += from->n_stopped, to->ns += from->ns;
+    }
+}
+
+static double energy_limit(const pal_rig *rig)
+{
+    double limit = slack;
+    for (int i = 0; i < pal_world_rows(rig->world); i++) {
+        const char *name = pal_world_effect(rig->world, i)->effect->name;
+        if (!strcmp(name, "verlet")) limit = fmax(limit, verlet_slack);
+        if (!strcmp(name, "central_cg")) limit = central_slack;
+    }
+    return limit;
+}
+
+static void judge(pal_rig *rig)
+{
+    pal_torture_result *out = rig->out;
+    bool judged = !isnan(out->energy) && rig->scale_J > 0;
+    out->limit = energy_limit(rig);
+    out->energy = judged ? rig->excess_J / rig->scale_J : (double)NAN;
+    if (out->verdict == PAL_VERDICT_SKIPPED) return;
+    if (!out->finite) pal_rig_fail(rig, "a number was none");
+    if (out->frozen && !rig->may_freeze) pal_rig_fail(rig, "a body was stopped");
+    if (out->finite && !out->frozen && judged && !(out->energy <= out->limit))
+        pal_rig_fail(rig, "energy rose by %.2g of what was put in", out->energy);
+    if (out->verdict == PAL_VERDICT_FAILED) return;
+    bool excused = rig->may_freeze && (out->frozen || pal_rig_springs(rig));
+    if (rig->late && !excused && (!rig->needs_rest || !(out->back_s < INFINITY))) {
+        pal_rig_say(rig, "not judged, the time was over after %.1f simulated s: give more --seconds", out->simulated_s);
+        out->verdict = PAL_VERDICT_UNDECIDED;
+        return;
+    }
+    if (rig->needs_rest && !excused && !(out->back_s < INFINITY))
+        pal_rig_fail(rig, "%.2g %% S from rest at the end", 100 * out->left_S);
+}
+
+/* a body that was stopped has to come back with a reset */
+static void check_reset(pal_rig *rig)
+{
+    pal_world_reset(rig->world);
+    for (int i = 0; i < 10; i++) (void)pal_world_step(rig->world, rig->scene->step_s);
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        if (body->frozen || !pal_body_finite(body)) pal_rig_fail(rig, "a reset did not bring %s back", body->name);
+    }
+}
+
+static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
+{
+    pal_torture_result *out = rig->out;
+    double begin = 1e-9 * (double)pal_clock_thread_ns();
+    *out = (pal_torture_result){.name = insult->name,
+                                .what = insult->what,
+                                .criterion = insult->criterion,
+                                .finite = true,
+                                .left_S = NAN,
+                                .back_s = NAN};
+    rig->deadline_s = begin + seconds;
+    rig->base_J = rig->scale_J = rig->excess_J = rig->allowed_J = 0;
+    rig->n_skip = 1, rig->since = 0, rig->count = 0;
+    rig->late = rig->may_freeze = rig->needs_rest = false;
+    if (!back_to_rest(rig)) {
+        pal_rig_say(rig, "not judged, the scene did not come to rest before it");
+        out->verdict = PAL_VERDICT_UNDECIDED;
+        return;
+    }
+    pal_rig_rebase(rig);
+    sample(rig);
+    insult->run(rig);
+    sum_rescues(rig);
+    judge(rig);
+    if (out->verdict != PAL_VERDICT_SKIPPED && out->frozen) check_reset(rig);
+    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+}
+
+/* ---- all of them ---- */
+
+static void look_at_rows(pal_rig *rig)
+{
+    bool first = true;
+    for (int i = 0; i < pal_world_rows(rig->world); i++) {
+        const char *name = pal_world_effect(rig->world, i)->effect->name;
+        rig->anew |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
+        if (strcmp(name, "tool_push")) continue;
+        pal_row_info info;
+        pal_world_row(rig->world, i, &info);
+        for (int b = 0; b < rig->scene->n_body && first; b++)
+            if (info.body == pal_world_body(rig->world, b)->name) rig->body = b, first = false;
+        rig->touches = true;
+    }
+    for (int b = 0; b < rig->scene->n_body; b++) rig->anew |= pal_world_body(rig->world, b)->shell != NULL;
+}
+
+static pal_err open_rig(pal_rig *rig, const pal_scene *scene)
+{
+    rig->scene = malloc(sizeof *rig->scene);
+    if (!rig->scene) return PAL_ERR_MEMORY;
+    *rig->scene = *scene;
+    if (scene->n_tool < 2) {
+        pal_tool_def own = scene->tool[0];
+        pal_tools_default(rig->scene, 2);
+        if (scene->n_tool == 1) rig->scene->tool[0] = own;
+    }
+    PAL_TRY(pal_world_create(rig->scene, rig->note, &rig->world));
+    for (int b = 0; b < scene->n_body; b++) {
+        size_t n3 = 3 * (size_t)pal_world_body(rig->world, b)->n_dof;
+        rig->rest[b] = calloc(n3 + 1, sizeof(double));
+        rig->start[b] = calloc(n3 + 1, sizeof(double));
+        if (!rig->rest[b] || !rig->start[b]) return PAL_ERR_MEMORY;
+    }
+    look_at_rows(rig);
+    return PAL_ERR_OK;
+}
+
+static void close_rig(pal_rig *rig)
+{
+    pal_world_destroy(rig->world);
+    for (int b = 0; b < PAL_BODY_MAX; b++) free(rig->rest[b]), free(rig->start[b]);
+    free(rig->scene);
+}
+
+static void count(pal_torture_report *out)
+{
+    for (int i = 0; i < out->n; i++) {
+        pal_verdict verdict = out->result[i].verdict;
+        out->n_passed += verdict == PAL_VERDICT_PASSED, out->n_failed += verdict == PAL_VERDICT_FAILED;
+        out->n_undecided += verdict == PAL_VERDICT_UNDECIDED, out->n_skipped += verdict == PAL_VERDICT_SKIPPED;
+    }
+}
+
+static pal_err run_all(pal_rig *rig, pal_torture_report *out)
+{
+    const pal_torture_options *o = rig->options;
+    double begin = 1e-9 * (double)pal_clock_thread_ns();
+    rig->deadline_s = begin + 0.5 * o->most_s;
+    if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
+    out->rests = settle(rig, &out->settle_s);
+    keep(rig, rig->rest);
+    for (int k = 0; k < N_INSULT; k++) {
+        if (o->only && strcmp(o->only, insults[k].name)) continue;
+        if (o->progress && !o->progress(insults[k].name, (double)k / N_INSULT, o->user))
+            return pal_note_set(rig->note, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
+        double left = begin + o->most_s - 1e-9 * (double)pal_clock_thread_ns();
+        /* what is short leaves its time to the others; none takes more than a third of what is left */
+        int n_left = o->only ? 1 : N_INSULT - k;
+        rig->out = &out->result[out->n++];
+        run_one(rig, &insults[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
+    }
+    count(out);
+    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_torture(const pal_scene *scene, const pal_torture_options *options, pal_torture_report *out, pal_note *note)
+{
+    bool known = !options->only;
+    for (int k = 0; k < N_INSULT && !known; k++) known = !strcmp(options->only, insults[k].name);
+    if (!known) return pal_note_set(note, PAL_ERR_REFUSED, "there is no insult \"%.60s\"", options->only);
+    pal_rig rig = {.options = options, .note = note};
+    pal_torture_report *report = calloc(1, sizeof *report);
+    pal_err err = report ? open_rig(&rig, scene) : PAL_ERR_MEMORY;
+    if (!err) err = run_all(&rig, report);
+    if (!err) *out = *report;
+    close_rig(&rig);
+    free(report);
+    return err;
+}

@@ -1,0 +1,104 @@
+#!/bin/sh
+# `palpate torture` as a person runs it: small scenes that pass, scenes that were made to fail and do, and refusals.
+# Prints "N passed, N failed"; exit 1 when a check failed.
+# usage: test_torture.sh PALPATE FOLDER_OF_PROBLEMS
+set -u
+palpate=$(realpath "$1")
+problems=$(realpath "$2")
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+passed=0 failed=0 bad=0
+
+begin() { name=$1 bad=0; }
+check() { # check SENTENCE CONDITION...
+    what=$1
+    shift
+    if "$@"; then return 0; fi
+    echo "  $name: $what"
+    bad=1
+}
+end() {
+    if [ "$bad" -eq 0 ]; then
+        passed=$((passed + 1))
+        echo "ok   $name"
+    else
+        failed=$((failed + 1))
+        echo "FAIL $name"
+        tail -n 30 out err | sed 's/^/    /'
+    fi
+}
+run() {
+    timeout 120 "$palpate" torture "$@" >out 2>err </dev/null
+    code=$?
+}
+has() { grep -q -- "$1" "$2"; }
+code_is() { [ "$code" -eq "$1" ]; }
+
+"$palpate" prepare "$problems/beam.obj" --hold 12 --resolution 8 --model fem -o fem --quiet || exit 2
+"$palpate" prepare "$problems/beam.obj" --hold 12 --resolution 8 -o springs --quiet || exit 2
+
+for scene in fem springs; do
+    begin "a beam of $scene passes every insult"
+    run $scene --seconds 8 --picture picture.svg
+    check "exit code 0, not $code" code_is 0
+    check "counts" has "^18 passed, 0 failed, 0 undecided, 0 do not apply" out
+    check "it says that the scene rests" has "comes to rest by itself" out
+    check "the poisoned body names its node" has "poisoned .*beam stopped: node [0-9]* of .* at (.*) mm: its position" out
+    check "a picture" has "</svg>" picture.svg
+    check "of well-formed text" has "start\" font-size=" picture.svg
+    end
+done
+
+begin "one insult alone is what it is among all, and JSON says so"
+run fem --json --only shuffled --seconds 8
+check "exit code 0" code_is 0
+check "its verdict" has '"name":"shuffled",.*"verdict":"passed"' out
+grep -o "\"left_S\":[^,]*" out | cut -c1-16 >alone
+run fem --json --seconds 8
+grep -o '"name":"shuffled".*' out | grep -o '"left_S":[^,]*' | head -n 1 | cut -c1-16 >among
+check "the same figure" cmp -s alone among
+run fem --json --only shuffled --seconds 8 --seed 2
+grep -o '"left_S":[^,]*' out | cut -c1-16 >other
+check "another with another seed" [ -s other ]
+if cmp -s alone other; then check "another with another seed" false; fi
+end
+
+begin "a body whose guard is too strict is stopped, and that fails"
+cp -r fem strict
+sed -i 's/"finite_guard"/"finite_guard", "reach": 0.15/' strict/scene.json
+check "the scene has the key" has '"reach": 0.15' strict/scene.json
+run strict --only meganewton --seconds 4
+check "exit code 1, not $code" code_is 1
+check "it says what was stopped" has "FAILED .*beam stopped: node .*, 0.0[0-9]* m allowed" out
+check "counts" has "^0 passed, 1 failed" out
+end
+
+begin "a body that nothing calms does not come back, and that fails"
+cp -r springs ringing
+sed -i 's/"damping_1_s":[[:space:]]*[0-9.]*/"damping_1_s": 0/' ringing/scene.json
+run ringing --only meganewton --seconds 4
+check "exit code 1, not $code" code_is 1
+check "it says so" has "FAILED .*back after inf s" out
+end
+
+begin "too little time is told and does not pass"
+run springs --seconds 0.1
+check "exit code 1" code_is 1
+check "it says so" has "give more --seconds\|did not come to rest before" out
+end
+
+begin "what is no insult and no scene is refused with one line"
+run fem --only tickle
+check "exit code 1" code_is 1
+check "one line" [ "$(wc -l <err)" -eq 1 ]
+check "it names the word" has 'there is no insult "tickle"' err
+run nowhere.json
+check "exit code 1" code_is 1
+check "one line" [ "$(wc -l <err)" -eq 1 ]
+run
+check "usage" code_is 2
+end
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
