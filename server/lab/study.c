@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10 };
+enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10, SOFTER = 3 };
 static const double usual_s = 0.5,
                     hair = 1e-7; /* of the diagonal: supports reach so much farther than they are given */
 
@@ -123,6 +123,18 @@ static void take_over(pal_study *to, const pal_study *from)
     to->reference_m = from->reference_m, to->most_m = from->most_m, to->size_m = from->size_m;
 }
 
+/* fine elements under the edge of a patch may find no rest where the coarse estimate saw one: then half as strong */
+static pal_err press(pal_study_job *job)
+{
+    PAL_TRY(pal_study_presses(job));
+    pal_err err = pal_study_reference(job);
+    for (int k = 0; k < SOFTER && (err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN); k++) {
+        pal_study_press_less(job);
+        err = pal_study_reference(job);
+    }
+    return err;
+}
+
 static pal_err study(pal_study_job *job)
 {
     pal_study_wish *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
@@ -134,8 +146,7 @@ static pal_err study(pal_study_job *job)
     if (!err && n == 0) err = pal_note_set(job->note, PAL_ERR_REFUSED, "no method of those asked for fits the body");
     if (whole) take_over(job->out, before);
     if (!err && !whole) err = take_probes(job);
-    if (!err && !whole && job->n_load == 0) err = pal_study_presses(job);
-    if (!err && !whole) err = pal_study_reference(job);
+    if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, wish, n);
     free(wish);
     return err;
@@ -143,28 +154,19 @@ static pal_err study(pal_study_job *job)
 
 /* ---- from a scene ---- */
 
-/* boxes for calibration; the lowest part only where up is an axis, else there is none and springs are not fitted */
+/* every mesh of the study holds the same; what is no box calibration does not know */
 static void set_supports(pal_study_job *job)
 {
-    const pal_body_def *body = &job->scene->body[0];
+    pal_body_def *body = &job->scene->body[0];
     const pal_surface *s = &body->mesh->surface;
-    double low[3], high[3];
-    pal_surface_box(s, low, high);
     for (int k = 0; k < body->n_support; k++) {
+        pal_support box;
+        if (!job->shell && pal_setting_box(job->scene, 0, k, &box)) body->support[k] = box;
         const pal_support *from = &body->support[k];
         pal_problem_support *to = &job->problem->support[job->problem->n_support];
-        bool fits = !from->rim && !from->lowest;
-        pal_copy3(to->region.low_m, from->low_m);
-        pal_copy3(to->region.high_m, from->high_m);
-        for (int c = 0; c < 3 && from->lowest; c++) {
-            double part = from->fraction * (high[c] - low[c]), size = high[c] - low[c];
-            to->region.low_m[c] = low[c] - size, to->region.high_m[c] = high[c] + size;
-            if (job->scene->up[c] > 0.999) to->region.high_m[c] = low[c] + part, fits = true;
-            if (job->scene->up[c] < -0.999) to->region.low_m[c] = high[c] - part, fits = true;
-        }
-        pal_add3(to->region.low_m, to->region.low_m, s->origin_m);
-        pal_add3(to->region.high_m, to->region.high_m, s->origin_m);
-        job->problem->n_support += fits;
+        pal_add3(to->region.low_m, from->low_m, s->origin_m);
+        pal_add3(to->region.high_m, from->high_m, s->origin_m);
+        job->problem->n_support += !from->rim && !from->lowest;
     }
 }
 

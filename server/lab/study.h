@@ -2,12 +2,15 @@
  * reference and its milliseconds per live step. [load]
  *
  * Loads: those of a problem's load case, or of a scene three presses on patches of its surface far from the supports,
- * each as strong as moves the patch by about 4 % of the body's diagonal (linear estimate). Static: the rest under every
- * load. Dynamic: the first load put on at once at rest, the way of its patch's middle for `seconds`, with the scene's
- * own damping. Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept, whose own
- * error is estimated from its last change (Richardson); its dynamic run with sdirk2 and a quarter of the shortest step;
- * adaptive_springs: its own finest level, wholly refined; or samples that the caller has.
- * Deterministic but for the milliseconds. */
+ * each as strong as moves the patch by about 2 % of the body's diagonal (linear estimate), or a half, a quarter, an
+ * eighth of that where the reference finds no rest. Static: the rest under every load, at up to 1,000 points of the
+ * shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes about as far as the
+ * whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's own damping; what
+ * would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed.
+ * Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own
+ * error is estimated from its last changes (Richardson); its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s);
+ * adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of the coarse surface; or
+ * samples that the caller has. Deterministic but for the milliseconds and seconds. */
 #ifndef PAL_LAB_STUDY_H
 #define PAL_LAB_STUDY_H
 #include "server/lab/sample_points.h"
@@ -23,7 +26,7 @@ typedef struct pal_study_point {
     int n_node, n_substep;
     double ms_p95;
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
-    double way_rms_m, way_most_m;       /* of the patch's middle over time, dynamic                                */
+    double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
     double predicted_ms, predicted_m;   /* by the models of cost and error fitted to the OTHER points of its method;
                                            NaN: too few of them                                                    */
@@ -73,7 +76,8 @@ void pal_study_front(pal_study *study);
 /* the cheapest point with error_m (plus the reference's own error) at most within_m, or the most accurate one with ms
  * at most budget_ms; the one that is not asked for is NaN; both: cheapest that keeps both. -1: none serves */
 int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
-/* cost and error foreseen for a setting between those measured: ms = a + b n^c, error = d size^-p fitted to the points
- * of the same method and solver; false: too few of them */
+/* cost and error foreseen for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a +
+ * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
+ * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
 bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
 #endif

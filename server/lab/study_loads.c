@@ -9,7 +9,7 @@
 
 enum { PRESSES = 3, COARSE = 10 };
 /* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
-static const double patch_share = 0.06, press_share = 0.04, first_share = 1e-3;
+static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
 
 static double diagonal(const pal_surface *s, double low[3])
 {
@@ -132,4 +132,12 @@ pal_err pal_study_presses(pal_study_job *job)
     job->n_load = job->problem->n_case = PRESSES;
     for (int k = 0; k < PRESSES && !err; k++) err = scale_load(job, k, place[k], size_m);
     return err;
+}
+
+void pal_study_press_less(pal_study_job *job)
+{
+    for (int k = 0; k < job->n_load; k++) {
+        double *total = job->problem->load_case[k].load[0].total_N;
+        pal_scale3(total, 0.5, total);
+    }
 }

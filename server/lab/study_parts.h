@@ -94,6 +94,7 @@ pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const p
 
 /* study_loads.c: three presses for a scene that has no load cases, and the problem that stands for its body */
 pal_err pal_study_presses(pal_study_job *job);
+void pal_study_press_less(pal_study_job *job); /* half as strong */
 /* the constants of springs fitted to the reference's rest, into the setting */
 pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note);
 

@@ -1,8 +1,9 @@
 /* The front of a study, what it answers, and what it foresees.
  *
- * Foreseen is first along the sizes of settings that are the same but for them: ms = a + b n^c, error = d n^-p, n the
- * size (edges of adaptive levels and of subdivided cells double with each). Where fewer than three of them are
- * measured, all points of the model are taken together: the logarithms are sums of what each knob adds. */
+ * Foreseen is along the sizes of settings that are the same but for them, where these follow a power law closely: ms =
+ * a + b n^c, error = d n^-p, n the size (edges of adaptive levels and of subdivided cells double with each). Elsewhere
+ * the logarithms of all points of the model are taken as sums of what each knob adds, and what that misses at the
+ * nearest settings of the same size is taken off: how many nodes there are is no smooth function of the size. */
 #include "server/base/vec3.h"
 #include "server/lab/study_parts.h"
 
@@ -12,7 +13,9 @@
 
 enum { ALONG = 3, FEATURES = 24 };
 /* weight of "no effect" for each knob, so that one that was never turned has none */
-static const double ridge = 1e-4;
+static const double ridge = 1e-4, least_m = 1e-12;
+/* a power law is followed closely */
+static const double close_off = 0.05;
 
 static bool measured(const pal_study_point *p)
 {
@@ -146,25 +149,44 @@ static double cost_at(const double *x, const double *y, int n, double at)
     return from + exp(b + c * at);
 }
 
-static bool foresee_along(const pal_study *study, const pal_setting *s, int leave_out, double *ms, double *error_m)
+/* a law along the sizes: what it gives at `at`, how far off it is at its points (RMS of logarithms) */
+typedef struct along {
+    int n_size;
+    double value, off;
+} along;
+
+static along law_along(const double *x, const double *y, int n, double at, bool cost)
 {
-    double x[PAL_STUDY_POINTS], y[PAL_STUDY_POINTS], z[PAL_STUDY_POINTS], a, slope, at = log(edges(s));
-    int n = 0, n_size = 0;
+    along out = {.n_size = 0};
+    for (int i = 0; i < n; i++) {
+        bool fresh = true;
+        for (int k = 0; k < i; k++) fresh = fresh && fabs(x[k] - x[i]) > 1e-9;
+        out.n_size += fresh;
+    }
+    if (out.n_size < ALONG) return out;
+    double a, slope;
+    line(x, y, n, &a, &slope);
+    out.value = cost ? cost_at(x, y, n, at) : exp(a + slope * at);
+    for (int i = 0; i < n; i++) {
+        double r = (cost ? log(cost_at(x, y, n, x[i])) : a + slope * x[i]) - y[i];
+        out.off += r * r / n;
+    }
+    out.off = sqrt(out.off);
+    return out;
+}
+
+static void look_along(const pal_study *study, const pal_setting *s, int leave_out, along out[2])
+{
+    double x[PAL_STUDY_POINTS], y[2][PAL_STUDY_POINTS], at = log(edges(s));
+    int n = 0;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
         if (i == leave_out || !measured(p) || !same_but_size(&p->priced.setting, s)) continue;
         x[n] = log(edges(&p->priced.setting));
-        bool fresh = true;
-        for (int k = 0; k < n; k++) fresh = fresh && fabs(x[k] - x[n]) > 1e-9;
-        n_size += fresh;
-        y[n] = log(p->priced.ms);
-        z[n++] = log(fmax(p->priced.error_m, 1e-12));
+        y[0][n] = log(p->priced.ms);
+        y[1][n++] = log(fmax(p->priced.error_m, least_m));
     }
-    if (n_size < ALONG) return false;
-    *ms = cost_at(x, y, n, at);
-    line(x, z, n, &a, &slope);
-    *error_m = exp(a + slope * at);
-    return true;
+    for (int v = 0; v < 2; v++) out[v] = law_along(x, y[v], n, at, v == 0);
 }
 
 /* ---- all knobs of a model ---- */
@@ -223,16 +245,38 @@ static bool is_strange(const pal_study *study, const pal_setting *s, int leave_o
     return !(element && law && solver && fitted && step && tolerance);
 }
 
-static bool foresee_knobs(const pal_study *study, const pal_setting *s, int leave_out, double *ms, double *error_m)
+static double sum_of(const double w[FEATURES], const double f[FEATURES])
 {
-    double A[FEATURES][FEATURES + 2] = {{0}}, w[2][FEATURES], f[FEATURES];
+    double sum = 0;
+    for (int r = 0; r < FEATURES; r++) sum += w[r] * f[r];
+    return sum;
+}
+
+/* knobs that stand otherwise */
+static int differences(const pal_setting *a, const pal_setting *b)
+{
+    return !pal_study_is(a->element, b->element) + !pal_study_is(a->law, b->law) + !pal_study_is(a->solver, b->solver) +
+           (a->step_s != b->step_s) + (a->tolerance != b->tolerance) + ((a->k_distance_J > 0) != (b->k_distance_J > 0));
+}
+
+static bool is_mate(const pal_study *study, int i, const pal_setting *s, int leave_out)
+{
+    const pal_study_point *p = &study->point[i];
+    return i != leave_out && measured(p) && pal_study_is(p->priced.setting.model, s->model);
+}
+
+/* logarithms of ms and error; *mates: other settings of the same size there are */
+static bool look_at_knobs(const pal_study *study, const pal_setting *s, int leave_out, double out[2], int *mates)
+{
+    double A[FEATURES][FEATURES + 2] = {{0}}, w[2][FEATURES], f[FEATURES], g[FEATURES], off[2] = {0, 0}, weight = 0;
     int n = 0;
+    *mates = 0;
     if (is_strange(study, s, leave_out)) return false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_study_point *p = &study->point[i];
-        if (i == leave_out || !measured(p) || !pal_study_is(p->priced.setting.model, s->model)) continue;
-        features(&p->priced.setting, f);
-        double y[2] = {log(p->priced.ms), log(fmax(p->priced.error_m, 1e-12))};
+        const pal_priced_setting *p = &study->point[i].priced;
+        if (!is_mate(study, i, s, leave_out)) continue;
+        features(&p->setting, f);
+        double y[2] = {log(p->ms), log(fmax(p->error_m, least_m))};
         for (int r = 0; r < FEATURES; r++) {
             for (int c = 0; c < FEATURES; c++) A[r][c] += f[r] * f[c];
             for (int v = 0; v < 2; v++) A[r][FEATURES + v] += f[r] * y[v];
@@ -242,17 +286,34 @@ static bool foresee_knobs(const pal_study *study, const pal_setting *s, int leav
     if (n < ALONG) return false;
     solve_knobs(A, w);
     features(s, f);
-    double sum[2] = {0, 0};
-    for (int v = 0; v < 2; v++)
-        for (int r = 0; r < FEATURES; r++) sum[v] += f[r] * w[v][r];
-    *ms = exp(sum[0]), *error_m = exp(sum[1]);
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_priced_setting *p = &study->point[i].priced;
+        if (!is_mate(study, i, s, leave_out) || p->setting.size != s->size) continue;
+        double near = exp2(-2 * differences(&p->setting, s));
+        features(&p->setting, g);
+        off[0] += near * (log(p->ms) - sum_of(w[0], g));
+        off[1] += near * (log(fmax(p->error_m, least_m)) - sum_of(w[1], g));
+        weight += near;
+        (*mates)++;
+    }
+    for (int v = 0; v < 2; v++) out[v] = sum_of(w[v], f) + (weight > 0 ? off[v] / weight : 0);
     return true;
 }
 
 bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m)
 {
-    return foresee_along(study, setting, leave_out, ms, error_m) ||
-           foresee_knobs(study, setting, leave_out, ms, error_m);
+    along line_of[2];
+    double knobs[2], *out[2] = {ms, error_m};
+    int mates = 0;
+    look_along(study, setting, leave_out, line_of);
+    bool known = look_at_knobs(study, setting, leave_out, knobs, &mates);
+    if (!known && line_of[0].n_size < ALONG) return false;
+    for (int v = 0; v < 2; v++) {
+        bool closely = line_of[v].n_size > ALONG && line_of[v].off < close_off;
+        bool by_line = line_of[v].n_size >= ALONG && (closely || !known || mates == 0);
+        *out[v] = by_line ? line_of[v].value : exp(knobs[v]);
+    }
+    return true;
 }
 
 void pal_study_predict(pal_study *study)

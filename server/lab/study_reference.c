@@ -11,7 +11,8 @@
 
 enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, COUNTED = 12 };
 /* shorter steps than any that is swept in number, and of second order */
-static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, reference_tolerance = 1e-4, full_share = 0.95;
+static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, reference_tolerance = 1e-4, full_share = 0.95,
+                    least_order = 0.5;
 
 static pal_setting reference_setting(const pal_study_job *job, int size)
 {
@@ -97,7 +98,8 @@ static pal_err estimate(pal_study_job *job, double *out)
     if (!err) {
         double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[0], job->n_probe);
         double order = pal_richardson_order(h, first, last);
-        if (isnan(order)) order = 1;
+        /* nearly no order is no order: what is left would be any number */
+        order = isnan(order) ? 1 : fmax(order, least_order);
         *out = last / (pow(h[1] / h[2], order) - 1);
     }
     free(u[0]), free(u[1]);

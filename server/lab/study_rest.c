@@ -10,8 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_NEWTON = 400, MOST_RELAX = 4000, QUIET = 3, RAMPS = 4 };
+enum { MOST_NEWTON = 120, MOST_RELAX = 4000, QUIET = 3, RAMPS = 4 };
 static const double rest_tolerance = 1e-6, relax_change = 1e-4;
+/* what running a body of finite elements to rest may take where Newton found none */
+static const double rescue_work = 1e6;
 
 /* ---- finite elements ---- */
 
@@ -169,11 +171,12 @@ static double change(double *before, const double *u, int n, double *most)
 }
 
 /* steps until a few peaks in a row have moved nothing to speak of */
-static pal_err relax_world(pal_study_job *job, pal_study_world *w, double *before, double *u, pal_note *note)
+static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step, double *before, double *u,
+                           pal_note *note)
 {
     double last = 0, most = 0;
     int quiet = 0;
-    for (int step = 1; step <= MOST_RELAX; step++) {
+    for (int step = 1; step <= most_step; step++) {
         pal_err err = pal_world_step(w->world, w->set->scene.step_s);
         if (err || w->body->frozen)
             return pal_note_set(note, err ? err : PAL_ERR_FROZEN, "%s after %d steps on its way to rest",
@@ -188,11 +191,12 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, double *befor
         quiet = change(before, u, job->n_probe, &most) <= relax_change * most ? quiet + 1 : 0;
         if (quiet == QUIET) return PAL_ERR_OK;
     }
-    return pal_note_set(note, PAL_ERR_NUMERIC, "not at rest after %d steps", MOST_RELAX);
+    return pal_note_set(note, PAL_ERR_NUMERIC, "not at rest after %d steps", most_step);
 }
 
+/* most_work: steps times nodes; 0: any */
 static pal_err relax(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                     int *n_node, pal_note *note)
+                     int *n_node, double most_work, pal_note *note)
 {
     pal_study_world w;
     pal_setting still = *setting;
@@ -202,7 +206,9 @@ static pal_err relax(pal_study_job *job, const pal_setting *setting, const pal_p
     *n_node = pal_body_nodes(w.body);
     double *before = calloc(3 * (size_t)job->n_probe, sizeof *before);
     pal_err err = before ? pal_study_put(job, &w, load, 1, note) : PAL_ERR_MEMORY;
-    if (!err) err = relax_world(job, &w, before, u, note);
+    if (!err)
+        err = relax_world(job, &w, most_work > 0 ? (int)fmin(MOST_RELAX, most_work / *n_node) : MOST_RELAX, before, u,
+                          note);
     if (!err) *n_node = pal_body_nodes(w.body);
     free(before);
     pal_study_close(&w);
@@ -224,9 +230,13 @@ pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const p
                          int *n_node, pal_note *note)
 {
     *n_node = 0;
-    if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem"))
-        return newton(job, setting, load, u, n_node, note);
+    if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem")) {
+        pal_err err = newton(job, setting, load, u, n_node, note);
+        pal_note other = {{0}};
+        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, rescue_work, &other)) return err;
+        return PAL_ERR_OK;
+    }
     if (pal_study_is(setting->model, "tet_springs") && only_gravity(&job->scene->body[0]))
         return lattice(job, setting, load, u, n_node, note);
-    return relax(job, setting, load, u, n_node, note);
+    return relax(job, setting, load, u, n_node, 0, note);
 }

@@ -201,6 +201,47 @@ static pal_err check_numbers(const pal_setting *s, pal_note *note)
     return PAL_ERR_OK;
 }
 
+/* ---- supports ---- */
+
+bool pal_setting_box(const pal_scene *scene, int body, int support, pal_support *out)
+{
+    const pal_body_def *def = &scene->body[body];
+    const pal_support *from = &def->support[support];
+    const double *x = def->cells                   ? def->cells->x
+                      : def->mesh->tets.n_node > 0 ? def->mesh->tets.x
+                                                   : def->mesh->surface.x;
+    int n = def->cells                   ? def->cells->n_vertex
+            : def->mesh->tets.n_node > 0 ? def->mesh->tets.n_node
+                                         : def->mesh->surface.n_vertex;
+    int axis = 0;
+    double low = INFINITY, high = -INFINITY, far = 0;
+    for (int c = 1; c < 3; c++)
+        if (fabs(scene->up[c]) > fabs(scene->up[axis])) axis = c;
+    if (!from->lowest || fabs(scene->up[axis]) < 0.999) return false;
+    double sign = scene->up[axis] < 0 ? -1 : 1;
+    for (int i = 0; i < n; i++) {
+        low = fmin(low, sign * x[3 * i + axis]), high = fmax(high, sign * x[3 * i + axis]);
+        for (int c = 0; c < 3; c++) far = fmax(far, fabs(x[3 * i + c]));
+    }
+    double top = low + (from->fraction + 1e-9) * (high - low);
+    *out = (pal_support){.lowest = false};
+    /* far enough for voxels of any size */
+    for (int c = 0; c < 3; c++) out->low_m[c] = -4 * far, out->high_m[c] = 4 * far;
+    if (sign > 0)
+        out->high_m[axis] = top;
+    else
+        out->low_m[axis] = -top;
+    return true;
+}
+
+static void box_supports(const pal_scene *from, int body, pal_body_def *to)
+{
+    for (int k = 0; k < to->n_support; k++) {
+        pal_support box;
+        if (pal_setting_box(from, body, k, &box)) to->support[k] = box;
+    }
+}
+
 /* ---- voxels ---- */
 
 /* Planes of the grid go through the border of the first box that cuts the body on an axis, a hair within the box, so
@@ -383,10 +424,12 @@ static bool keeps_mesh(const pal_body_def *body, const pal_setting *now, const p
     return to->size == voxels_of(body->mesh) && (!by_fill || body->mesh->hexes.measured);
 }
 
-static pal_err change(const pal_setting *now, const pal_setting *to, pal_set_scene *set, pal_note *note)
+static pal_err change(const pal_scene *from, const pal_setting *now, const pal_setting *to, pal_set_scene *set,
+                      pal_note *note)
 {
     pal_body_def *body = &set->scene.body[set->body];
     if (!keeps_mesh(body, now, to)) {
+        box_supports(from, set->body, body);
         PAL_TRY(make_mesh(body, to->size, &set->mesh, note));
         body->mesh = &set->mesh;
         body->spring_grid = (pal_spring_grid){.n = {0}};
@@ -420,7 +463,7 @@ pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to,
     set->scene = *from;
     set->body = body;
     pal_setting_of(from, body, &now);
-    pal_err err = change(&now, to, set, note);
+    pal_err err = change(from, &now, to, set, note);
     if (err) {
         pal_set_scene_free(set);
         return err;

@@ -4,9 +4,7 @@
 
 #include "server/base/vec3.h"
 #include "server/lab/solve.h"
-#include "server/mesh/stomach.h"
 #include "tests/check.h"
-#include "tests/sim/solid_scene.h"
 
 static pal_study *new_study(void)
 {

@@ -186,6 +186,40 @@ static void voxels_end_where_the_support_does(void)
     organ_free(&o);
 }
 
+/* another mesh holds the same part of the body, its border in a plane of nodes */
+static void the_lowest_part_is_held_as_a_box(void)
+{
+    organ o;
+    organ_make(&o, true);
+    o.scene->body[0].support[0] = (pal_support){.lowest = true, .fraction = 0.2};
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < o.mesh.tets.n_node; i++)
+        low = fmin(low, o.mesh.tets.x[3 * i + 2]), high = fmax(high, o.mesh.tets.x[3 * i + 2]);
+    for (int size = 7; size <= 15; size += 4) {
+        pal_set_scene *set = NULL;
+        double nearest = 1, top = low + 0.2 * (high - low);
+        CHECK(!pal_setting_make(o.scene, 0, &(pal_setting){.model = "fem", .size = size}, &o.note, &set));
+        if (!set) continue;
+        const pal_support *box = &set->scene.body[0].support[0];
+        CHECK(!box->lowest && box->low_m[2] < low - 0.1 && box->low_m[0] < -0.1 && box->high_m[1] > 0.2);
+        CHECK_NEAR(box->high_m[2], top, 1e-8);
+        for (int i = 0; i < set->mesh.tets.n_node; i++) {
+            double below = box->high_m[2] - set->mesh.tets.x[3 * i + 2];
+            if (below >= 0) nearest = fmin(nearest, below);
+        }
+        CHECK(nearest < 1e-5 * set->mesh.tets.h_m);
+        pal_set_scene_free(set);
+    }
+    /* upside down, and along no axis */
+    pal_support box;
+    pal_set3(o.scene->up, 0, 0, -1);
+    CHECK(pal_setting_box(o.scene, 0, 0, &box));
+    CHECK_NEAR(box.low_m[2], high - 0.2 * (high - low), 1e-8);
+    pal_set3(o.scene->up, 0.6, 0, 0.8);
+    CHECK(!pal_setting_box(o.scene, 0, 0, &box));
+    organ_free(&o);
+}
+
 static void a_hollow_body_adapts_or_is_refined(void)
 {
     organ o;
@@ -298,6 +332,7 @@ int main(void)
     RUN(a_full_body_runs_in_every_setting);
     RUN(keys_that_a_setting_does_not_speak_of_stay);
     RUN(voxels_end_where_the_support_does);
+    RUN(the_lowest_part_is_held_as_a_box);
     RUN(a_hollow_body_adapts_or_is_refined);
     RUN(cells_go_into_voxels);
     RUN(what_does_not_fit_is_refused_in_a_sentence);

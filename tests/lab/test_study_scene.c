@@ -1,0 +1,156 @@
+/* Studies of scenes, which have no load cases: presses on a full organ, a hollow one and control cells; samples that
+ * are given; refusals. */
+#include "server/lab/study.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/stomach.h"
+#include "tests/check.h"
+#include "tests/sim/solid_scene.h"
+
+/* an ellipsoid of 20 x 14 x 9 cm, full, held below; or its surface alone */
+typedef struct organ {
+    pal_surface surface;
+    pal_prepared mesh;
+    pal_scene *scene;
+    pal_study *study;
+    pal_note note;
+} organ;
+
+static void organ_make(organ *o, bool full)
+{
+    const double size_m[3] = {0.2, 0.14, 0.09};
+    double low[3], high[3];
+    memset(o, 0, sizeof *o);
+    o->scene = calloc(1, sizeof *o->scene);
+    o->study = calloc(1, sizeof *o->study);
+    if (!o->scene || !o->study || pal_sphere_make(0.1, &o->surface)) abort();
+    pal_surface_box(&o->surface, low, high);
+    for (int i = 0; i < 3 * o->surface.n_vertex; i++)
+        o->surface.x[i] = (o->surface.x[i] - low[i % 3]) / (high[i % 3] - low[i % 3]) * size_m[i % 3];
+    pal_voxel_options voxel = {.resolution = 10, .border = true, .least_fill = 0.25, .fill = true};
+    pal_err err = full ? pal_prepared_make(&o->surface, &voxel, &o->mesh, NULL, &o->note)
+                       : pal_prepared_surface(&o->surface, &o->mesh);
+    if (err) printf("  %s\n", o->note.text), abort();
+    pal_scene_default(o->scene);
+    o->scene->n_body = 1;
+    pal_body_def *def = &o->scene->body[0];
+    pal_body_default(def, "organ", &o->mesh);
+    def->n_effect = 0;
+    def->support[0].fraction = 0.3;
+    if (!full) pal_item_init(&def->model, "model", "adaptive_springs");
+}
+
+static void organ_free(organ *o)
+{
+    pal_prepared_free(&o->mesh);
+    pal_surface_free(&o->surface);
+    free(o->scene);
+    free(o->study);
+}
+
+static void show(const pal_study *s)
+{
+    char name[PAL_SETTING_TEXT];
+    printf("  %s: most %.3g mm, own error %.3g mm\n", s->reference, 1e3 * s->most_m, 1e3 * s->reference_m);
+    for (int i = 0; i < s->n_point; i++)
+        printf("  %c %s: %d nodes, %.3f ms, rest %.3g mm, way %.3g mm %s\n", s->point[i].priced.front ? '*' : ' ',
+               pal_setting_text(&s->point[i].priced.setting, name), s->point[i].n_node, s->point[i].priced.ms,
+               1e3 * s->point[i].static_most_m, 1e3 * s->point[i].way_most_m, s->point[i].why);
+}
+
+/* presses move the body by what they say, about; finer elements are nearer */
+static void a_full_organ_is_pressed(void)
+{
+    static const char *const method[] = {"fem", "tet_springs"};
+    organ o;
+    organ_make(&o, true);
+    pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = 2};
+    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
+    if (err) CHECK_FAIL("%s", o.note.text);
+    const pal_study *s = o.study;
+    show(s);
+    CHECK(s->most_m > 0.01 * s->size_m && s->most_m < 0.05 * s->size_m);
+    CHECK(s->reference_m > 0 && s->reference_m < 0.1 * s->most_m);
+    double coarse = NAN, fine = NAN, fitted = NAN, plain = NAN;
+    for (int i = 0; i < s->n_point; i++) {
+        const pal_study_point *p = &s->point[i];
+        const pal_setting *q = &p->priced.setting;
+        CHECK(!p->err && p->priced.ms > 0 && p->priced.error_m > 0 && p->priced.error_m < 0.6 * s->most_m);
+        if (!strcmp(q->element, "hex8_bbar")) coarse = isnan(coarse) ? p->static_rms_m : coarse, fine = p->static_rms_m;
+        if (!strcmp(q->model, "tet_springs") && q->k_distance_J > 0) fitted = p->static_rms_m;
+        if (!strcmp(q->model, "tet_springs") && !(q->k_distance_J > 0)) plain = p->static_rms_m;
+    }
+    CHECK(fine < coarse && fitted < plain);
+    organ_free(&o);
+}
+
+static void a_hollow_organ_is_pressed(void)
+{
+    organ o;
+    organ_make(&o, false);
+    pal_study_options options = {.quick = 1, .seconds = 0.1};
+    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
+    if (err) CHECK_FAIL("%s", o.note.text);
+    show(o.study);
+    CHECK_INT(o.study->n_point, 3);
+    for (int i = 0; i < o.study->n_point; i++) {
+        const pal_study_point *p = &o.study->point[i];
+        CHECK(!p->err && !strcmp(p->priced.setting.model, "adaptive_springs") && p->priced.ms > 0);
+    }
+    /* the finest that is swept, wholly refined, is nearer than the coarse surface */
+    CHECK(o.study->point[2].static_most_m < o.study->point[0].static_most_m);
+    CHECK(o.study->most_m > 0.005 * o.study->size_m && o.study->most_m < 0.2 * o.study->size_m);
+    organ_free(&o);
+}
+
+static void cells_are_pressed(void)
+{
+    static const char *const method[] = {"subdivision_fem"};
+    const int32_t n[3] = {3, 2, 2};
+    const double size_m[3] = {0.15, 0.1, 0.1};
+    solid_scene s;
+    pal_study *study = calloc(1, sizeof *study);
+    REQUIRE(study);
+    solid_scene_take(&s, solid_scene_box(n, size_m, true), 1, "central_cg", "polar");
+    solid_scene_hold(&s, 0, 1e-9);
+    pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = 1};
+    pal_err err = pal_study_scene(s.scene, &options, study, &s.note);
+    if (err) CHECK_FAIL("%s", s.note.text);
+    show(study);
+    CHECK_INT(study->n_point, 4);
+    for (int i = 0; i < study->n_point; i++)
+        CHECK(!study->point[i].err && study->point[i].static_most_m < 0.7 * study->most_m);
+    solid_scene_close(&s);
+    free(study);
+}
+
+static void check_refused(organ *o, const pal_study_options *options, const char *word)
+{
+    o->note.text[0] = 0;
+    CHECK(pal_study_scene(o->scene, options, o->study, &o->note) == PAL_ERR_REFUSED);
+    CHECK(strstr(o->note.text, word));
+    if (!strstr(o->note.text, word)) printf("  \"%s\" has no \"%s\"\n", o->note.text, word);
+}
+
+static void what_makes_no_sense_is_refused_in_a_sentence(void)
+{
+    static const char *const wrong[] = {"jelly"}, *const hollow[] = {"adaptive_springs"};
+    organ o;
+    organ_make(&o, true);
+    check_refused(&o, &(pal_study_options){.quick = 1, .body = 1}, "body 1");
+    check_refused(&o, &(pal_study_options){.quick = 1, .method = wrong, .n_method = 1}, "jelly");
+    check_refused(&o, &(pal_study_options){.quick = 1, .method = hollow, .n_method = 1}, "adaptive_springs");
+    check_refused(&o, &(pal_study_options){.quick = 1, .seconds = -1}, "seconds");
+    o.scene->body[0].n_support = 0;
+    check_refused(&o, &(pal_study_options){.quick = 1}, "hold");
+    organ_free(&o);
+}
+
+int main(void)
+{
+    RUN(a_full_organ_is_pressed);
+    RUN(a_hollow_organ_is_pressed);
+    RUN(cells_are_pressed);
+    RUN(what_makes_no_sense_is_refused_in_a_sentence);
+    return check_report();
+}
