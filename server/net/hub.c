@@ -369,7 +369,7 @@ static void hub_wake(void *user)
         next = pal_hub_make_fields(hub, room, now);
         if (next && (!due || next < due)) due = next;
     }
-    pal_hub_sculpt_turn(hub);
+    pal_hub_works_turn(hub);
     if (due) pal_loop_due(hub->loop, due);
 }
 
@@ -460,7 +460,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
 void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
-    pal_hub_sculpt_end(hub);
+    pal_hub_works_end(hub);
     for (int i = 0; i < hub->n_room; i++) {
         pal_stream_close(hub->room[i].stream);
         for (int k = 0; k < PAL_HUB_PAST; k++) pal_packet_drop(hub->room[i].past[k].asset);

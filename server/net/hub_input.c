@@ -152,7 +152,7 @@ static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
         pal_hub_complain(hub, c, "role", "a viewer gives no commands");
         return;
     }
-    if (pal_hub_sculpt_order(hub, c, order)) return;
+    if (pal_hub_sculpt_order(hub, c, order) || pal_hub_switch_order(hub, c, order)) return;
     for (int i = 0; i < PAL_COMMAND_FIELD; i++) /* fields are asked for with `view` */
         if (!strcmp(order->verb, verbs[i])) command.kind = (pal_command_kind)i;
     if (command.kind == PAL_COMMAND_COUNT) {

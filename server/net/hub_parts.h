@@ -1,5 +1,5 @@
-/* What hub.c, hub_input.c, hub_fields.c, hub_sculpt.c, hub_plan.c, hub_accuracy.c and hub_pages.c share: the hub's
- * records. Private to these. Thread: [net]. */
+/* What hub.c, hub_input.c, hub_fields.c, hub_works.c, hub_sculpt.c, hub_switch.c, hub_plan.c, hub_accuracy.c and
+ * hub_pages.c share: the hub's records. Private to these. Thread: [net]. */
 #ifndef PAL_NET_HUB_PARTS_H
 #define PAL_NET_HUB_PARTS_H
 #include "server/net/credit.h"
@@ -49,7 +49,7 @@ typedef struct pal_hub_past {
 /* one session as the hub sees it */
 typedef struct pal_hub_room {
     pal_session *session;
-    bool own; /* the hub made it: sculpting has replaced the one that was given */
+    bool own; /* the hub made it: sculpting or a switch has replaced the one that was given */
     pal_stream *stream;
     pal_hub_past past[PAL_HUB_PAST]; /* as a ring, the oldest at n_past */
     int n_past;
@@ -74,12 +74,12 @@ typedef struct pal_hub_count {
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;
 
-typedef struct pal_hub_sculpt pal_hub_sculpt;
+typedef struct pal_hub_works pal_hub_works;
 
 struct pal_hub {
     pal_loop *loop;
-    pal_session **session;  /* the caller's array [n_room] */
-    pal_hub_sculpt *sculpt; /* NULL until somebody sculpts */
+    pal_session **session; /* the caller's array [n_room] */
+    pal_hub_works *works;  /* NULL until somebody sculpts or switches */
     double error_m;
     pal_site *site;
     int n_room, most_clients, n_client;
@@ -115,8 +115,11 @@ uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
 /* hub_sculpt.c */
 /* an order that is one of sculpting is dealt with, now or when its turn comes; false: it is none */
 bool pal_hub_sculpt_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
-void pal_hub_sculpt_turn(pal_hub *hub); /* what the workshop has done, and the next order */
-void pal_hub_sculpt_end(pal_hub *hub);  /* closes the sessions that the hub made */
+/* hub_switch.c: the same for an order that asks for another setting */
+bool pal_hub_switch_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
+/* hub_works.c */
+void pal_hub_works_turn(pal_hub *hub); /* what the workshop has done, and the next order */
+void pal_hub_works_end(pal_hub *hub);  /* closes the sessions that the hub made */
 /* hub_accuracy.c */
 /* the order `estimate` is dealt with; false: it is another one */
 bool pal_hub_estimate_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);

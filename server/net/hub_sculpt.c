@@ -1,51 +1,13 @@
-/* Commands of sculpting at the hub (protocol/README.md, "Sculpting"): who may, what is meant, one after the other to
- * the workshop, and what comes out of it in the place of the session that runs.
- *
- * An order waits as it came and is read when its turn comes, so that it means the shape that its forerunners left. */
-#include "server/net/hub_parts.h"
+/* Commands of sculpting at the hub (protocol/README.md, "Sculpting"): who may, what is meant and how it is answered;
+ * brushes and probes at once, edits through hub_works.c. */
+#include "server/net/hub_works.h"
 
-#include "server/base/clock.h"
-#include "server/base/log.h"
 #include "server/base/vec3.h"
-#include "server/net/plain_text.h"
-#include "server/net/workshop.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { MOST_WAITING = 16 };
-
-typedef struct waiting {
-    pal_hub_room *room;
-    int member;
-    uint64_t asked_ns;
-    pal_wire_order order;
-} waiting;
-
-/* one body of a room that has been sculpted */
-typedef struct place {
-    pal_sculptor *sculptor;
-    pal_sculpt_turn *turn; /* whose scene the body's arrays are in; NULL: still the scene of the start */
-} place;
-
-/* the brush that a tool's holder asked for last */
-typedef struct hand {
-    int member, body;
-    double asked_m[6]; /* places as they came */
-    pal_brush brush;   /* kind NONE: none     */
-} hand;
-
-struct pal_hub_sculpt {
-    pal_workshop *workshop;
-    waiting list[MOST_WAITING]; /* oldest first; that under way is no longer in it */
-    int n;
-    waiting now;                  /* under way */
-    int body;                     /* of now    */
-    place (*place)[PAL_BODY_MAX]; /* [n_room] */
-    hand (*hand)[PAL_TOOL_MAX];   /* [n_room] */
-};
 
 /* ---- what is meant ---- */
 
@@ -79,42 +41,10 @@ static const struct verb *find_verb(const char *name)
     return v->name ? v : NULL;
 }
 
-static const pal_wire_arg *find_arg(const pal_wire_order *order, const char *key)
-{
-    for (uint32_t i = 0; i < order->n_arg; i++)
-        if (!strcmp(order->arg[i].key, key)) return &order->arg[i];
-    return NULL;
-}
-
 static double arg(const pal_wire_order *order, const char *key, double otherwise)
 {
-    const pal_wire_arg *a = find_arg(order, key);
+    const pal_wire_arg *a = pal_hub_arg(order, key);
     return a ? a->value : otherwise;
-}
-
-/* is every number there, and none that the verb does not take? false: complained */
-static bool good_args(pal_hub *hub, pal_client *c, const struct verb *v, const pal_wire_order *order)
-{
-    bool needed = true;
-    uint32_t n_known = 0;
-    for (const char *at = v->args; *at;) {
-        char key[32];
-        size_t n = strcspn(at, " ");
-        snprintf(key, sizeof key, "%.*s", (int)n, at);
-        at += n + (at[n] == ' ');
-        if (!strcmp(key, "|")) {
-            needed = false;
-            continue;
-        }
-        bool there = find_arg(order, key) != NULL;
-        n_known += there;
-        if (there || !needed) continue;
-        pal_hub_complain(hub, c, "args", "%s: %s is missing", v->name, key);
-        return false;
-    }
-    if (n_known == order->n_arg) return true;
-    pal_hub_complain(hub, c, "args", "%s takes %s", v->name, v->args[0] ? v->args : "no numbers");
-    return false;
 }
 
 /* the body named, or the first that sculpts; -1: complained */
@@ -301,42 +231,19 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_ord
 
 /* ---- answers ---- */
 
-static pal_client *find_client(pal_hub *hub, const waiting *w)
+void pal_hub_sculpt_answer(pal_hub *hub, pal_client *c, const pal_work *work)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (c->peer && c->room == w->room && c->id == w->member && !c->peer->drop_code) return c;
-    }
-    return NULL;
-}
-
-static void add_arg(pal_wire_answer *a, const char *key, double value)
-{
-    pal_wire_arg *to = &a->arg[a->n_arg++];
-    snprintf(to->key, sizeof to->key, "%s", key);
-    to->value = value;
-}
-
-static pal_wire_answer *begin_answer(pal_hub *hub, const char *verb)
-{
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ANSWER;
-    pal_plain_text(hub->control->answer.verb, sizeof hub->control->answer.verb, verb);
-    return &hub->control->answer;
-}
-
-static void answer_done(pal_hub *hub, const waiting *w, const pal_sculptor *sculptor, const pal_work *work)
-{
-    pal_client *c = find_client(hub, w);
-    if (!c) return;
-    pal_wire_answer *a = begin_answer(hub, w->order.verb);
+    const pal_hub_works *s = hub->works;
+    const char *verb = s->now.order.verb;
+    const pal_sculptor *sculptor = s->place[c->room - hub->room][s->body].sculptor;
+    pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
     int n_cell = pal_sculptor_cells(sculptor)->n_cell;
-    snprintf(a->text, sizeof a->text, "%s: %d control cells, made in %.0f ms", w->order.verb, n_cell,
+    snprintf(a->text, sizeof a->text, "%s: %d control cells, made in %.0f ms", verb, n_cell,
              1e-6 * (double)(work->made_ns - work->asked_ns));
-    add_arg(a, "cells", n_cell);
-    add_arg(a, "can_undo", pal_sculptor_past(sculptor));
-    add_arg(a, "can_redo", pal_sculptor_future(sculptor));
-    add_arg(a, "made_ms", 1e-6 * (double)(work->made_ns - work->asked_ns));
+    pal_hub_answer_arg(a, "cells", n_cell);
+    pal_hub_answer_arg(a, "can_undo", pal_sculptor_past(sculptor));
+    pal_hub_answer_arg(a, "can_redo", pal_sculptor_future(sculptor));
+    pal_hub_answer_arg(a, "made_ms", 1e-6 * (double)(work->made_ns - work->asked_ns));
     pal_hub_say(hub, c, hub->control);
 }
 
@@ -351,12 +258,12 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
         *def = scene->body[body];
         pal_session_material(c->room->session, body, &def->material);
         pal_material_painted(def, a.rest_m, &m);
-        pal_wire_answer *to = begin_answer(hub, order->verb);
+        pal_wire_answer *to = pal_hub_answer_begin(hub, order->verb);
         snprintf(to->text, sizeof to->text, "probe: E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
-        add_arg(to, "young_Pa", m.young_Pa);
-        add_arg(to, "poisson", m.poisson);
-        add_arg(to, "density_kg_m3", m.density_kg_m3);
-        add_arg(to, "face", a.face);
+        pal_hub_answer_arg(to, "young_Pa", m.young_Pa);
+        pal_hub_answer_arg(to, "poisson", m.poisson);
+        pal_hub_answer_arg(to, "density_kg_m3", m.density_kg_m3);
+        pal_hub_answer_arg(to, "face", a.face);
         pal_hub_say(hub, c, hub->control);
     }
     free(def);
@@ -366,7 +273,8 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
 
 /* places of a brush at rest. One whose places are those of the brush that the hand holds stays where that is, however
  * far the surface has moved since; false: complained */
-static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, hand *h, pal_brush *to)
+static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_hub_hand *h,
+                        pal_brush *to)
 {
     static const char *const key[6] = {"x_m", "y_m", "z_m", "x2_m", "y2_m", "z2_m"};
     bool same = h->brush.kind == to->kind && h->member == c->id && h->body == body;
@@ -391,7 +299,7 @@ static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_or
 
 static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pal_wire_order *order)
 {
-    hand *h = &hub->sculpt->hand[c->room - hub->room][tool], next = *h;
+    pal_hub_hand *h = &hub->works->hand[c->room - hub->room][tool], next = *h;
     pal_note note = {""};
     pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = body, .slot = tool};
     pal_brush *b = &command.brush;
@@ -412,210 +320,48 @@ static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pa
     }
     *h = next;
     h->brush = *b;
-    pal_wire_answer *a = begin_answer(hub, verb);
+    pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
     snprintf(a->text, sizeof a->text, b->kind == PAL_BRUSH_NONE ? "%s: tool %d" : "%s: with tool %d", verb, tool);
     pal_hub_say(hub, c, hub->control);
 }
 
-/* ---- one after the other ---- */
-
-/* assets that go are kept for a while: a client may be on its way to fetch one */
-static void keep_assets(pal_hub_room *room, const pal_stream *before)
+bool pal_hub_sculpt_read(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_work *to, int *body)
 {
-    for (int p = 0; p < before->n_part; p++) {
-        const pal_stream_part *part = &before->part[p];
-        if (p < room->stream->n_part && !strcmp(part->info.asset, room->stream->part[p].info.asset)) continue;
-        pal_hub_past *past = &room->past[room->n_past];
-        snprintf(past->path, sizeof past->path, "%s", part->info.asset);
-        pal_packet_replace(&past->asset, pal_packet_hold(part->asset));
-        room->n_past = (room->n_past + 1) % PAL_HUB_PAST;
-    }
-}
-
-/* what came out takes the place of what runs; false: it goes on as it was, note says why */
-static bool take_over(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
-{
-    pal_hub_room *room = s->now.room;
-    place *at = &s->place[room - hub->room][s->body];
-    pal_stream *old_stream = room->stream;
-    pal_session *old = room->session;
-    work->err = pal_session_follow(work->next, old, pal_sculpt_carry, work->turn, &work->note);
-    if (work->err) return false;
-    pal_stream_follow(work->stream, old_stream);
-    pal_sculptor_accept(at->sculptor, work->turn);
-    room->stream = work->stream, room->session = work->next;
-    memset(s->hand[room - hub->room], 0, sizeof *s->hand); /* brushes are over */
-    keep_assets(room, old_stream);
-    hub->session[room - hub->room] = NULL;
-    room->own = true;
-    pal_workshop_clear(s->workshop, old_stream, old, at->turn);
-    at->turn = work->turn;
-    work->turn = NULL, work->next = NULL, work->stream = NULL;
-    return true;
-}
-
-static void tell_topology(pal_hub *hub, pal_hub_room *room)
-{
-    for (int i = 0; i < hub->most_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
-        memset(hub->control, 0, sizeof *hub->control);
-        hub->control->type = PAL_CONTROL_TOPOLOGY;
-        hub->control->topology.n_part = (uint32_t)room->stream->n_part;
-        for (int p = 0; p < room->stream->n_part; p++) hub->control->topology.part[p] = room->stream->part[p].info;
-        pal_hub_topology_rows(room, &hub->control->topology);
-        memset(c->sent_change, 0, sizeof c->sent_change);
-        memset(c->sent_field, 0, sizeof c->sent_field);
-        pal_hub_say(hub, c, hub->control);
-    }
-}
-
-static void finish(pal_hub *hub, pal_hub_sculpt *s, pal_work *work)
-{
-    pal_hub_room *room = s->now.room;
-    const pal_sculptor *sculptor = s->place[room - hub->room][s->body].sculptor;
-    if (!work->err && take_over(hub, s, work)) {
-        tell_topology(hub, room);
-        answer_done(hub, &s->now, sculptor, work);
-    } else {
-        pal_client *c = find_client(hub, &s->now);
-        const char *verb = s->now.order.verb, *why = work->note.text[0] ? work->note.text : pal_err_text(work->err);
-        bool named = !strncmp(why, verb, strlen(verb)); /* edits of cells say it themselves */
-        if (c) pal_hub_complain(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : verb, why);
-    }
-    pal_work_free(work);
-}
-
-/* the scene that runs now, with the materials of now; NULL: out of memory */
-static pal_scene *scene_now(const pal_hub_room *room)
-{
-    pal_scene *scene = malloc(sizeof *scene);
-    if (!scene) return NULL;
-    *scene = *pal_session_scene(room->session);
-    for (int b = 0; b < scene->n_body; b++) pal_session_material(room->session, b, &scene->body[b].material);
-    return scene;
-}
-
-/* gives the next order to the workshop; one that cannot be read is answered and gone */
-static void begin_next(pal_hub *hub, pal_hub_sculpt *s)
-{
-    /* what is pointed at, and kept, is what is shown: a session that has just begun comes with its first frame */
-    while (s->n > 0 && s->list[0].room->stream->frame) {
-        pal_work work = {.err = PAL_ERR_OK};
-        s->now = s->list[0];
-        memmove(s->list, s->list + 1, sizeof *s->list * (size_t)--s->n);
-        pal_client *c = find_client(hub, &s->now);
-        pal_hub_room *room = s->now.room;
-        int body = c ? find_body(hub, c, &s->now.order) : -1; /* who has gone wants nothing any more */
-        if (body < 0) continue;
-        place *at = &s->place[room - hub->room][body];
-        pal_note note = {""};
-        if (!at->sculptor && pal_sculptor_create(pal_session_scene(room->session), body, &note, &at->sculptor)) {
-            pal_hub_complain(hub, c, "refused", "%s: %s", s->now.order.verb, note.text);
-            continue;
-        }
-        if (!read_order(hub, c, body, &s->now.order, at->sculptor, &work.command, &work.point_m)) continue;
-        work.scene = scene_now(room);
-        if (!work.scene) {
-            pal_work_free(&work);
-            pal_hub_complain(hub, c, "refused", "%s: %s", s->now.order.verb, pal_err_text(PAL_ERR_MEMORY));
-            continue;
-        }
-        s->body = body;
-        work.sculptor = at->sculptor, work.session = room->session;
-        work.error_m = hub->error_m;
-        work.asked_ns = s->now.asked_ns;
-        pal_workshop_give(s->workshop, &work);
-        return;
-    }
-}
-
-void pal_hub_sculpt_turn(pal_hub *hub)
-{
-    pal_hub_sculpt *s = hub->sculpt;
-    pal_work work;
-    if (!s) return;
-    if (pal_workshop_take(s->workshop, &work)) finish(hub, s, &work);
-    if (!pal_workshop_busy(s->workshop)) begin_next(hub, s);
-}
-
-/* ---- coming in and ending ---- */
-
-static void wake_loop(void *user)
-{
-    pal_loop_wake(user);
-}
-
-/* the workshop comes with the first order; false: out of memory */
-static bool make_sculpt(pal_hub *hub)
-{
-    if (hub->sculpt) return true;
-    pal_hub_sculpt *s = calloc(1, sizeof *s);
-    if (s) s->place = calloc((size_t)hub->n_room, sizeof *s->place);
-    if (s) s->hand = calloc((size_t)hub->n_room, sizeof *s->hand);
-    if (!s || !s->place || !s->hand || pal_workshop_open(wake_loop, hub->loop, &s->workshop)) {
-        if (s) free(s->place), free(s->hand);
-        free(s);
+    pal_note note = {""};
+    *body = find_body(hub, c, order);
+    if (*body < 0) return false;
+    pal_hub_place *at = &hub->works->place[c->room - hub->room][*body];
+    if (!at->sculptor && pal_sculptor_create(pal_session_scene(c->room->session), *body, &note, &at->sculptor)) {
+        pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, note.text);
         return false;
     }
-    hub->sculpt = s;
-    return true;
+    to->sculptor = at->sculptor;
+    return read_order(hub, c, *body, order, at->sculptor, &to->command, &to->point_m);
 }
 
 bool pal_hub_sculpt_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 {
     const struct verb *v = find_verb(order->verb);
     if (!v) return false;
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    if (m->role != PAL_MEMBER_INSTRUCTOR && m->tool < 0 && strcmp(v->name, "probe") != 0) {
-        pal_hub_complain(hub, c, "role", "%s: only an instructor or who holds a tool sculpts", v->name);
-        return true;
-    }
+    bool probes = !strcmp(v->name, "probe");
+    if (!probes && !pal_hub_works_may(hub, c, v->name, "sculpts")) return true;
     int body = find_body(hub, c, order);
-    if (body < 0 || !good_args(hub, c, v, order)) return true;
-    if (!strcmp(v->name, "probe")) {
+    if (body < 0 || !pal_hub_args_good(hub, c, v->args, order)) return true;
+    if (probes) {
         probe(hub, c, body, order);
         return true;
     }
-    if (!make_sculpt(hub)) {
+    if (!pal_hub_works_make(hub)) {
         pal_hub_complain(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
         return true;
     }
     bool brush = !strcmp(v->name, "inflate") || !strcmp(v->name, "curve") || !strcmp(v->name, "release");
-    if (brush && m->tool < 0)
+    int tool = pal_members_find(&c->room->members, c->id)->tool;
+    if (brush && tool < 0)
         pal_hub_complain(hub, c, "tool", "%s: take a tool first, its hand does it", v->name);
     else if (brush)
-        give_brush(hub, c, body, m->tool, order);
-    if (brush) return true;
-    pal_hub_sculpt *s = hub->sculpt;
-    if (s->n == MOST_WAITING) {
-        pal_hub_complain(hub, c, "busy", "%s: %d commands wait already", v->name, MOST_WAITING);
-        return true;
-    }
-    s->list[s->n++] = (waiting){c->room, c->id, pal_clock_ns(), *order};
-    if (!pal_workshop_busy(s->workshop)) begin_next(hub, s);
+        give_brush(hub, c, body, tool, order);
+    else
+        pal_hub_works_wait(hub, c, PAL_WORK_SCULPT, order);
     return true;
-}
-
-void pal_hub_sculpt_end(pal_hub *hub)
-{
-    pal_hub_sculpt *s = hub->sculpt;
-    if (!s) return;
-    pal_workshop_close(s->workshop);
-    for (int r = 0; r < hub->n_room; r++) {
-        pal_hub_room *room = &hub->room[r];
-        if (room->own) {
-            pal_stream_close(room->stream);
-            pal_session_close(room->session);
-            room->stream = NULL, room->session = NULL;
-        }
-        for (int b = 0; b < PAL_BODY_MAX; b++) {
-            pal_sculptor_destroy(s->place[r][b].sculptor);
-            pal_sculpt_free(s->place[r][b].turn);
-        }
-    }
-    free(s->place);
-    free(s->hand);
-    free(s);
-    hub->sculpt = NULL;
 }

@@ -9,12 +9,6 @@
 
 enum { MOST_CLEAR = 8 };
 
-typedef struct waste {
-    pal_stream *stream;
-    pal_session *session;
-    pal_sculpt_turn *turn;
-} waste;
-
 struct pal_workshop {
     pthread_t thread;
     pthread_mutex_t lock;
@@ -23,25 +17,32 @@ struct pal_workshop {
     void *user;
     pal_work work;
     enum { IDLE, GIVEN, DONE } state;
-    waste waste[MOST_CLEAR];
+    pal_waste waste[MOST_CLEAR];
     int n_waste;
     bool leaving;
 };
 
 static void make(pal_work *w)
 {
-    w->err = pal_sculptor_prepare(w->sculptor, w->scene, &w->command, &w->note, &w->turn);
-    if (!w->err) w->err = pal_session_open_after(w->session, pal_sculpt_scene(w->turn), &w->note, &w->next);
+    if (w->kind == PAL_WORK_SWITCH)
+        w->err = pal_switch_prepare(w->scene, w->was, w->body, &w->setting, &w->note, &w->change);
+    else
+        w->err = pal_sculptor_prepare(w->sculptor, w->scene, &w->command, &w->note, &w->turn);
+    if (!w->err) {
+        const pal_scene *scene = w->change ? pal_switch_scene(w->change) : pal_sculpt_scene(w->turn);
+        w->err = pal_session_open_after(w->session, scene, &w->note, &w->next);
+    }
     if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->note, &w->stream);
     w->made_ns = pal_clock_ns();
 }
 
-static void clear(waste *w)
+static void clear(pal_waste *w)
 {
     pal_stream_close(w->stream);
     pal_session_close(w->session);
     pal_sculpt_free(w->turn);
-    *w = (waste){.stream = NULL};
+    pal_switch_free(w->change);
+    *w = (pal_waste){.stream = NULL};
 }
 
 static void *work(void *user)
@@ -50,7 +51,7 @@ static void *work(void *user)
     pthread_mutex_lock(&s->lock);
     while (!s->leaving || s->n_waste > 0) {
         if (s->n_waste > 0) {
-            waste w = s->waste[--s->n_waste];
+            pal_waste w = s->waste[--s->n_waste];
             pthread_mutex_unlock(&s->lock);
             clear(&w);
             pthread_mutex_lock(&s->lock);
@@ -135,9 +136,9 @@ bool pal_workshop_take(pal_workshop *workshop, pal_work *out)
     return done;
 }
 
-void pal_workshop_clear(pal_workshop *workshop, pal_stream *stream, pal_session *session, pal_sculpt_turn *turn)
+void pal_workshop_clear(pal_workshop *workshop, const pal_waste *waste)
 {
-    waste w = {stream, session, turn};
+    pal_waste w = *waste;
     pthread_mutex_lock(&workshop->lock);
     bool room = workshop->n_waste < MOST_CLEAR;
     if (room) workshop->waste[workshop->n_waste++] = w;
@@ -151,7 +152,9 @@ void pal_work_free(pal_work *work)
     pal_stream_close(work->stream);
     pal_session_close(work->next);
     pal_sculpt_free(work->turn);
+    pal_switch_free(work->change);
     free(work->scene);
+    free(work->base);
     free(work->point_m);
     *work = (pal_work){.err = PAL_ERR_OK};
 }

@@ -1,30 +1,50 @@
-/* One thread beside the loop that makes what a command of sculpting leads to: scene, world and stream, slow and with
- * memory, while the session runs on; and that frees what has been replaced. One piece of work at a time: the next one
- * is given when the last has been taken. Thread: [net] unless said otherwise. */
+/* One thread beside the loop that makes what a command of sculpting, or one for another setting, leads to: scene, world
+ * and stream, slow and with memory, while the session runs on; and that frees what has been replaced. One piece of work
+ * at a time: the next one is given when the last has been taken. Thread: [net] unless said otherwise. */
 #ifndef PAL_NET_WORKSHOP_H
 #define PAL_NET_WORKSHOP_H
 #include "server/net/stream.h"
 #include "server/session/sculpt.h"
+#include "server/session/switching.h"
 
 typedef struct pal_workshop pal_workshop;
 
-/* what is to be made, and what has been. Borrowed until it is taken: sculptor and session, which nobody changes or
+typedef enum pal_work_kind { PAL_WORK_SCULPT, PAL_WORK_SWITCH } pal_work_kind;
+
+/* what is to be made, and what has been. Borrowed until it is taken: sculptor, session and was, which nobody changes or
  * closes meanwhile */
 typedef struct pal_work {
-    const pal_sculptor *sculptor;
+    pal_work_kind kind;
     const pal_session *session; /* that runs now */
     pal_scene *scene;           /* its scene with live materials; heap, goes with the work */
+    /* SCULPT */
+    const pal_sculptor *sculptor;
     pal_sculpt command;
     double *point_m; /* what the command points to, heap, or NULL */
+    /* SWITCH */
+    int body;
+    pal_setting setting;
+    const pal_body_def *was; /* the body before its first switch               */
+    pal_body_def *base;      /* the same where this is its first: heap, or NULL */
     double error_m;
     uint64_t asked_ns, made_ns;
     /* made; when err is not 0 nothing is, and note says why */
     pal_err err;
     pal_note note;
-    pal_sculpt_turn *turn;
+    pal_sculpt_turn *turn; /* SCULPT */
+    pal_switch *change;    /* SWITCH */
     pal_session *next;
     pal_stream *stream;
+    pal_switch_report report; /* filled in by who lets it take over */
 } pal_work;
+
+/* what has been replaced; each may be NULL */
+typedef struct pal_waste {
+    pal_stream *stream;
+    pal_session *session;
+    pal_sculpt_turn *turn;
+    pal_switch *change;
+} pal_waste;
 
 /* wake is called on the thread when work is done. MEMORY. [load] */
 pal_err pal_workshop_open(void (*wake)(void *user), void *user, pal_workshop **out);
@@ -35,8 +55,8 @@ bool pal_workshop_busy(const pal_workshop *workshop); /* has work that was not t
 void pal_workshop_give(pal_workshop *workshop, const pal_work *work);
 /* what is done, once; false: nothing yet. Heap parts are the caller's again */
 bool pal_workshop_take(pal_workshop *workshop, pal_work *out);
-/* closes and frees on the thread, in this order, each may be NULL; before the next give */
-void pal_workshop_clear(pal_workshop *workshop, pal_stream *stream, pal_session *session, pal_sculpt_turn *turn);
+/* closes and frees on the thread, in the order of the struct; before the next give */
+void pal_workshop_clear(pal_workshop *workshop, const pal_waste *waste);
 /* frees what a work holds: scene, points, and what was made */
 void pal_work_free(pal_work *work);
 #endif

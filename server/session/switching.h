@@ -1,22 +1,29 @@
 /* A live switch of method, resolution, step or tolerance of one body: another world is made beside the running one
  * (pal_switch_prepare, slow), and takes over between two steps with pal_session_follow and pal_switch_carry, without a
  * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
- * within 2 % of what it was, the mismatch of forces let go over 10 steps. Thread: one at a time. */
+ * within 2 % of what it was, the mismatch of forces let go over 10 steps (sim/transfer.h). What tools hold they go on
+ * holding, lasting loads stay; brushes are over. Thread: one at a time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H
 #include "server/sim/setting.h"
+#include "server/sim/transfer.h"
 #include "server/sim/world.h"
 
 typedef struct pal_switch pal_switch;
 /* what the carry saw, for people and tests */
 typedef struct pal_switch_report {
-    double energy_before_J, energy_after_J; /* of the whole world */
+    double energy_before_J, energy_after_J; /* of the whole world: kinetic and elastic */
     double most_move_m;                     /* of a shown vertex, between the frame before and the one after */
+    double scale;                           /* of displacements, for the sake of the energy; 1: none */
 } pal_switch_report;
 
-/* the scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body); borrows
- * `scene`. Errors as of pal_setting_make */
-pal_err pal_switch_prepare(const pal_scene *scene, int body, const pal_setting *to, pal_note *note, pal_switch **out);
+/* The scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body). It is made
+ * from `scene`, whose world runs, with the body as `base` has it: as it was before its first switch, with the cells and
+ * voxels that it came with, so that every setting can be come back to; NULL: as scene has it. Materials and step are
+ * those of scene. Borrows scene's and base's meshes, copies both. REFUSED as of pal_setting_make and, besides, what it
+ * is already; BUDGET, MEMORY. [any] */
+pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
+                           pal_note *note, pal_switch **out);
 const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */
 /* pal_session_carry with user a pal_switch */
 void pal_switch_carry(void *change, pal_world *next, const pal_world *before);

@@ -147,3 +147,24 @@ void pal_patches_update(pal_patches *patches, const pal_patch_rules *rules, cons
     pal_copy3(patches->last_m, tool->here_m);
     patches->known = true;
 }
+
+bool pal_patch_series(double give[3][3], int n_give, double k_N_m, double K[6])
+{
+    double c[3][3], minor[3][3];
+    if (n_give == 0 || !(k_N_m > 0)) return false;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            c[i][j] = i < n_give && j < n_give ? 0.5 * (give[i][j] + give[j][i]) : 0;
+            if (i == j) c[i][j] = (i < n_give ? c[i][i] : give[0][0]) + 1 / k_N_m;
+        }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
+            minor[i][j] = c[a][p] * c[b][q] - c[a][q] * c[b][p];
+        }
+    double det = pal_dot3(c[0], minor[0]);
+    if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
+    const int place[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+    for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
+    return isfinite(det);
+}

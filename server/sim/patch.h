@@ -61,4 +61,7 @@ void pal_patches_reset(pal_patches *patches, int id_base);
  * tool->patch. The tool's place is tool->here_m. */
 void pal_patches_update(pal_patches *patches, const pal_patch_rules *rules, const pal_blob *blob, int n,
                         pal_tool *tool);
+/* K = (C + 1/k)^-1 as xx xy xz yy yz zz: tissue of compliance C, m/N, behind a spring k. give: columns of C, those from
+ * n_give on are not known and taken isotropic. False: none is known, or C is no compliance */
+bool pal_patch_series(double give[3][3], int n_give, double k_N_m, double K[6]);
 #endif

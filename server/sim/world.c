@@ -214,6 +214,7 @@ void pal_world_destroy(pal_world *world)
     pal_plan_free(&world->plan);
     pal_field_free(&world->fields);
     pal_brush_rows_free(&world->brushes);
+    pal_ease_rows_free(&world->eases);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -404,9 +405,16 @@ void pal_world_watch(pal_world *world, bool watched)
         if (world->plan.body[b].stale && pal_body_finite(&world->plan.body[b])) show(world, b);
 }
 
+pal_err pal_world_ease(pal_world *world, int body, const double *force_N)
+{
+    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
+    return pal_ease_rows_set(&world->eases, &world->plan, body, force_N);
+}
+
 void pal_world_tidy(pal_world *world)
 {
     pal_brush_rows_tidy(&world->brushes, &world->plan);
+    pal_ease_rows_tidy(&world->eases, &world->plan);
 }
 
 /* ---- a step ---- */
@@ -427,6 +435,15 @@ static void begin_loads(pal_body *body)
         memcpy(body->load, body->outer, n_byte);
     else
         memset(body->load, 0, n_byte);
+}
+
+pal_err pal_world_pull(pal_world *world, int body)
+{
+    pal_step step = step_of(world, body);
+    begin_loads(step.body);
+    pal_err err = pal_gather(&step);
+    pal_arena_reset(world->scratch);
+    return err;
 }
 
 static void cap_loads(pal_body *body)
@@ -624,7 +641,7 @@ double pal_world_energy_J(const pal_world *world)
 size_t pal_world_bytes(const pal_world *world)
 {
     return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte + pal_field_bytes(&world->fields) +
-           pal_brush_rows_bytes(&world->brushes) + pal_plan_bytes(&world->plan);
+           pal_brush_rows_bytes(&world->brushes) + pal_ease_rows_bytes(&world->eases) + pal_plan_bytes(&world->plan);
 }
 
 int pal_world_bodies(const pal_world *world)

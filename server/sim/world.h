@@ -76,8 +76,12 @@ bool pal_world_gives(const pal_world *world, int body, pal_field field); /* woul
  * brushes of its slot, a reset ends all at once. REFUSED (one sentence): no such body or slot, a body without brushes,
  * a bad number, nothing within reach; MEMORY; both change nothing. Between steps; takes heap memory. [sim] */
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note);
-/* rows whose last brush has gone out are taken out of the plan. After every step of a world that shall be repeatable to
- * the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
+/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_EASE_STEPS steps (ease.h): what
+ * makes up for a change between two steps. Replaces one that still acts; reset ends it. REFUSED: no such body; MEMORY.
+ * Between steps; takes heap memory. [sim] */
+pal_err pal_world_ease(pal_world *world, int body, const double *force_N);
+/* rows of brushes and loads that have gone out are taken out of the plan. After every step of a world that shall be
+ * repeatable to the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
 void pal_world_tidy(pal_world *world);
 
 /* Switches a row off, or on again, in the running world. Off: the row is gone from the plan with its memory, as if the

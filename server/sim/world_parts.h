@@ -1,7 +1,8 @@
-/* What world.c and world_show.c share: the world's record. Private to these. */
+/* What world.c, world_show.c and transfer_carry.c share: the world's record. Private to these. */
 #ifndef PAL_SIM_WORLD_PARTS_H
 #define PAL_SIM_WORLD_PARTS_H
 #include "server/sim/brush_rows.h"
+#include "server/sim/ease.h"
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
 #include "server/sim/world.h"
@@ -30,6 +31,11 @@ struct pal_world {
     pal_err row_err;       /* of the first row that failed in this step */
     pal_field_rows fields; /* put in while the world runs */
     pal_brush_rows brushes;
+    pal_ease_rows eases;
 };
+
+/* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact: for those who look between
+ * steps */
+pal_err pal_world_pull(pal_world *world, int body);
 
 #endif

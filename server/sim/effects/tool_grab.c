@@ -16,6 +16,8 @@
  * so tissue follows a faster tool late. Where caps leave less than the spring's force, it becomes a constant force and
  * the solver goes round once more (pal_tangent.settle).
  *
+ * Another body in this one's place (hand): weights go to the nodes around, o changes so that the force stays.
+ *
  * On a body that adapts (sim/shell.h) weights go with the masses of the nodes as well, so that fine and coarse parts of
  * the patch come along alike, and a grip goes on when nodes come and go: a new midpoint weighs as its edge's ends do in
  * the mean, one that goes leaves the others their weights, and its own to the ends of its edge where neither was held.
@@ -36,6 +38,7 @@
 #include "server/sim/touch.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define ALPHA        0.25
@@ -63,6 +66,12 @@ typedef struct live_grip {
     double y[3], shift[3], k_N_m, dt_s; /* patch and spring in the sub-step before        */
     bool renewed;                       /* other nodes since then                         */
 } live_grip;
+
+/* a grip that was handed over: its patch then, force on tissue */
+typedef struct handed {
+    bool due;
+    double y[3], force_N[3], k_N_m;
+} handed;
 
 typedef struct grip {
     bool held, button; /* has tissue; button in the last step                              */
@@ -94,7 +103,8 @@ typedef struct tool_grab {
     double *gather;     /* weights of a new grab [n_node], 0 between grabs */
     double asked_N_m, damping_s, asked_reach_m;
     double young_Pa, poisson;
-    in_use *use; /* bodies that adapt only, else NULL */
+    in_use *use;    /* bodies that adapt only, else NULL */
+    handed *handed; /* heap, after hand; else NULL [n_tool] */
 } tool_grab;
 
 static double reach_m(const tool_grab *grab, const pal_tool *tool)
@@ -121,6 +131,11 @@ static void let_go(tool_grab *grab, grip *g)
     for (int i = 0; i < g->n_node; i++) grab->sum_weight[g->node[i]] -= g->weight[i];
     g->n_node = 0;
     g->held = g->pulls = false;
+}
+
+static void destroy(void *self)
+{
+    free(((tool_grab *)self)->handed);
 }
 
 static void reset(void *self, const pal_body *body)
@@ -261,6 +276,7 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     pal_sub3(last, tool->last.position_m, body->offset_m);
     if (!close_on(grab, body, last, reach)) return;
     take_gathered(grab, g, body);
+    if (grab->handed) grab->handed[g - grab->grip].due = false;
     patch_place(g, body, y, v);
     double back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
     pal_sub3(g->offset, y, last);
@@ -348,8 +364,55 @@ static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal
     if (pressed && !g->held) take_hold(grab, g, tool, body);
 }
 
-/* what the patch weighs at least, where points carry its nodes: W' C W <= sum W_i C_ii; shared by the tools that hold
- * some of it */
+static void hand(void *self, const pal_body *body, const void *before, const pal_body *from,
+                 const pal_point_rows *place)
+{
+    tool_grab *grab = self;
+    const tool_grab *old = before;
+    if (!grab->handed) grab->handed = calloc((size_t)grab->n_tool, sizeof *grab->handed);
+    for (int t = 0; t < grab->n_tool && t < old->n_tool && grab->handed; t++) {
+        const grip *b = &old->grip[t];
+        grip *g = &grab->grip[t];
+        handed *h = &grab->handed[t];
+        g->button = b->button;
+        for (int i = 0; i < b->n_node && b->held; i++) {
+            const double weight = b->live ? b->live->even[i] : b->weight[i];
+            if (!place) grab->gather[b->node[i]] += weight;
+            for (int32_t k = place ? place->start[b->node[i]] : 0; place && k < place->start[b->node[i] + 1]; k++)
+                grab->gather[place->point[k]] += weight * fmax(0, place->weight[k]);
+        }
+        if (!b->held) continue;
+        take_gathered(grab, g, body);
+        pal_copy3(g->offset, b->offset), pal_copy3(g->last_m, b->last_m), pal_copy3(g->last_N, b->last_N);
+        g->xx = b->xx, g->xf = b->xf, g->k_start_N_m = b->k_start_N_m, g->k_felt_N_m = b->k_felt_N_m;
+        patch_place(b, from, h->y, h->force_N);
+        pal_scale3(h->force_N, -1, b->force);
+        h->k_N_m = b->firm ? b->firm->k_N_m : 0;
+        g->held = h->due = g->n_node > 0;
+    }
+}
+
+/* o of a grip that was handed over, for the same force; held back besides (caps, haste) only where that is no jump */
+static void hold_on(const tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body, double k_N_m)
+{
+    handed *h = grab->handed ? &grab->handed[g - grab->grip] : NULL;
+    double goal[3], y[3], back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
+    if (!h || !h->due || !(k_N_m > 0)) return;
+    h->due = false;
+    patch_place(g, body, y, goal);
+    pal_quat_rotate(goal, tool->last.quat, g->offset);
+    pal_sub3(goal, goal, h->y);
+    if (g->firm && h->k_N_m > 0)
+        pal_axpy3(goal, -1 / h->k_N_m, h->force_N);
+    else
+        pal_sub3(goal, body->offset_m, tool->last.position_m);
+    pal_add3(goal, goal, y);
+    pal_axpy3(goal, 1 / k_N_m, h->force_N);
+    pal_quat_rotate(g->offset, back, goal);
+    if (g->firm) g->firm->stretch_m = pal_norm3(h->force_N) / k_N_m;
+}
+
+/* what the patch weighs at least, where points carry its nodes: W' C W <= sum W_i C_ii; shared by tools that hold it */
 static double patch_mass(const tool_grab *grab, const grip *g, const pal_body *body)
 {
     double ease_1_kg = 0;
@@ -404,10 +467,11 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     double y[3], v[3], goal[3], force[3];
     find_limits(grab, g, body, step->dt_s);
     patch_place(g, body, y, v);
+    double k = spring_N_m(grab, g, tool);
+    hold_on(grab, g, tool, body, tool->ramp * k);
     pal_quat_rotate(goal, tool->next.quat, g->offset);
     pal_add3(goal, goal, tool->here_m);
     pal_sub3(goal, goal, body->offset_m);
-    double k = spring_N_m(grab, g, tool);
     if (g->live) keep_force(g, tool, y, v, k, step->dt_s, goal);
     double c = fmin(k * grab->damping_s, g->c_most_Ns_m);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
@@ -437,11 +501,12 @@ static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *
     pal_body *body = step->body;
     double y[3], v[3], goal[3], rise = RISE_S * body->size_m / step->n_sub;
     patch_place(g, body, y, v);
+    g->firm->k_N_m = tool->ramp * stiffness_N_m(grab, reach_m(grab, tool));
+    hold_on(grab, g, tool, body, g->firm->k_N_m);
     pal_quat_rotate(goal, tool->next.quat, g->offset);
     pal_add3(goal, goal, tool->here_m);
     pal_sub3(goal, goal, body->offset_m);
     pal_sub3(goal, goal, y);
-    g->firm->k_N_m = tool->ramp * stiffness_N_m(grab, reach_m(grab, tool));
     double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), most = g->firm->stretch_m + rise, weight = 0;
     for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / weight);
@@ -481,27 +546,9 @@ static void find_give(grip *g, const pal_tool *tool, pal_step *step)
     pal_arena_return(step->scratch, used);
 }
 
-/* K = (C + 1/k)^-1; false: not known */
 static bool felt(const grip *g, double k_N_m, double K[6])
 {
-    double c[3][3], minor[3][3];
-    if (!g->firm || g->firm->n_give == 0 || !(k_N_m > 0)) return false;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            c[i][j] =
-                i < g->firm->n_give && j < g->firm->n_give ? 0.5 * (g->firm->give[i][j] + g->firm->give[j][i]) : 0;
-            if (i == j) c[i][j] = (i < g->firm->n_give ? c[i][i] : g->firm->give[0][0]) + 1 / k_N_m;
-        }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
-            minor[i][j] = c[a][p] * c[b][q] - c[a][q] * c[b][p];
-        }
-    double det = pal_dot3(c[0], minor[0]);
-    if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
-    const int place[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
-    for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
-    return isfinite(det);
+    return g->firm && pal_patch_series(g->firm->give, g->firm->n_give, k_N_m, K);
 }
 
 /* the bilateral part for a haptic bridge, in the last sub-step */
@@ -641,4 +688,6 @@ const pal_effect pal_effect_tool_grab = {.name = "tool_grab",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
+                                         .hand = hand,
+                                         .destroy = destroy,
                                          .tangent = &tangent};

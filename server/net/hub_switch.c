@@ -1,0 +1,117 @@
+/* Orders for another setting at the hub (protocol/README.md, "Settings"): a point of the study, or a knob turned.
+ * Made and put in place by hub_works.c. */
+#include "server/net/hub_works.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct verb {
+    const char *name, *args;
+} verbs[] = {{"point", "index"}, {"knob", "| size step_ms tolerance"}, {NULL, NULL}};
+
+static const struct verb *find_verb(const char *name)
+{
+    const struct verb *v = verbs;
+    while (v->name && strcmp(v->name, name)) v++;
+    return v->name ? v : NULL;
+}
+
+/* the body named; "": that of the study, or the first. -1: complained */
+static int find_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    const pal_scene *scene = pal_session_scene(c->room->session);
+    if (!order->target[0]) return c->room->setting ? c->room->setting_body : 0;
+    for (int b = 0; b < scene->n_body; b++)
+        if (!strcmp(scene->body[b].name, order->target)) return b;
+    pal_hub_complain(hub, c, "target", "there is no body %s", order->target);
+    return -1;
+}
+
+/* a point of the room's study; false: complained */
+static bool read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_setting *to)
+{
+    const pal_hub_room *room = c->room;
+    double index = pal_hub_arg(order, "index")->value;
+    if (!room->setting || body != room->setting_body) {
+        pal_hub_complain(hub, c, "refused", "point: there is no study of %s here",
+                         pal_session_scene(room->session)->body[body].name);
+        return false;
+    }
+    if (!(index >= 0 && index < room->n_setting && index == floor(index))) {
+        pal_hub_complain(hub, c, "args", "point: index %g, wanted 0 to %d", index, room->n_setting - 1);
+        return false;
+    }
+    *to = room->setting[(int)index].setting;
+    return true;
+}
+
+/* the present setting with other numbers; false: complained */
+static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_setting *to)
+{
+    const pal_wire_arg *size = pal_hub_arg(order, "size"), *step = pal_hub_arg(order, "step_ms"),
+                       *tolerance = pal_hub_arg(order, "tolerance");
+    pal_setting_of(pal_session_scene(c->room->session), body, to);
+    if (size && !(size->value >= -1 && size->value <= 10000 && size->value == floor(size->value))) {
+        pal_hub_complain(hub, c, "args", "knob: size %g is no number of voxels or levels", size->value);
+        return false;
+    }
+    if (size && size->value != 0) to->size = (int)size->value;
+    if (step && step->value != 0) to->step_s = 1e-3 * step->value;
+    if (tolerance && tolerance->value != 0) to->tolerance = tolerance->value;
+    return true;
+}
+
+bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_work *to, int *body)
+{
+    const pal_scene *scene = pal_session_scene(c->room->session);
+    *body = to->body = find_body(hub, c, order);
+    if (*body < 0) return false;
+    bool good = !strcmp(order->verb, "point") ? read_point(hub, c, *body, order, &to->setting)
+                                              : read_knob(hub, c, *body, order, &to->setting);
+    if (!good) return false;
+    to->was = hub->works->place[c->room - hub->room][*body].base;
+    if (to->was) return true;
+    /* its first switch: what it can come back to is what it is now */
+    to->base = malloc(sizeof *to->base);
+    if (to->base) *to->base = scene->body[*body];
+    to->was = to->base;
+    if (!to->base) pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, pal_err_text(PAL_ERR_MEMORY));
+    return to->base != NULL;
+}
+
+void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
+{
+    const char *verb = hub->works->now.order.verb;
+    const pal_switch_report *r = &work->report;
+    char text[PAL_SETTING_TEXT];
+    pal_setting now;
+    double change = r->energy_before_J > 0 ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
+    double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns);
+    pal_setting_of(pal_session_scene(c->room->session), work->body, &now);
+    pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
+    snprintf(a->text, sizeof a->text, "%s: %s; energy %+.2f %%, moved %.3g mm, made in %.0f ms", verb,
+             pal_setting_text(&now, text), change, 1e3 * r->most_move_m, made_ms);
+    pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
+    pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
+    pal_hub_answer_arg(a, "energy_percent", change);
+    pal_hub_answer_arg(a, "most_move_m", r->most_move_m);
+    pal_hub_answer_arg(a, "made_ms", made_ms);
+    pal_hub_say(hub, c, hub->control);
+}
+
+bool pal_hub_switch_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+{
+    const struct verb *v = find_verb(order->verb);
+    if (!v) return false;
+    if (!pal_hub_works_may(hub, c, v->name, "changes settings") || !pal_hub_args_good(hub, c, v->args, order))
+        return true;
+    if (order->n_arg == 0)
+        pal_hub_complain(hub, c, "args", "%s takes %s", v->name, v->args + 2);
+    else if (!pal_hub_works_make(hub))
+        pal_hub_complain(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
+    else
+        pal_hub_works_wait(hub, c, PAL_WORK_SWITCH, order);
+    return true;
+}

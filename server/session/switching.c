@@ -1,0 +1,73 @@
+/* Live switches: a scene made by pal_setting_make, and a transfer to it from the one that runs. */
+#include "server/session/switching.h"
+
+#include <stdlib.h>
+
+struct pal_switch {
+    pal_scene from; /* what the new scene is made of */
+    pal_set_scene *set;
+    pal_transfer *transfer;
+    pal_transfer_report report;
+};
+
+static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
+                       pal_note *note, pal_switch *s)
+{
+    pal_setting now, next;
+    if (body < 0 || body >= scene->n_body)
+        return pal_note_set(note, PAL_ERR_REFUSED, "there is no body %d to be switched", body);
+    s->from = *scene;
+    if (base) {
+        s->from.body[body] = *base;
+        s->from.body[body].material = scene->body[body].material;
+    }
+    PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
+    pal_setting_of(scene, body, &now);
+    pal_setting_of(&s->set->scene, body, &next);
+    if (pal_setting_same(&now, &next)) {
+        char text[PAL_SETTING_TEXT];
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" is as wanted already: %s", scene->body[body].name,
+                            pal_setting_text(&now, text));
+    }
+    return pal_transfer_make(scene, &s->set->scene, body, note, &s->transfer);
+}
+
+pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
+                           pal_note *note, pal_switch **out)
+{
+    pal_switch *s = calloc(1, sizeof *s);
+    pal_err err = s ? prepare(scene, base, body, to, note, s) : PAL_ERR_MEMORY;
+    if (err)
+        pal_switch_free(s);
+    else
+        *out = s;
+    return err;
+}
+
+const pal_scene *pal_switch_scene(const pal_switch *change)
+{
+    return &change->set->scene;
+}
+
+void pal_switch_carry(void *change, pal_world *next, const pal_world *before)
+{
+    pal_switch *s = change;
+    pal_transfer_carry(s->transfer, next, before, &s->report);
+}
+
+void pal_switch_report_of(const pal_switch *change, pal_switch_report *out)
+{
+    const pal_transfer_report *r = &change->report;
+    *out = (pal_switch_report){.energy_before_J = r->energy_before_J,
+                               .energy_after_J = r->energy_after_J,
+                               .most_move_m = r->most_move_m,
+                               .scale = r->scale};
+}
+
+void pal_switch_free(pal_switch *change)
+{
+    if (!change) return;
+    pal_transfer_free(change->transfer);
+    pal_set_scene_free(change->set);
+    free(change);
+}

@@ -1,0 +1,49 @@
+/* The state of a body goes over to another model or mesh of the same organ, between two steps of a running world
+ * (numerics.md part 3, "live switch of method or resolution").
+ *
+ * Places. Nodes of the new body are looked for in the elements of the old one at rest (mesh/locate.h; outside them the
+ * nearest element goes on by one element at most) and take displacement and velocity by its shape functions. Of a solid
+ * the elements are its subdivided cells as tetrahedra, and its control points are those that put the nodes there with
+ * the least squares (numerics.md part 1 A), by conjugate gradients with a small pull to rest. Two solids of the same
+ * control cells share their points to the bit; of two adaptive surfaces of one organ the new one refines where the old
+ * one has, as far as it can.
+ * Forces go the other way: those on old nodes are shared out to the new ones around them, so that no net force or
+ * moment is lost; where the new mesh is the finer one they go as accelerations, so that they do not gather in few
+ * nodes.
+ *
+ * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
+ * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),
+ * until the elastic energy is what it was, or 40 times; what is left is made up for by the length of the displacement
+ * from rest (of a body that nothing holds, from its best rigid place) and of the velocity. A body that rests under a
+ * load with the same elastic energy stands about half way between where it rested before and where it will: a point
+ * moves by half of what the methods differ in, which is less than the sum of their errors. The other half is let go as
+ * the difference of all forces goes out (ease.h). Momentum: a body that nothing holds keeps momentum and spin of
+ * before; what they ask for of the kinetic energy they have (equal masses: the same).
+ *
+ * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
+ * tool holds (pal_effect.hand). Contact begins anew where it is, brushes are over. Thread: one at a time. */
+#ifndef PAL_SIM_TRANSFER_H
+#define PAL_SIM_TRANSFER_H
+#include "server/sim/world.h"
+
+typedef struct pal_transfer pal_transfer;
+
+typedef struct pal_transfer_report {
+    /* kinetic energy and that of elastic rows, of the whole world; loads and gravity are not in it */
+    double energy_before_J, energy_after_J;
+    double interpolated_J; /* as interpolation alone would have it */
+    double most_move_m;    /* of a shown vertex */
+    int n_smooth;          /* rounds of smoothing that it took */
+    double scale;          /* of the displacement, 1: as interpolated and smoothed */
+} pal_transfer_report;
+
+/* What the carry needs, found beforehand: where every node of the body in scene `to` lies in that in `from` and the
+ * other way round, and memory. REFUSED: an adaptive surface and another model, or two of different surfaces; what the
+ * models say; MEMORY. Borrows nothing. [load] */
+pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, pal_transfer **out);
+void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
+/* `next`, a new world of `to`, goes on where `before`, one of `from`, is. Both stand still; the forces in before are
+ * worked out anew, its state is as it was. Deterministic. Heap memory for row `ease`; where there is none, the forces
+ * change at once. [sim] */
+void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
+#endif

@@ -1,0 +1,21 @@
+/* What transfer.c and transfer_carry.c share. Private to these. */
+#ifndef PAL_SIM_TRANSFER_PARTS_H
+#define PAL_SIM_TRANSFER_PARTS_H
+#include "server/sim/transfer.h"
+
+struct pal_transfer {
+    int body;
+    bool shell;           /* both adapt: rows are made when the new state is known    */
+    bool same_points;     /* both are solids of the same control cells                */
+    pal_point_rows in;    /* nodes of the new body by those of the old one            */
+    pal_point_rows back;  /* nodes of the old body by those of the new one            */
+    int n_from, n_to;     /* nodes                                                    */
+    int n_dof;            /* points of the new body                                   */
+    double *x, *v;        /* new points                                 [n_dof][3]    */
+    double *place, *rate; /* new nodes                                  [n_to][3]     */
+    double *pull;         /* what shall pull on them, N                 [n_to][3]     */
+    double *bound;        /* of stiffness; work                         [n_to]        */
+    double *work[5];      /* of least squares                           [n_dof][3]    */
+    double *old;          /* work                                       [n_from][3]   */
+};
+#endif

@@ -1,0 +1,332 @@
+/* A live switch (sim/transfer.h) in detail: momentum, forces that are let go, hashes, drift, grips, loads, levels of
+ * surfaces, refusals. --table prints figures. */
+#include "server/sim/ease.h"
+#include "tests/stability/switch_beam.h"
+
+/* ---- one pair in detail ---- */
+
+static pal_transfer *make_transfer(const beam *b, int i, int j)
+{
+    pal_transfer *x = NULL;
+    pal_note note = {""};
+    if (pal_transfer_make(&b->set[i]->scene, &b->set[j]->scene, 0, &note, &x)) CHECK_FAIL("%s", note.text);
+    return x;
+}
+
+/* momentum and spin about the origin */
+static void momenta(const pal_body *b, double p[3], double l[3])
+{
+    pal_set3(p, 0, 0, 0);
+    pal_set3(l, 0, 0, 0);
+    for (int i = 0; i < b->n_dof; i++) {
+        double turn[3];
+        pal_cross3(turn, b->x + 3 * i, b->v + 3 * i);
+        pal_axpy3(p, b->mass_kg[i], b->v + 3 * i);
+        pal_axpy3(l, b->mass_kg[i], turn);
+    }
+}
+
+/* a free body, turned by a radian, stretched and bent, flies, spins and swings: momentum and spin stay, at the switch
+ * and while the difference of forces is let go */
+static void a_free_body_keeps_its_momentum(void)
+{
+    const double c = cos(1), s = sin(1);
+    beam b;
+    begin(&b, false, false, 0);
+    for (int k = 0; k < 2; k++) {
+        pal_setting exact = full[k];
+        exact.tolerance = 1e-9;
+        add_setting(&b, &exact);
+    }
+    add_setting(&b, &full[6]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            if (i == j) continue;
+            pal_world *w = open_world(&b.set[i]->scene), *next = open_world(&b.set[j]->scene);
+            pal_body *body = pal_world_body(w, 0);
+            for (int k = 0; k < body->n_dof; k++) {
+                double *x = body->x + 3 * k, *v = body->v + 3 * k, y[3];
+                pal_set3(y, 1.05 * x[0], x[1], x[2] + 2 * (x[0] - 0.1) * (x[0] - 0.1));
+                pal_set3(x, c * y[0] - s * y[1], s * y[0] + c * y[1], y[2]);
+                pal_set3(v, 0.3 - 2 * x[1], 2 * x[0], -0.1 + 3 * (y[0] - 0.1) * (y[0] - 0.1));
+            }
+            pal_world_moved(w, 0);
+            step(w, 1.0 / 240, 2);
+            double p[3], l[3], q[3], m[3];
+            pal_transfer *x = make_transfer(&b, i, j);
+            pal_transfer_report r;
+            momenta(body, p, l);
+            pal_transfer_carry(x, next, w, &r);
+            momenta(pal_world_body(next, 0), q, m);
+            CHECK_LE(pal_dist3(p, q), 1e-9 * pal_norm3(p));
+            CHECK_LE(pal_dist3(l, m), 1e-9 * pal_norm3(l));
+            CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+            step(next, 1.0 / 240, 15);
+            momenta(pal_world_body(next, 0), q, m);
+            CHECK_LE(pal_dist3(p, q), 1e-6 * pal_norm3(p));
+            pal_transfer_free(x);
+            pal_world_destroy(w), pal_world_destroy(next);
+        }
+    end(&b);
+}
+
+/* the difference of forces is a row that lasts 10 steps, makes up for all of it at first, and leaves nothing */
+static void forces_are_let_go_over_ten_steps(void)
+{
+    beam b;
+    double still[3], move[3], speed[3];
+    begin(&b, false, true, 25);
+    add_setting(&b, &full[1]), add_setting(&b, &full[6]);
+    pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+    pal_transfer *x = make_transfer(&b, 0, 1);
+    pal_transfer_report r;
+    step(w, 1.0 / 60, 90);
+    int n_row = pal_world_rows(next);
+    size_t n_byte = pal_world_bytes(next);
+    uint64_t rest = pal_world_hash(next);
+    pal_transfer_carry(x, next, w, &r);
+    CHECK(pal_world_hash(next) != rest);
+    CHECK_INT(pal_world_rows(next), n_row + 1);
+    tip_of(next, still, speed);
+    step(next, 1.0 / 60, 1);
+    tip_of(next, move, speed);
+    /* what rested goes on resting: without the row the first step would be some 30 times as long */
+    CHECK_LE(pal_dist3(move, still), 2e-3 * pal_norm3(still));
+    step(next, 1.0 / 60, PAL_EASE_STEPS - 2);
+    CHECK_INT(pal_world_rows(next), n_row + 1);
+    step(next, 1.0 / 60, 1);
+    CHECK_INT(pal_world_rows(next), n_row);
+    CHECK_INT(pal_world_bytes(next), n_byte);
+    /* and it comes to rest where the new method has it rest */
+    step(next, 1.0 / 60, 80);
+    tip_of(next, move, speed);
+    CHECK_NEAR(move[2], find_rest(&b.set[1]->scene), 1e-3 * fabs(move[2]));
+    /* a reset ends it at once */
+    pal_transfer_carry(x, next, w, &r);
+    pal_world_reset(next);
+    pal_world_tidy(next);
+    CHECK_INT(pal_world_rows(next), n_row);
+    CHECK(pal_world_hash(next) != 0);
+    pal_transfer_free(x);
+    pal_world_destroy(w), pal_world_destroy(next);
+    end(&b);
+}
+
+/* the same switch gives the same bits, at once and later */
+static void the_same_switch_gives_the_same_hash(void)
+{
+    beam b;
+    uint64_t hash[2][2];
+    begin(&b, false, true, 2);
+    add_setting(&b, &full[5]), add_setting(&b, &full[1]);
+    for (int k = 0; k < 2; k++) {
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1);
+        pal_transfer_report r;
+        (void)disturb(w, 1.0 / 60);
+        pal_transfer_carry(x, next, w, &r);
+        hash[k][0] = pal_world_hash(next);
+        step(next, 1.0 / 60, 15);
+        hash[k][1] = pal_world_hash(next);
+        pal_transfer_free(x);
+        pal_world_destroy(w), pal_world_destroy(next);
+    }
+    CHECK(hash[0][0] == hash[1][0] && hash[0][1] == hash[1][1] && hash[0][0] != hash[0][1]);
+    end(&b);
+}
+
+/* 50 times there and back, `rest` steps between; the energy of every switch, and where the tip is */
+static void go_round(int first, int second, int n, int rest, double drift)
+{
+    beam b;
+    begin(&b, false, true, 8);
+    add_setting(&b, &full[first]), add_setting(&b, &full[second]);
+    pal_transfer *x[2] = {make_transfer(&b, 0, 1), make_transfer(&b, 1, 0)};
+    pal_world *w = open_world(&b.set[0]->scene);
+    pal_transfer_report r;
+    step(w, 1.0 / 60, 60);
+    double least = INFINITY, most = -INFINITY, begin_J = 0, z = tip_z(w);
+    for (int k = 0; k < n; k++) {
+        pal_world *next = open_world(&b.set[(k + 1) % 2]->scene);
+        pal_transfer_carry(x[k % 2], next, w, &r);
+        CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+        if (k == 0) begin_J = r.energy_before_J;
+        step(next, 1.0 / 60, rest);
+        least = fmin(least, tip_z(next)), most = fmax(most, tip_z(next));
+        pal_world_destroy(w);
+        w = next;
+    }
+    if (table)
+        printf("  %d switches, %d steps between: tip %.2f, then %.2f to %.2f mm, energy %.4f of the first\n", n, rest,
+               1e3 * z, 1e3 * least, 1e3 * most, r.energy_after_J / begin_J);
+    CHECK_LE(fabs(least - z), drift * fabs(z));
+    CHECK_LE(fabs(most - z), drift * fabs(z));
+    if (rest == 0) CHECK_NEAR(r.energy_after_J / begin_J, 1, 0.02);
+    for (int k = 0; k < 2; k++) pal_transfer_free(x[k]);
+    pal_world_destroy(w);
+    end(&b);
+}
+
+static void there_and_back_fifty_times(void)
+{
+    /* without a step between: no force has had time to be let go, and shapes go to and fro between methods */
+    go_round(0, 5, 20, 0, 0.5);
+    go_round(0, 5, 100, 2, 0.25);
+}
+
+/* a tool that pulls the tip up goes on holding it: no other force, no other place */
+static void tools_hold_on(void)
+{
+    const int pair[4][2] = {{0, 1}, {0, 6}, {6, 0}, {6, 5}};
+    for (int n = 0; n < 4; n++) {
+        beam b;
+        begin(&b, false, true, 20);
+        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1);
+        pal_transfer_report r;
+        step(w, 1.0 / 60, 60);
+        for (int k = 0; k < 100; k++) {
+            double up = k < 15 ? 0 : k < 55 ? 0.0002 * (k - 15) : 0.008;
+            pal_pose p = at(0.19, 0.025, 0.005 + up, k >= 2);
+            pal_world_pose(w, 0, &p);
+            step(w, 1.0 / 60, 1);
+        }
+        const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0];
+        double force[3], z = tip_z(w);
+        pal_copy3(force, before->mean_force_N);
+        CHECK(before->holding && pal_norm3(force) > 0.3);
+        pal_transfer_carry(x, next, w, &r);
+        step(next, 1.0 / 60, 1);
+        CHECK(after->holding);
+        if (table)
+            printf("  grip: %.3f -> %.3f N, tip %.2f -> %.2f mm\n", force[2], after->mean_force_N[2], 1e3 * z,
+                   1e3 * tip_z(next));
+        CHECK_LE(pal_dist3(after->mean_force_N, force), 0.1 * pal_norm3(force));
+        CHECK_LE(fabs(tip_z(next) - z), 0.1 * 0.008);
+        /* and goes where it would have gone, by a part of the way that the tool led it */
+        step(w, 1.0 / 60, 60);
+        step(next, 1.0 / 60, 60);
+        CHECK(after->holding);
+        CHECK_LE(fabs(tip_z(next) - tip_z(w)), 0.25 * 0.008);
+        /* and lets go */
+        pal_pose p = at(0.19, 0.025, 0.045, 0);
+        pal_world_pose(next, 0, &p);
+        step(next, 1.0 / 60, 1);
+        CHECK(!after->holding);
+        pal_transfer_free(x);
+        pal_world_destroy(w), pal_world_destroy(next);
+        end(&b);
+    }
+}
+
+/* lasting loads: their sum and what they turn by stay, and so does where the body rests */
+static void lasting_loads_stay(void)
+{
+    beam b;
+    begin(&b, false, true, 25);
+    add_setting(&b, &full[0]), add_setting(&b, &full[1]);
+    pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+    pal_transfer *x = make_transfer(&b, 0, 1);
+    pal_transfer_report r;
+    pal_body *from = pal_world_body(w, 0), *to = pal_world_body(next, 0);
+    double sum[2][3] = {{0}}, turn[2][3] = {{0}};
+    for (int i = 0; i < from->n_node; i++)
+        if (from->x_rest[3 * i] > LENGTH - 1e-6) pal_world_load(w, 0, i, (double[3]){0.01, 0.02 * i, 0.05});
+    pal_transfer_carry(x, next, w, &r);
+    REQUIRE(to->outer != NULL);
+    for (int k = 0; k < 2; k++) {
+        const pal_body *body = k ? to : from;
+        for (int i = 0; i < body->n_node; i++) {
+            double t[3];
+            pal_cross3(t, body->x_rest + 3 * i, body->outer + 3 * i);
+            pal_add3(sum[k], sum[k], body->outer + 3 * i);
+            pal_add3(turn[k], turn[k], t);
+        }
+    }
+    CHECK_LE(pal_dist3(sum[0], sum[1]), 1e-9 * pal_norm3(sum[0]));
+    CHECK_LE(pal_dist3(turn[0], turn[1]), 1e-9 * pal_norm3(turn[0]));
+    pal_transfer_free(x);
+    pal_world_destroy(w), pal_world_destroy(next);
+    end(&b);
+}
+
+/* an adaptive surface that is refined where it was poked: more levels and fewer */
+static void surfaces_go_between_levels(void)
+{
+    const int level[3] = {2, 3, 1};
+    beam b;
+    begin(&b, false, true, 2);
+    pal_prepared surface;
+    REQUIRE(!pal_prepared_surface(&b.mesh.surface, &surface));
+    b.scene->body[0].mesh = &surface;
+    pal_item_init(&b.scene->body[0].model, "model", "adaptive_springs");
+    pal_item_put_number(&b.scene->body[0].model, "thickness_m", 0.01, NULL);
+    for (int i = 0; i < 3; i++) add_setting(&b, &(pal_setting){.model = "adaptive_springs", .size = level[i]});
+    for (int i = 0; i < 3; i++) {
+        pal_world *w = open_world(&b.set[i]->scene);
+        (void)disturb(w, 1.0 / 60);
+        for (int j = 0; j < 3; j++) {
+            if (i == j) continue;
+            pal_world *next = open_world(&b.set[j]->scene);
+            pal_transfer *x = make_transfer(&b, i, j);
+            pal_transfer_report r;
+            double z = tip_z(w);
+            pal_transfer_carry(x, next, w, &r);
+            if (table)
+                printf("  levels %d -> %d: %d -> %d nodes, energy %+.1f %%, %+.3f %%, moved %.3f mm, tip %.2f -> %.2f "
+                       "mm\n",
+                       level[i], level[j], pal_world_body(w, 0)->n_active, pal_world_body(next, 0)->n_active,
+                       100 * (r.interpolated_J / r.energy_before_J - 1),
+                       100 * (r.energy_after_J / r.energy_before_J - 1), 1e3 * r.most_move_m, 1e3 * z,
+                       1e3 * tip_z(next));
+            CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+            /* more levels: the same surface to the bit */
+            if (level[j] > level[i]) CHECK_INT(pal_world_body(next, 0)->n_active, pal_world_body(w, 0)->n_active);
+            if (level[j] > level[i]) CHECK_LE(r.most_move_m, 1e-3 * WIDTH);
+            step(next, 1.0 / 60, 12);
+            CHECK(pal_body_finite(pal_world_body(next, 0)) && !pal_world_body(next, 0)->frozen);
+            pal_transfer_free(x);
+            pal_world_destroy(next);
+        }
+        pal_world_destroy(w);
+    }
+    pal_prepared_free(&surface);
+    end(&b);
+}
+
+static void what_does_not_fit_is_refused(void)
+{
+    beam b;
+    begin(&b, false, true, 2);
+    add_setting(&b, &full[0]);
+    pal_scene *other = malloc(sizeof *other);
+    if (!other) abort();
+    *other = b.set[0]->scene;
+    pal_prepared surface;
+    REQUIRE(!pal_prepared_surface(&b.mesh.surface, &surface));
+    other->body[0].mesh = &surface;
+    pal_item_init(&other->body[0].model, "model", "adaptive_springs");
+    pal_item_init(&other->body[0].solver, "solver", "");
+    pal_note note = {""};
+    pal_transfer *x = NULL;
+    CHECK_INT(pal_transfer_make(&b.set[0]->scene, other, 0, &note, &x), PAL_ERR_REFUSED);
+    CHECK(!x && strstr(note.text, "adapts"));
+    pal_prepared_free(&surface);
+    free(other);
+    end(&b);
+}
+
+int main(int argc, char **argv)
+{
+    table = argc > 1 && !strcmp(argv[1], "--table");
+    RUN(a_free_body_keeps_its_momentum);
+    RUN(forces_are_let_go_over_ten_steps);
+    RUN(the_same_switch_gives_the_same_hash);
+    RUN(there_and_back_fifty_times);
+    RUN(tools_hold_on);
+    RUN(lasting_loads_stay);
+    RUN(surfaces_go_between_levels);
+    RUN(what_does_not_fit_is_refused);
+    return check_report();
+}
