@@ -29,9 +29,9 @@ static void steps(const pal_foresight *from, pal_estimate *out)
     double shrink = exp2(-from->solver_order);
     pal_setting to = from->setting;
     to.step_s = from->setting.step_s * 2;
-    if (to.step_s <= most_step_s) add(out, &to, out->ms, out->time_m * (1 / shrink - 1));
+    if (to.step_s <= most_step_s) add(out, &to, out->ms / 2, out->time_m * (1 / shrink - 1));
     to.step_s = from->setting.step_s / 2;
-    if (to.step_s >= least_step_s) add(out, &to, out->ms, out->time_m * (shrink - 1));
+    if (to.step_s >= least_step_s) add(out, &to, out->ms * 2, out->time_m * (shrink - 1));
 }
 
 static void tolerances(const pal_foresight *from, pal_estimate *out)

@@ -1,10 +1,11 @@
 /* The neighbours of a running body's setting: the next lower and higher choice on each knob, with what they are
  * foreseen to cost and to leave. Private to estimate_*.c. Thread: any.
  *
- * size: half and twice; a step's time goes with n^growth, n being 8 times the nodes, the part of discretisation with
- *   h^order. step (implicit solvers): half and twice; a step takes as long, the part of time goes with step^solver
- *   order. tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, the time by what a
- *   decade was measured to cost. */
+ * ms is what a step of the scene takes, as it is now (setting.h: a shorter step is priced by two of them).
+ * size: half and twice; time goes with n^growth, n being 8 times the nodes, the part of discretisation with h^order.
+ * step (implicit solvers): half and twice; each of them takes as long, the part of time goes with step^solver order.
+ * tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was
+ * measured to cost. */
 #ifndef PAL_SESSION_ESTIMATE_FORESEE_H
 #define PAL_SESSION_ESTIMATE_FORESEE_H
 #include "server/session/estimate.h"
