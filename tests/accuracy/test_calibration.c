@@ -6,6 +6,7 @@
 #include "server/mesh/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "tests/check.h"
+#include "tests/stability/hard_case.h"
 
 #include <float.h>
 
@@ -168,6 +169,10 @@ static void a_grid_finds_the_hard_half_of_the_cube(void)
     REQUIRE(calibrate(&e, 1, 8, grid, 60));
     medians(&e, median, &right);
     CHECK(homogeneous >= 5 * e.result.value.error_percent);
+    HARD_CASE_MISSED("poisson_static", "tet_springs", "soft on stiff, 3 constants fitted: RMS off finite elements",
+                     homogeneous, 3, "%");
+    HARD_CASE("poisson_static", "tet_springs", "soft on stiff, constants fitted on a grid: RMS off finite elements",
+              e.result.value.error_percent, 3, "%");
     CHECK(median[1] >= 8 * median[0]);
     CHECK(right >= 0.8);
     close_problem(&e);

@@ -8,6 +8,7 @@
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/sim/fem_beam.h"
+#include "tests/stability/hard_case.h"
 
 static const char *const elements[4] = {"hex8_bbar", "hex8", "tet4", "tet10"};
 static const char *const laws[3] = {"linear", "corotational", "neo_hookean"};
@@ -447,7 +448,7 @@ static void ten_thousand_turns_leave_no_energy(void)
                 if (k % 97 == 0 || k > n_step - 20) most = fmax(most, energy_now(&b));
             }
             CHECK(stretched > 0);
-            CHECK_LE(most, 1e-6 * stretched);
+            HARD_CASE("many_turns", "fem", "energy over that of 1 % strain", most / stretched, 1e-6, "");
             /* and the field is rigid: forces are gone too */
             pal_step now = {.body = b.body, .dt_s = 0.01};
             memset(b.body->f, 0, 3 * sizeof(double) * (size_t)b.body->n_node);

@@ -5,6 +5,7 @@
 #include "server/mesh/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "tests/check.h"
+#include "tests/stability/hard_case.h"
 
 typedef struct row {
     const char *reference, *law, *element;
@@ -32,6 +33,8 @@ static pal_problem *open_problem(const char *folder, pal_surface *surface)
     free(problem);
     return NULL;
 }
+
+static bool on_record; /* in the table of hard cases: the cube of nu 0.499 */
 
 static void check_row(const pal_problem *problem, const pal_surface *surface, const row *r)
 {
@@ -63,6 +66,11 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     printf("  %-13s %-12s %-9s %6d nodes: RMS %6.3f %% (at most %g), largest %6.3f %%\n", r->reference, r->law,
            r->element, result.n_node, rms, r->rms_percent, most);
     CHECK_LE(rms, r->rms_percent);
+    if (on_record && !strcmp(r->element, "hex8_bbar"))
+        HARD_CASE("poisson_static", "fem", "soft on stiff, 729 and 4,913 nodes: RMS off the reference", rms, 3, "%");
+    else if (on_record)
+        HARD_CASE_MISSED("poisson_static", "fem", "elements that are not the default (tet4, hex8): the same", rms, 3,
+                         "%");
     if (r->n_node > 0) CHECK_INT(result.n_node, r->n_node);
     /* supports bear what the loads give */
     for (int c = 0; c < 3; c++)
@@ -76,6 +84,7 @@ static void check_rows(const char *folder, const row *r, int n)
 {
     pal_surface surface = {0};
     pal_problem *problem = open_problem(folder, &surface);
+    on_record = !strcmp(folder, "cube");
     for (int i = 0; i < n && problem; i++) check_row(problem, &surface, &r[i]);
     pal_surface_free(&surface);
     free(problem);

@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/num/random.h"
 #include "tests/check.h"
+#include "tests/stability/hard_case.h"
 
 #include <float.h>
 
@@ -451,7 +452,8 @@ static void annealing_ends_as_it_is_told(void)
         CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &note), 0);
         CHECK_TEXT(r.ended, ended[turn]);
         CHECK_NEAR(r.start_percent, start, 0);
-        CHECK_LE(r.value.error_percent, start);
+        HARD_CASE("calibration", "tet_springs", "error over that of the start, however it ends",
+                  r.value.error_percent / start, 1, "");
         CHECK_INT(r.n_evaluation, t.n);
         if (turn == 0) CHECK(r.n_evaluation > 1 && r.value.error_percent <= 0.9 * start);
         if (turn == 1) CHECK_INT(r.n_evaluation, 7);
@@ -523,8 +525,11 @@ static void constants_without_a_rest_are_passed_over(void)
     for (int i = 0; i < 3; i++) b.theta[i] = b.info.low[i];
     CHECK_INT(pal_fit_anneal(b.c, &o, b.theta, &r, &note), 0);
     CHECK_NEAR(r.start_percent, DBL_MAX, 0);
-    CHECK(r.value.error_percent < 50);
     CHECK(r.n_rejected > 10 && r.n_rejected < 150);
+    HARD_CASE("calibration", "tet_springs",
+              "from a start without rest, candidates without rest on the way: error found", r.value.error_percent, 50,
+              "%");
+    HARD_CASE("calibration", "tet_springs", "evaluations", r.n_evaluation, o.most_evaluation, "");
     /* what is no constant at all */
     b.theta[1] = NAN;
     CHECK_INT(pal_calibration_evaluate(b.c, b.seat, b.theta, PAL_CALIBRATION_FIT, &v, slope, &note), PAL_ERR_NUMERIC);

@@ -3,6 +3,7 @@
 
 #include "server/mesh/cell_shapes.h"
 #include "tests/check.h"
+#include "tests/stability/hard_case.h"
 
 static pal_note note;
 
@@ -122,6 +123,8 @@ static void check_genus(const pal_cells *c, int piece, int sheet, int genus)
     CHECK_INT(t.n_piece, piece);
     CHECK_INT(t.n_sheet, sheet);
     CHECK_INT(t.n_cavity, sheet - piece);
+    HARD_CASE_ALL("cavities", "subdivision_fem", "pieces and hollows are as many as there are",
+                  t.n_piece == piece && t.n_cavity == sheet - piece, 1);
     CHECK_INT(t.genus, genus);
     CHECK_INT(t.sheet_euler, 2 * (sheet - genus));
     /* a solid's Euler number is half that of its boundary */
@@ -395,6 +398,8 @@ static void refused(pal_cell_loops l, const char *words)
     CHECK_INT(pal_cells_make(&l, &c, &note), PAL_ERR_REFUSED);
     CHECK_INT(c.n_vertex, -7);
     if (!strstr(note.text, words)) CHECK_TEXT(note.text, words);
+    HARD_CASE_ALL("broken_surface", "subdivision_fem", "no complex of cells, flat, NaN: refused by number",
+                  strstr(note.text, words) != NULL, 1);
     CHECK(!strchr(note.text, '\n'));
     CHECK_INT(pal_cells_make(&l, &c, NULL), PAL_ERR_REFUSED);
     pal_cell_loops_free(&l);

@@ -4,6 +4,7 @@
 #include "server/mesh/stomach.h"
 #include "tests/check.h"
 #include "tests/mesh/shapes.h"
+#include "tests/stability/hard_case.h"
 
 #include <time.h>
 
@@ -429,9 +430,10 @@ static void a_budget_is_kept(void)
 static void refused(pal_surface s, const char *word)
 {
     pal_note note;
-    CHECK_INT(make_with(&s, 3, 0, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, word) != NULL);
-    if (!strstr(note.text, word)) printf("  \"%s\" lacks \"%s\"\n", note.text, word);
+    const bool named = make_with(&s, 3, 0, &note) == PAL_ERR_REFUSED && strstr(note.text, word);
+    HARD_CASE_ALL("broken_surface", "adaptive_springs", "no manifold, turned over, flat, NaN: refused by number", named,
+                  1);
+    if (!named) printf("  \"%s\" lacks \"%s\"\n", note.text, word);
     pal_surface_free(&s);
 }
 

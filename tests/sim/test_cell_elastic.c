@@ -1,6 +1,7 @@
 /* Row cell_elastic, operator polar: subdivided solids' elements in their own frames (A 3.2-3.4), node by node. */
 #include "cell_bodies.h"
 #include "server/num/polar.h"
+#include "tests/stability/hard_case.h"
 
 static void feels_nothing_at_rest(void)
 {
@@ -380,7 +381,8 @@ static void shear_is_resisted_up_to_179_degrees(void)
                 rate[3 * i] = -s * x[0] + c * x[1], rate[3 * i + 1] = c * x[0] - s * x[1], rate[3 * i + 2] = 0;
             }
             double moment = cell_dot(cell_force(&b), rate, n);
-            CHECK(turn > 0 ? moment < 0 : moment > 0);
+            HARD_CASE_ALL("cell_angles", "subdivision_fem", "operator polar, 1 to 179 degrees: moment keeps its sign",
+                          turn > 0 ? moment < 0 : moment > 0, 1);
         }
         free(rate);
         cell_free(&b);

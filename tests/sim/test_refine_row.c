@@ -1,6 +1,7 @@
 /* Row refine: where, when and how often levels switch, and what a switch keeps. */
 #include "server/sim/refine_measure.h"
 #include "tests/sim/shells.h"
+#include "tests/stability/hard_case.h"
 
 static const double radius_m = 0.1;
 static const double pole[3] = {0, 0, 0.1}, south[3] = {0, 0, -0.1}, side[3] = {0.05, 0, 0.05}, none[3] = {0, 0, 0};
@@ -402,12 +403,14 @@ static double sweeps(int i)
 
 static void never_flickers(void)
 {
-    CHECK_LE(most_switches(at_threshold, 120, false), 1);
+    const char *const what = "most switches of a face in a second";
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(at_threshold, 120, false), 1, "");
     CHECK_INT(most_switches(around_threshold, 120, false), 1);
-    CHECK_LE(most_switches(around_both, 120, false), 5);
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(around_both, 120, false), 5, "");
     int worst = most_switches(on_and_off, 240, false);
     CHECK(worst >= 4 && worst <= 5);
-    CHECK_LE(most_switches(sweeps, 240, true), 5);
+    HARD_CASE("threshold", "adaptive_springs", what, worst, 5, "");
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(sweeps, 240, true), 5, "");
 }
 
 static void a_node_that_bears_a_lasting_load_is_not_taken_away(void)
@@ -594,8 +597,8 @@ static void a_switch_keeps_energy_mass_and_momentum(void)
         CHECK(w.n >= 4);
         /* without what the row does about it the test would show nothing */
         CHECK(w.raw > 0.05);
-        CHECK_LE(w.after, 0.01);
-        CHECK_LE(w.mass, 1e-12);
+        HARD_CASE("threshold", "adaptive_springs", "energy jumps at a switch by", 100 * w.after, 1, "%");
+        HARD_CASE("threshold", "adaptive_springs", "mass off by", w.mass, 1e-12, "");
         CHECK_LE(w.momentum, 1e-10);
         if (!stomach) CHECK_LE(w.turn, 1e-10);
     }

@@ -6,6 +6,7 @@
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
+#include "tests/stability/hard_case.h"
 
 static pal_note note;
 static uint64_t seed;
@@ -363,8 +364,8 @@ static void keeps_the_energy_of_an_undamped_body(void)
         n += pal_world_substeps(world);
     }
     printf("  energy within -%.2f %% and +%.2f %%\n", 100 * (1 - least / start), 100 * (most / start - 1));
-    CHECK_LE(most, 1.01 * start);
-    CHECK_LE(0.99 * start, least);
+    HARD_CASE("no_drag", "tet_springs", "20,000 sub-steps at half the limit: energy off the first",
+              100 * fmax(most / start - 1, 1 - least / start), 1, "%");
     pal_world_destroy(world);
     free(scene);
     box_free(&box);

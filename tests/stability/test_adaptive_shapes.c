@@ -1,6 +1,7 @@
 /* Odd surfaces as adaptive springs: whatever can be split bears being pressed, pulled, blown about, reset and run again
  * on changing levels, on both laws of stiffness and of mass; two such bodies do not see each other. */
 #include "tests/sim/shells.h"
+#include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60, MOST = 64 };
 
@@ -227,7 +228,11 @@ static void whatever_can_be_split_is_borne(void)
             CHECK(!s.body->frozen);
             /* a membrane of one triangle goes with its tool as it is */
             CHECK(a.most > a.least || (kind == TRIANGLE && !other));
-            CHECK_LE(a.mass_off, 1e-12);
+            HARD_CASE(kind == TWO_PIECES || kind == PIECE_AND_SHEET ? "pieces"
+                      : kind == TRIANGLE                            ? "one_element"
+                                                                    : "hanging",
+                      "adaptive_springs", "pressed, blown about on changing levels: mass off by", a.mass_off, 1e-12,
+                      "");
             /* a reset while levels, ramps and grips are under way is a new start, to the bit */
             for (int i = 0; i < 20; i++) {
                 pose_tools(&s, i);

@@ -2,8 +2,10 @@
  * all in a plane, on a point, mirrored, shuffled, blown up), it comes back to rest with no element turned over, its
  * state stays finite and its energy does not rise above what the insult put in. */
 #include "tests/stability/fem_hard.h"
+#include "tests/stability/hard_case.h"
 
 static pal_note note;
+static const char *const insult_cases[] = {"plane", "point", "mirror", "blown_up"};
 static const char *const insult_names[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
 
 static bool open_kind(fem_beam *b, const hard_kind *kind, int nx, int ny, int nz, double poisson)
@@ -29,7 +31,8 @@ static void an_element_that_is_turned_over_turns_back(void)
         printf("  %s: back after %.2f s, energy up to %.3f\n", hard_kinds[k].shown, run.back_s, run.most);
         CHECK(run.finite);
         CHECK_LE(run.most, 1.01);
-        CHECK_LE(run.back_s, 2);
+        HARD_CASE("inverted", "fem", "within 0.1 % S of rest after", run.back_s, 2, "s");
+        HARD_CASE("inverted", "fem", "energy over the insult's", run.most, 1.01, "");
         CHECK_INT(hard_inverted(&b), 0);
         beam_free(&b);
     }
@@ -54,10 +57,13 @@ static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
                 hard_steps(&b, most_s, 1.0 / 60, &run);
                 printf(" %s %.2f s (energy %.2f)", insult_names[insult], run.back_s, run.most);
                 CHECK(run.finite);
-                CHECK_LE(run.most, 1.01);
+                HARD_CASE(insult_cases[insult], "fem", "energy over the insult's", run.most, 1.01, "");
                 /* known to fail: a neo-Hookean tet4 body, hardly compressible, on a point stays folded on its split */
-                if (k == HARD_NEO_TET && q == 2 && insult == HARD_POINT) continue;
-                CHECK_LE(run.back_s, most_s);
+                if (k == HARD_NEO_TET && q == 2 && insult == HARD_POINT)
+                    HARD_CASE_MISSED("point", "fem", "tet4, neo-Hookean, nu 0.499: stays folded; at rest after",
+                                     run.back_s, most_s, "s");
+                else
+                    HARD_CASE(insult_cases[insult], "fem", "within 0.1 % S of rest after", run.back_s, most_s, "s");
             }
             printf("\n");
             beam_free(&b);
@@ -85,8 +91,8 @@ static void shuffled_bodies_come_back_for_every_seed(void)
             }
             printf("  %-11s nu %.3f: %d of %d back, the last after %.2f s; energy up to %.3f, largest rise %.2g\n",
                    hard_kinds[k].shown, poisson[q], back, n, last, most, rise);
-            CHECK_INT(back, n);
-            CHECK_LE(most, 1.01);
+            HARD_CASE_ALL("shuffle", "fem", "shuffled or exchanged: back within 10 s", back, n);
+            HARD_CASE("shuffle", "fem", "energy over the insult's", most, 1.01, "");
             beam_free(&b);
         }
 }
@@ -136,7 +142,8 @@ static void free_bodies_come_back_to_their_shape(void)
                     worst = fmax(worst, fabs(pal_dist3(b.body->x + 3 * i, b.body->x + 3 * j) -
                                              pal_dist3(b.body->x_rest + 3 * i, b.body->x_rest + 3 * j)));
             CHECK_LE(most, 1.01 * first);
-            CHECK_LE(worst, 1e-3 * b.body->size_m);
+            HARD_CASE(insult < HARD_SHUFFLE ? insult_cases[insult] : "shuffle", "fem",
+                      "free bodies: distances off those at rest after 10 s", 100 * worst / b.body->size_m, 0.1, "% S");
             CHECK_INT(hard_inverted(&b), 0);
             beam_free(&b);
         }

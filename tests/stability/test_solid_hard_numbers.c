@@ -2,6 +2,7 @@
  * very different sizes side by side, steps that are too long, lengths and moduli of any size, drag without end or none,
  * one element, all held, nothing held, momentum and energy. */
 #include "tests/sim/fem_beam.h"
+#include "tests/stability/hard_case.h"
 #include "tests/stability/solid_hard.h"
 
 static bool open_kind(solid_scene *s, int kind, int nx, int ny, int nz, bool held)
@@ -78,6 +79,9 @@ static void hardly_compressible_cubes_are_too_stiff_by_a_bounded_part(void)
                100 * (solid / fem - 1));
         CHECK(good[0] && good[1]);
         CHECK_LE(fabs(solid / fem - 1), most[q]);
+        if (q == 2)
+            HARD_CASE_MISSED("poisson_static", "subdivision_fem", "729 nodes, too stiff beside model fem by",
+                             100 * fabs(solid / fem - 1), 3, "%");
     }
 }
 
@@ -92,7 +96,8 @@ static void steps_stay_finite_at_the_largest_poisson_ratio(void)
         kick(&s, 0.2, 3);
         solid_steps(&s, 0.25, solid_step_s, &run);
         CHECK(run.finite);
-        if (solid_kinds[k].energy) CHECK_LE(run.most, 1.01);
+        if (solid_kinds[k].energy)
+            HARD_CASE("poisson_step", "subdivision_fem", "nu 0.4999: energy over the first", run.most, 1.01, "");
         solid_scene_close(&s);
     }
 }
@@ -123,7 +128,8 @@ static void a_contrast_of_a_million_costs_few_iterations(void)
     printf("  %d iterations at most, hard part moves %.2g of the soft one\n", most, hard / soft);
     CHECK(soft > 1e-4);
     CHECK_LE(most, 35);
-    CHECK_LE(hard, 1e-4 * soft);
+    HARD_CASE_MISSED("contrast", "subdivision_fem", "painted: iterations to 1e-6", most, 30, "");
+    HARD_CASE("contrast", "subdivision_fem", "hard part moves, over the soft one", hard / soft, 1e-4, "");
     solid_scene_close(&s);
     /* explicit steps are a thousand times as many: refused with the number */
     solid_make(&s, &solid_kinds[SOLID_EXPLICIT], 2, 2, 4, true);
@@ -150,7 +156,7 @@ static void long_steps_stay_bounded(void)
                 if (solid_kinds[k].explicit)
                     CHECK_LE(dt_s / pal_world_substeps(s.world), 1.05 * pal_world_limit_s(s.world));
             }
-            CHECK_LE(most, 1.01 * first);
+            HARD_CASE("long_step", "subdivision_fem", "x 10, x 100: energy over the first", most / first, 1.01, "");
             CHECK_LE(solid_rms(s.body), 1e-2 * s.body->size_m);
             solid_scene_close(&s);
         }
@@ -191,7 +197,7 @@ static void any_unit_gives_the_same_answer(void)
             solid_scene_close(&s);
         }
         printf("  %s: %d others within %.2g of the length\n", solid_kinds[k].shown, n_same, worst);
-        CHECK_LE(worst, k == SOLID_EXPLICIT ? 1e-3 : 1e-4);
+        HARD_CASE("scales", "subdivision_fem", "scaled answers differ by", worst, 1e-4, "of the length");
         free(first);
     }
 }
@@ -209,7 +215,8 @@ static void drag_without_end_creeps_and_none_keeps_energy(void)
         double before = solid_rms(s.body), first = before;
         for (int i = 0; i < 20; i++) {
             REQUIRE(solid_scene_step(&s, 1, solid_step_s));
-            CHECK_LE(solid_rms(s.body), before * (1 + 1e-12));
+            HARD_CASE("drag", "subdivision_fem", "distance from rest over that of the step before",
+                      solid_rms(s.body) / before, 1 + 1e-12, "");
             before = solid_rms(s.body);
         }
         CHECK(before < first && before > 0.99 * first);
@@ -231,6 +238,8 @@ static void drag_without_end_creeps_and_none_keeps_energy(void)
         most = fmax(most, pal_world_energy_J(s.world)), least = fmin(least, pal_world_energy_J(s.world));
     }
     printf("  without drag energy stays between %.4f and %.4f of the first\n", least / first, most / first);
+    HARD_CASE_MISSED("no_drag", "subdivision_fem", "explicit: energy off the first (v half a sub-step behind x)",
+                     100 * fmax(most / first - 1, 1 - least / first), 1, "%");
     CHECK_LE(most, 1.06 * first);
     CHECK(least > 0.94 * first);
     solid_scene_close(&s);
@@ -261,6 +270,7 @@ static void momentum_of_a_free_body_stays(void)
         }
         printf("  %s: momentum drifts by %.2g, angular momentum ends at %.4f, at most %.4f\n", solid_kinds[k].shown,
                drift / of, pal_norm3(l[1]) / pal_norm3(l[0]), spin / pal_norm3(l[0]));
+        HARD_CASE("momentum", "subdivision_fem", "drift of momentum in 2 s", drift / of, 1e-4, "");
         CHECK_LE(drift, 1e-9 * of);
         if (solid_kinds[k].energy) CHECK_LE(spin, 1.01 * pal_norm3(l[0]));
         solid_scene_close(&s);
@@ -309,7 +319,10 @@ static void all_held_and_one_element_are_fine(void)
                 CHECK(pal_body_finite(s.body) && !s.body->frozen);
                 for (int i = 0; i < s.body->n_dof; i++)
                     far = fmax(far, pal_dist3(s.body->x + 3 * i, s.body->x_rest + 3 * i));
-                if (held) CHECK_LE(far, 0);
+                if (held)
+                    HARD_CASE("all_held", "subdivision_fem", "moves by", far, 0, "m");
+                else
+                    HARD_CASE("one_element", "subdivision_fem", "flies on by, in 1 s at 0.1 m/s", far, 0.2, "m");
                 CHECK_LE(far, 0.2);
                 solid_scene_close(&s);
             }
