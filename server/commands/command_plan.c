@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/commands/commands.h"
 #include "server/commands/median.h"
+#include "server/commands/preflight_report.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
 #include "server/commands/studied_scene.h"
@@ -185,6 +186,12 @@ static void print(const pal_studied *studied, pal_world *world, cost *c)
            1e-1 * step_ms / scene->step_s, 1e-6 * (double)pal_world_bytes(world));
 }
 
+static cJSON *with_preflight(cJSON *plan, const pal_preflight *preflight)
+{
+    cJSON_AddItemToObject(plan, "preflight", pal_preflight_json(preflight));
+    return plan;
+}
+
 int command_plan(int argc, char **argv)
 {
     const pal_flag_table table = {.usage = "plan SCENE [flags]",
@@ -206,16 +213,22 @@ int command_plan(int argc, char **argv)
     if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &note);
     if (!err && (err = pal_world_create(studied.scene, &why, &world)))
         pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    pal_preflight preflight = {0};
+    if (!err && (err = pal_preflight_look(studied.scene, &preflight, &why)))
+        pal_note_set(&note, err, "%s: %s", word[0], why.text);
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, studied.scene->step_s, &measured);
     pal_report_progress(NULL, 0, &common);
     if (err)
         code = pal_report_refusal(&common, err, &note);
     else if (common.json)
-        code = pal_report_json(&common, as_json(&studied, world, &measured));
+        code = pal_report_json(&common, with_preflight(as_json(&studied, world, &measured), &preflight));
     else
         code = 0;
-    if (!err && !common.json && !common.quiet) print(&studied, world, &measured);
+    if (!err && !common.json && !common.quiet) {
+        print(&studied, world, &measured);
+        pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
+    }
     pal_world_destroy(world);
     pal_studied_close(&studied);
     pal_scene_free(loaded);

@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/commands/commands.h"
+#include "server/commands/preflight_report.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
 #include "server/commands/studied_scene.h"
@@ -138,6 +139,9 @@ static pal_err open_sessions(serve_run *run, pal_note *note)
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
+        pal_preflight preflight;
+        PAL_TRY(pal_preflight_look(scene, &preflight, note));
+        pal_preflight_log(&preflight, scene->name);
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;

@@ -8,6 +8,7 @@
 #include "server/sim/shell.h"
 #include "server/sim/solid_body.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -101,12 +102,16 @@ static pal_err check_budget(pal_world *w, pal_note *note)
     int n = count_substeps(w, w->step_s, limit);
     bool adapts = false;
     for (int b = 0; b < w->plan.n_body; b++) adapts |= refines(w, b);
-    if (!(limit > 0) || n > w->most_substep)
-        return pal_note_set(note, PAL_ERR_BUDGET,
-                            "a step of %g s needs %.0f sub-steps of %.3g s%s, most_substep allows %d: take a softer or "
-                            "denser material, larger elements%s or a shorter step",
-                            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "",
-                            w->most_substep, adapts ? ", fewer levels" : "");
+    if (!(limit > 0) || n > w->most_substep) {
+        char who[120];
+        pal_world_name_limit(w, who, sizeof who);
+        return pal_note_set(
+            note, PAL_ERR_BUDGET,
+            "a step of %g s needs %.0f sub-steps of %.3g s%s%s, most_substep allows %d: take a softer or "
+            "denser material, larger elements%s or a shorter step",
+            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "", who, w->most_substep,
+            adapts ? ", fewer levels" : "");
+    }
     w->rest_limit_s = limit;
     return PAL_ERR_OK;
 }

@@ -38,4 +38,8 @@ struct pal_world {
  * steps */
 pal_err pal_world_pull(pal_world *world, int body);
 
+/* ", node 512 at (1, 2, 3) mm sets it": the node that the rows' bounds make responsible. Where bounds are of nodes that
+ * are not the points, and without bounds, nothing. The forces' room is free between steps */
+void pal_world_name_limit(const pal_world *world, char *text, size_t n_byte);
+
 #endif

@@ -4,6 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/shell.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static void copy_fields(const pal_body *body, pal_frame_part *to)
@@ -141,6 +142,32 @@ const pal_body *pal_world_look(const pal_world *world, int body)
 void pal_world_material_now(const pal_world *world, int body, pal_material *out)
 {
     *out = world->material[body];
+}
+
+void pal_world_name_limit(const pal_world *world, char *text, size_t n_byte)
+{
+    const pal_world *w = world;
+    double most = 0;
+    text[0] = 0;
+    for (int b = 0; b < w->plan.n_body; b++) {
+        const pal_body *body = &w->plan.body[b];
+        const size_t room = sizeof(double) * (size_t)body->n_dof;
+        if (body->embed || body->implicit) continue;
+        memset(body->g, 0, room);
+        for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
+            const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
+            if (row->effect->stiffness) row->effect->stiffness(row->self, body, body->g);
+        }
+        for (int k = 0; k < body->n_active; k++) {
+            int i = pal_body_point(body, k);
+            const double *x = body->x_rest + 3 * (size_t)i, *o = body->offset_m;
+            if (body->held[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
+            most = body->g[i] / body->mass_kg[i];
+            snprintf(text, n_byte, ", node %d at (%.4g, %.4g, %.4g) mm sets it", i, 1e3 * (x[0] + o[0]),
+                     1e3 * (x[1] + o[1]), 1e3 * (x[2] + o[2]));
+        }
+        memset(body->g, 0, room);
+    }
 }
 
 int pal_world_rows(const pal_world *world)
