@@ -109,6 +109,7 @@ if [ -z "$fast" ]; then
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
     step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
     step "a solid is sculpted in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
+    step "what accuracy costs in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with address and undefined-behaviour sanitizers"
     # all but what is left out below, and the ranks of MPI, which are the release build's

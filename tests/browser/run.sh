@@ -1,10 +1,11 @@
 #!/bin/sh
-# The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|together BUILD [PICTURES]
+# The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
 #   fields    displacement, stress, energy and edge stiffness in colours, asked for and looked away from
 #   calibrated  a calibrated scene, its error beside its name
 #   adaptive  a surface that refines where it is pressed, seen by two browsers
 #   sculpt    a solid that is sculpted by clicks, seen by two browsers
+#   accuracy  what accuracy costs: a study's plot, a body switched along its front, rows off and on, seen by two browsers
 #   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.
 set -u
@@ -13,13 +14,13 @@ which=${1:-pull}
 build=$(cd "${2:-$here/../../build}" && pwd) || exit 2
 pictures=${3:-$build/pictures}
 case $which in
-pull | fields | calibrated | adaptive | sculpt) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
+pull | fields | calibrated | adaptive | sculpt | accuracy) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
 together)
     exec unshare -n sh -c 'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec node "$0/together.mjs" "$1" "$2"' \
         "$here" "$build" "$pictures"
     ;;
 *)
-    echo "usage: run.sh pull|fields|calibrated|adaptive|sculpt|together BUILD [PICTURES]" >&2
+    echo "usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|together BUILD [PICTURES]" >&2
     exit 2
     ;;
 esac

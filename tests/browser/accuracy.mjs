@@ -1,0 +1,112 @@
+// What accuracy costs in real Chromium pages: a study's points and where the body stands, a slider along the front that
+// switches the running body, rows switched off and on; who looks on sees the same.
+// usage: node accuracy.mjs BUILD PICTURES     ends with "N passed, N failed"
+import { execFileSync } from "node:child_process";
+import { join } from "node:path";
+import { check, finish, launch, moved, open, organPixel, palpate, pictures, scratch, serve, troubles, until } from "./common.mjs";
+
+/** what a page shows of the accuracy panel */
+const shown = (page) => page.evaluate(() => {
+  const { cost, state } = window.palpate, body = [...state.bodies.values()][0], at = (id) => document.querySelector("#cost-" + id);
+  return {
+    visible: !at("panel").hidden, points: cost.points.length, front: cost.front.map((p) => p.index), marks: document.querySelectorAll("#cost-plot circle.point").length,
+    line: document.querySelectorAll("#cost-plot polyline.front").length, live: document.querySelectorAll("#cost-plot .live, #cost-plot .live-line").length,
+    neighbours: document.querySelectorAll("#cost-knob-list button").length, estimate: cost.estimate, slider: Number(at("slider").value), most: Number(at("slider").max),
+    choice: at("choice").textContent, said: at("say").textContent, busy: cost.underWay !== null, setting: at("setting").textContent,
+    epoch: body.epoch, drawn: body.mesh.visible && body.shown, tick: state.status?.tick ?? 0,
+  };
+});
+/** what a page shows of the plan */
+const plan = (page) => page.evaluate(() => ({
+  on: [...document.querySelectorAll("#rows tr:not(.off)")].map((r) => r.textContent), off: [...document.querySelectorAll("#rows tr.off")].map((r) => r.textContent),
+  switches: document.querySelectorAll("#rows input").length, why: document.querySelector("#rows tr")?.title ?? "", rows: window.palpate.state.rows,
+  row_ms: window.palpate.state.status?.row_ms.length ?? 0, unwatched: document.querySelector("#unwatched").textContent, off_wire: window.palpate.state.status?.off ?? [],
+}));
+/** moves the slider to a place and lets it go, as a hand does */
+const slide = (page, place) => page.evaluate((value) => {
+  const slider = document.querySelector("#cost-slider");
+  slider.value = String(value);
+  slider.dispatchEvent(new Event("input"));
+  slider.dispatchEvent(new Event("change"));
+}, place);
+const flip = (page, row) => page.click(`#rows input[aria-label="${row} is part of the plan"]`);
+
+let server;
+const browsers = [];
+try {
+  const folder = join(scratch, "organ"), scene = join(folder, "scene.json");
+  execFileSync(palpate, ["prepare", "--procedural", "--resolution", "8", "--triangles", "4000", "--model", "fem", "-o", folder, "--quiet"]);
+  execFileSync(palpate, ["study", scene, "--quick", "--seconds", "0.1", "--methods", "fem,tet_springs", "--quiet"], { stdio: ["ignore", "ignore", "inherit"] });
+  server = await serve(scene, 0);
+  const address = `http://127.0.0.1:${server.info.port}/`;
+  browsers.push(await launch(), await launch());
+  const ada = await open(browsers[0], address, "Ada&role=instructor", { width: 1200, height: 800 });
+  const ben = await open(browsers[1], address, "Ben", { width: 900, height: 700 });
+
+  const closed = await shown(ada);
+  check("nobody looks, so nothing is sent", !closed.visible && closed.points === 0 && closed.estimate === null);
+  await ada.keyboard.press("4");
+  const begin = await until(() => shown(ada), (s) => s.points > 2 && s.estimate?.tick > 0);
+  check("key 4 opens the plot with the study's points and its front", begin.visible && begin.marks === begin.points && begin.line === 1 && begin.front.length >= 2, `${begin.points} points, ${begin.front.length} on the front`);
+  check("the body has its place there", begin.live >= 1 && /fem/.test(begin.setting), begin.setting);
+  check("the slider goes along the front", begin.most === begin.front.length - 1, begin.choice);
+  const other = await shown(ben);
+  check("who has not asked is not told", other.points === 0 && other.estimate === null);
+
+  // under load there is something to be wrong about
+  const pixel = await until(() => organPixel(ada), (p) => p);
+  await ada.mouse.move(pixel.x, pixel.y);
+  await ada.mouse.down();
+  await ada.mouse.move(pixel.x + 60, pixel.y - 60, { steps: 8 });
+  const loaded = await until(() => shown(ada), (s) => s.estimate?.error_m > 1e-7);
+  check("a pulled body has an error, of parts", loaded.estimate?.error_m > 1e-7 && (await ada.locator("#cost-parts li").count()) >= 1, JSON.stringify(loaded.estimate).slice(0, 300));
+  await until(() => ada.evaluate(() => !window.palpate.stage.dirty), (still) => still, 3000);
+  await ada.screenshot({ path: join(pictures, "accuracy_plot.png") });
+  await ada.mouse.up();
+  await until(() => moved(ada), (m) => m < 1e-3);
+
+  await ben.keyboard.press("4");
+  await until(() => shown(ben), (s) => s.points > 2 && s.estimate);
+  // to the other end of the front, and back
+  for (const [place, what] of [[0, "the cheapest"], [begin.most, "the most accurate"]]) {
+    const before = await shown(ada);
+    if (before.front[place] === before.estimate?.point) continue;
+    await slide(ada, place);
+    const making = await shown(ada);
+    check(`let go at ${what}, the panel says what is made`, making.busy && /^Making /.test(making.said), making.said);
+    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.point === s.front[place]);
+    check(`${what} runs, and what the switch did is said`, /^Switched: energy [+−][\d.]+ %/.test(after.said) && after.estimate?.point === after.front[place], `${after.said} ${after.setting}`);
+    const seen = await until(() => shown(ben), (s) => s.epoch === after.epoch && s.drawn && s.estimate?.point === after.front[place]);
+    check("who looks on sees the same setting and shape", seen.epoch === after.epoch && seen.setting === after.setting, seen.setting);
+    check("no time was lost", after.tick >= before.tick, `${before.tick} to ${after.tick}`);
+  }
+  await until(() => ada.evaluate(() => !window.palpate.stage.dirty), (still) => still, 3000);
+  await ada.screenshot({ path: join(pictures, "accuracy_switched.png") });
+  await ada.keyboard.press("4");
+  check("the panel closes", !(await shown(ada)).visible);
+
+  // rows: the instructor has switches, others see what is off
+  for (const page of [ada, ben]) await page.keyboard.press("p");
+  const rows = await until(() => plan(ada), (p) => p.switches > 0);
+  check("an instructor has a switch for every row, others none", rows.switches === rows.on.length && (await plan(ben)).switches === 0, rows.on.join(" | "));
+  check("a row says what called for it", rows.why !== "", rows.why);
+  const name = rows.rows.includes("viscous") ? "viscous" : rows.rows[0];
+  await flip(ada, name);
+  const off = await until(() => plan(ada), (p) => p.off.length === 1 && p.row_ms === rows.on.length - 1);
+  check(`${name} off: it is gone from the plan, with its cost`, off.row_ms === rows.on.length - 1 && off.off_wire[0]?.row === name && !off.rows.includes(name), off.off.join());
+  const seenOff = await until(() => plan(ben), (p) => p.off.length === 1);
+  check("who looks on sees that it is off", seenOff.off.length === 1, seenOff.off.join());
+  await ada.screenshot({ path: join(pictures, "accuracy_row_off.png") });
+  await until(() => ada.isEnabled(`#rows input[aria-label="${name} is part of the plan"]`), (e) => e);
+  await flip(ada, name);
+  const on = await until(() => plan(ada), (p) => p.off.length === 0 && p.row_ms === rows.on.length);
+  check("on again: the plan is what it was", on.rows.join() === rows.rows.join(), on.rows.join(" "));
+  check("what nobody looks at is said not to be computed", /colours/.test(on.unwatched), on.unwatched);
+  check("nothing was complained of in the browsers' consoles", troubles.length === 0, troubles.slice(0, 3).join(" | "));
+} catch (error) {
+  check("the test ran to its end", false, String(error.stack ?? error));
+} finally {
+  for (const browser of browsers) await browser.close().catch(() => {});
+  server?.child.kill("SIGTERM");
+}
+finish();
