@@ -35,7 +35,7 @@ let server;
 const browsers = [];
 try {
   const folder = join(scratch, "organ"), scene = join(folder, "scene.json");
-  execFileSync(palpate, ["prepare", "--procedural", "--resolution", "8", "--triangles", "4000", "--model", "fem", "-o", folder, "--quiet"]);
+  execFileSync(palpate, ["prepare", "--procedural", "--resolution", "10", "--triangles", "4000", "--model", "fem", "-o", folder, "--quiet"]);
   execFileSync(palpate, ["study", scene, "--quick", "--seconds", "0.1", "--methods", "fem,tet_springs", "--quiet"], { stdio: ["ignore", "ignore", "inherit"] });
   server = await serve(scene, 0);
   const address = `http://127.0.0.1:${server.info.port}/`;
