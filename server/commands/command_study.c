@@ -234,7 +234,8 @@ static bool keep(const pal_study *study, int n_all, void *user)
     run->file->n_all = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
     run->file->whole = false;
     run->kept = pal_study_file_write(run->file, run->path, &run->kept_note);
-    return !run->kept && !stop_asked;
+    /* the last one ends it anyway */
+    return !run->kept && (!stop_asked || study->n_point == n_all);
 }
 
 static bool show(const char *what, double fraction, void *user)

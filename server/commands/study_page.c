@@ -96,8 +96,10 @@ static void knobs_of(const pal_study *study, const pal_study_point *p, double us
                                    : s->size == 1 ? "level"
                                                   : "levels")
                         : snprintf(out, n_byte, "as it is");
+    bool law = s->law[0] && strcmp(s->law, "corotational") != 0, other = !strcmp(s->solver, "sdirk2");
+    n += snprintf(out + n, n_byte - (size_t)n, "%s%s%s", law ? " " : "", law ? s->law : "", other ? " sdirk2" : "");
     double step = step_of(study, p);
-    if (fabs(step - study->step_s) > 1e-9 && step > 0)
+    if ((size_t)n < n_byte && fabs(step - study->step_s) > 1e-9 && step > 0)
         n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
     if (s->tolerance > 0 && s->tolerance != usual && (size_t)n < n_byte)
         snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);

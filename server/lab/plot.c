@@ -232,7 +232,11 @@ static void draw_label(FILE *to, const pal_plot_label *l, const axis *x, const a
             if (ring > 0)
                 fprintf(to, "<path stroke=\"#999\" stroke-width=\"0.7\" d=\"M%.1f %.1fL%.1f %.1f\"/>\n", px, py, ax,
                         ay);
-            label(to, from, base, "start", small_text, l->text);
+            /* left of its point it ends there: the width is a guess */
+            if (side[k][0] < 0)
+                label(to, ax, base, "end", small_text, l->text);
+            else
+                label(to, from, base, "start", small_text, l->text);
             return;
         }
 }

@@ -140,7 +140,9 @@ static int small_texts(const char *text, double box[][4], int most)
         const char *end = strchr(at, '>'), *stop = end ? strchr(end, '<') : NULL;
         if (!stop || sscanf(at, "<text x=\"%lf\" y=\"%lf\"", &x, &y) != 2) continue;
         if (!strstr(at, "font-size=\"11\"") || strstr(at, "font-size=\"11\"") > end) continue;
-        box[n][0] = x, box[n][1] = y - 9, box[n][2] = x + 6.2 * (double)(stop - end - 1), box[n++][3] = y + 2;
+        double long_px = 6.2 * (double)(stop - end - 1);
+        if (strstr(at, "text-anchor=\"end\"") && strstr(at, "text-anchor=\"end\"") < end) x -= long_px;
+        box[n][0] = x, box[n][1] = y - 9, box[n][2] = x + long_px, box[n++][3] = y + 2;
     }
     return n;
 }
