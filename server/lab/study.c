@@ -93,7 +93,6 @@ static pal_err sweep(pal_study_job *job, const pal_study_wish *wish, int n)
             PAL_TRY(pal_study_measure(job, &wish[i], &job->out->point[i]));
         job->out->n_point = i + 1;
         pal_study_front(job->out);
-        pal_study_predict(job->out);
         if (o->done && !o->done(job->out, n, o->user))
             return pal_note_set(job->note, PAL_ERR_STATE, "stopped after %d of %d settings", i + 1, n);
     }
@@ -148,6 +147,7 @@ static pal_err study(pal_study_job *job)
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, wish, n);
+    pal_study_predict(job->out);
     free(wish);
     return err;
 }

@@ -28,8 +28,8 @@ typedef struct pal_study_point {
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
-    double predicted_ms, predicted_m;   /* by the models of cost and error fitted to the OTHER points of its method;
-                                           NaN: too few of them                                                    */
+    double predicted_ms, predicted_m; /* by the models of cost and error fitted to the OTHER points of its method, once
+                                         all are there; NaN: too few of them */
 } pal_study_point;
 
 typedef struct pal_study {

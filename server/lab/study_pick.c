@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ALONG = 3, FEATURES = 24 };
+enum { ALONG = 3, FEATURES = 24, GOLDEN = 44 };
 /* weight of "no effect" for each knob, so that one that was never turned has none */
 static const double ridge = 1e-4, least_m = 1e-12;
 /* a power law is followed closely */
@@ -95,7 +95,7 @@ static double misfit(const double *x, const double *y, int n, double a, double c
         if (!(left > 0)) return INFINITY;
         mean += (log(left) - c * x[i]) / n;
     }
-    for (int k = 0; k < 8; k++) { /* Newton for b, whose logarithm is not linear in y once a is there */
+    for (int k = 0; k < 4; k++) { /* Newton for b, whose logarithm is not linear in y once a is there */
         double g = 0, h = 0;
         for (int i = 0; i < n; i++) {
             double part = exp(mean + c * x[i]), r = log(a + part) - y[i], d = part / (a + part);
@@ -116,7 +116,7 @@ static double best_power(const double *x, const double *y, int n, double a, doub
 {
     const double g = 0.6180339887498949;
     double low = 0, high = 8;
-    for (int k = 0; k < 60; k++) {
+    for (int k = 0; k < GOLDEN; k++) {
         double p = high - g * (high - low), q = low + g * (high - low);
         if (misfit(x, y, n, a, p, b) < misfit(x, y, n, a, q, b))
             high = q;
@@ -127,26 +127,36 @@ static double best_power(const double *x, const double *y, int n, double a, doub
     return misfit(x, y, n, a, *c, b);
 }
 
-/* ms = a + b n^c at `at`, a between 0 and what the cheapest costs; a straight line where there are but three points */
-static double cost_at(const double *x, const double *y, int n, double at)
+/* y = ln (a + exp (b + c x)) */
+typedef struct cost_law {
+    double a, b, c;
+} cost_law;
+
+static double cost_at(const cost_law *law, double x)
 {
-    double a, slope, b, c, least = INFINITY, straight = 0;
+    return law->a + exp(law->b + law->c * x);
+}
+
+/* ms = a + b n^c, a between 0 and what the cheapest costs; a straight line where there are but three points */
+static cost_law fit_cost(const double *x, const double *y, int n)
+{
+    double intercept, slope, b, c, least = INFINITY, straight = 0;
     for (int i = 0; i < n; i++) least = fmin(least, y[i]);
-    line(x, y, n, &a, &slope);
-    for (int i = 0; i < n; i++) straight += (a + slope * x[i] - y[i]) * (a + slope * x[i] - y[i]);
-    if (n < 4 || straight < 1e-18 || slope <= 0) return exp(a + slope * at);
+    line(x, y, n, &intercept, &slope);
+    for (int i = 0; i < n; i++) straight += (intercept + slope * x[i] - y[i]) * (intercept + slope * x[i] - y[i]);
+    const cost_law power = {0, intercept, slope};
+    if (n < 4 || straight < 1e-18 || slope <= 0) return power;
     const double g = 0.6180339887498949;
     double low = 0, high = exp(least) * 0.999999;
-    for (int k = 0; k < 60; k++) {
+    for (int k = 0; k < GOLDEN; k++) {
         double p = high - g * (high - low), q = low + g * (high - low);
         if (best_power(x, y, n, p, &c, &b) < best_power(x, y, n, q, &c, &b))
             high = q;
         else
             low = p;
     }
-    double from = (low + high) / 2;
-    if (!(best_power(x, y, n, from, &c, &b) < straight)) return exp(a + slope * at);
-    return from + exp(b + c * at);
+    cost_law out = {.a = (low + high) / 2};
+    return best_power(x, y, n, out.a, &out.c, &out.b) < straight ? out : power;
 }
 
 /* a law along the sizes: what it gives at `at`, how far off it is at its points (RMS of logarithms) */
@@ -166,9 +176,10 @@ static along law_along(const double *x, const double *y, int n, double at, bool 
     if (out.n_size < ALONG) return out;
     double a, slope;
     line(x, y, n, &a, &slope);
-    out.value = cost ? cost_at(x, y, n, at) : exp(a + slope * at);
+    const cost_law law = cost ? fit_cost(x, y, n) : (cost_law){0, a, slope};
+    out.value = cost_at(&law, at);
     for (int i = 0; i < n; i++) {
-        double r = (cost ? log(cost_at(x, y, n, x[i])) : a + slope * x[i]) - y[i];
+        double r = log(cost_at(&law, x[i])) - y[i];
         out.off += r * r / n;
     }
     out.off = sqrt(out.off);
