@@ -87,7 +87,9 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     const pal_switch_report *r = &work->report;
     char text[PAL_SETTING_TEXT];
     pal_setting now;
-    double change = r->energy_before_J > 0 ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
+    /* a body at rest has no energy but rounding */
+    bool any = r->energy_before_J > 1e-15;
+    double change = any ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
     double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns);
     pal_setting_of(pal_session_scene(c->room->session), work->body, &now);
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);

@@ -12,7 +12,8 @@
 
 /* rounds of smoothing, near enough in energy, most that a displacement or velocity is lengthened or shortened, pull to
  * rest of the least squares in parts of their largest weight */
-enum { N_SMOOTH = 40, N_SCALE = 8 };
+enum { N_SMOOTH = 40, N_SMOOTH_FAR = 200, N_SCALE = 8 };
+#define FAR        1.5 /* times the energy wanted: more rounds than usual */
 #define SAME       1e-4
 #define MOST_SCALE 1.5
 #define INERTIA    0.8
@@ -362,7 +363,7 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     int n = 0;
     if (to->embed || to->shell || !find_bound(next, t->body, t->bound)) return 0;
     memset(way, 0, 3 * sizeof *way * (size_t)to->n_dof);
-    for (; n < N_SMOOTH && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
+    for (; n < (now_J > FAR * want_J ? N_SMOOTH_FAR : N_SMOOTH) && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
         for (int i = 0; i < to->n_node; i++) {
             if (to->held[i] || !(t->bound[i] > 0)) continue;
             for (int c = 3 * i; c < 3 * i + 3; c++) {

@@ -1,0 +1,261 @@
+/* Other settings over the wire: points of a study and knobs, asked for by clients on mem:// of a real session that
+ * runs; the topology that comes of them, answers, refusals, tools that stay with their holders; before and after
+ * sculpting. */
+#include "protocol/asset.h"
+#include "server/net/server.h"
+#include "tests/net/mem_client.h"
+#include "tests/session/clay.h"
+
+#include <time.h>
+
+#define FRAME_NS 16666667ull
+
+static clay_scene clay;
+enum { POINTS = 3 };
+static pal_priced_setting point[POINTS];
+static pal_session *session;
+static pal_server *server;
+static pal_server_gate *gate;
+static pal_transport *road;
+static uint64_t now_ns;
+
+/* places of a block of 0.1 m, on its top and beside it */
+#define TOP "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"
+
+static void begin(void)
+{
+    pal_note note = {""};
+    gate = pal_server_gate_create();
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
+    static const pal_priced_setting *list[1];
+    static int n[1], body[1];
+    list[0] = point, n[0] = POINTS, body[0] = 0;
+    pal_server_options net = {.road = "mem", .setting = list, .n_setting = n, .setting_body = body};
+    if (pal_session_open(&clay.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    pal_server_connect(server, gate);
+    road = pal_server_transport(server);
+    now_ns = 1000000000ull;
+}
+
+static void end(void)
+{
+    pal_server_close(server);
+    pal_session_close(session);
+    pal_server_gate_destroy(gate);
+    CHECK_INT(pal_packet_total(), 0);
+}
+
+/* the loop goes on by a little; others read too, or their queues would fill */
+static void turn(mem_client *a, mem_client *b)
+{
+    now_ns += FRAME_NS / 4;
+    pal_server_turn(server, now_ns);
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+    nanosleep(&(struct timespec){0, 500000}, NULL);
+}
+
+static int n_answer(const mem_client *c)
+{
+    return c->n_text[PAL_CONTROL_ANSWER] + c->n_text[PAL_CONTROL_ERROR];
+}
+
+static void until_answers(mem_client *c, mem_client *other, int n)
+{
+    for (int i = 0; i < 20000 && n_answer(c) < n; i++) turn(c, other);
+    CHECK_INT(n_answer(c), n);
+}
+
+static void send(mem_client *c, const char *verb, const char *args)
+{
+    char text[512];
+    snprintf(text, sizeof text, "{\"type\":\"command\",\"verb\":\"%s\",\"target\":\"\",\"args\":{%s}}", verb, args);
+    mem_text(c, text);
+}
+
+/* was it done? */
+static bool order(mem_client *c, const char *verb, const char *args)
+{
+    int n_done = c->n_text[PAL_CONTROL_ANSWER];
+    send(c, verb, args);
+    until_answers(c, NULL, n_answer(c) + 1);
+    return c->n_text[PAL_CONTROL_ANSWER] > n_done;
+}
+
+static double told(const mem_client *c, const char *key)
+{
+    const pal_wire_answer *a = &c->last[PAL_CONTROL_ANSWER].answer;
+    for (uint32_t i = 0; i < a->n_arg; i++)
+        if (!strcmp(a->arg[i].key, key)) return a->arg[i].value;
+    return NAN;
+}
+
+static const char *trouble(const mem_client *c)
+{
+    return c->last[PAL_CONTROL_ERROR].problem.text;
+}
+
+/* waits for a frame of the epoch that the client has */
+static void until_frame(mem_client *c)
+{
+    for (int i = 0; i < 20000 && (c->frame.epoch != c->epoch || c->n_tools == 0); i++) turn(c, NULL);
+    CHECK_INT(c->frame.epoch, c->epoch);
+    CHECK_INT(c->n_bad, 0);
+}
+
+static void join(mem_client *c, const char *name, pal_wire_role role, int tool)
+{
+    mem_join(c, road, name, role, tool);
+    mem_pull(c, 1000);
+    REQUIRE(c->asset);
+    until_frame(c);
+}
+
+static const pal_wire_part_info *part(const mem_client *c)
+{
+    return c->n_text[PAL_CONTROL_TOPOLOGY] ? &c->last[PAL_CONTROL_TOPOLOGY].topology.part[0]
+                                           : &c->last[PAL_CONTROL_HELLO].hello.part[0];
+}
+
+static void setting(int i, const char *model, const char *element, int size)
+{
+    pal_setting *s = &point[i].setting;
+    snprintf(s->model, sizeof s->model, "%s", model);
+    snprintf(s->element, sizeof s->element, "%s", element);
+    s->size = size;
+    point[i].ms = 1 + i, point[i].error_m = 0.001 / (1 + i), point[i].front = true;
+}
+
+static void two_clients_see_a_point_of_the_study(void)
+{
+    mem_client a, b;
+    begin();
+    join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    join(&b, "Ben", PAL_WIRE_ROLE_TRAINEE, 0);
+    char before[64];
+    snprintf(before, sizeof before, "%s", part(&a)->asset);
+    /* finite elements on voxels: another surface is shown */
+    send(&a, "point", "\"index\":1");
+    until_answers(&a, &b, n_answer(&a) + 1);
+    CHECK_INT(a.n_text[PAL_CONTROL_ANSWER], 1);
+    if (a.n_text[PAL_CONTROL_ERROR]) printf("  %s\n", trouble(&a));
+    for (int i = 0; i < 20000 && b.n_text[PAL_CONTROL_TOPOLOGY] < 1; i++) turn(&a, &b);
+    until_frame(&a), until_frame(&b);
+    CHECK_INT(part(&a)->epoch, 2);
+    CHECK_TEXT(part(&b)->asset, part(&a)->asset);
+    CHECK(strcmp(part(&a)->asset, before) != 0);
+    CHECK(!part(&a)->sculpts);
+    CHECK_INT(b.n_text[PAL_CONTROL_ANSWER], 0);
+    CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "fem hex8_bbar") != NULL);
+    /* nothing has pushed it: what energy it has is rounding */
+    CHECK_LE(told(&a, "energy_before_J"), 1e-9);
+    CHECK_LE(fabs(told(&a, "energy_after_J") - told(&a, "energy_before_J")), 1e-9);
+    CHECK(isfinite(told(&a, "energy_percent")));
+    CHECK_LE(told(&a, "most_move_m"), 0.005);
+    /* a knob of it, and back to the cells, which can be sculpted again */
+    CHECK(order(&a, "knob", "\"size\":10,\"tolerance\":0.001"));
+    CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "10 voxels") != NULL);
+    CHECK(order(&a, "point", "\"index\":2"));
+    for (int i = 0; i < 20000 && b.n_text[PAL_CONTROL_TOPOLOGY] < 3; i++) turn(&a, &b);
+    until_frame(&a), until_frame(&b);
+    CHECK(part(&a)->sculpts);
+    CHECK_INT(part(&b)->epoch, 4);
+    CHECK(order(&a, "divide", TOP));
+    CHECK(told(&a, "cells") > 8);
+    /* what was sculpted is switched as it is, and comes back as it was */
+    double cells = told(&a, "cells");
+    CHECK(order(&a, "point", "\"index\":1"));
+    CHECK(!order(&a, "divide", TOP));
+    CHECK(strstr(trouble(&a), "cannot be sculpted") || strstr(trouble(&a), "can be sculpted"));
+    CHECK(order(&a, "point", "\"index\":0"));
+    CHECK(order(&a, "undo", ""));
+    CHECK(told(&a, "cells") < cells);
+    mem_end(&a);
+    mem_end(&b);
+    end();
+}
+
+static void tools_stay_with_who_holds_them(void)
+{
+    mem_client c;
+    uint32_t seq = 0;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    for (int round = 0; round < 3; round++) {
+        const double at[3] = {0, 0, 0.12 + 0.01 * round};
+        mem_pose(&c, 0, ++seq, at);
+        if (round == 1) CHECK(order(&c, "knob", "\"step_ms\":20"));
+        for (int i = 0; i < 20000 && c.tools.tool[0].echo_seq != seq; i++) turn(&c, NULL);
+        CHECK_INT(c.tools.tool[0].echo_seq, seq);
+        CHECK(c.tools.tool[0].flags & PAL_WIRE_TOOL_HELD);
+        CHECK_NEAR((double)c.tools.tool[0].position_m[2], at[2], 1e-6);
+        CHECK_INT(c.tools.tool[0].holder, c.last[PAL_CONTROL_HELLO].hello.you_id);
+    }
+    CHECK_INT(part(&c)->epoch, 2);
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+static void what_cannot_be_is_refused_with_a_sentence(void)
+{
+    static const struct {
+        const char *verb, *args, *says;
+    } bad[] = {{"point", "", "index is missing"},
+               {"point", "\"index\":7", "wanted 0 to 2"},
+               {"point", "\"index\":0.5", "wanted 0 to 2"},
+               {"point", "\"index\":0,\"size\":3", "takes index"},
+               {"knob", "", "takes size step_ms tolerance"},
+               {"knob", "\"size\":3.5", "is no number of"},
+               {"knob", "\"size\":9", "levels, wanted"},
+               {"knob", "\"step_ms\":1000", "step_s"},
+               {"knob", "\"tolerance\":7", "tolerance"}};
+    mem_client c, d;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        CHECK(!order(&c, bad[i].verb, bad[i].args));
+        CHECK(strstr(trouble(&c), bad[i].says) != NULL);
+        if (!strstr(trouble(&c), bad[i].says)) printf("  %s\n", trouble(&c));
+    }
+    CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 0);
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"point\",\"target\":\"stone\",\"args\":{\"index\":1}}");
+    until_answers(&c, NULL, n_answer(&c) + 1);
+    CHECK(strstr(trouble(&c), "stone") != NULL);
+    /* who teaches nobody and holds no tool */
+    join(&d, "Ben", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    CHECK(!order(&d, "point", "\"index\":1"));
+    CHECK(strstr(trouble(&d), "only an instructor or who holds a tool") != NULL);
+    mem_end(&c);
+    mem_end(&d);
+    end();
+}
+
+/* who asks goes, and the server ends while it is being made */
+static void a_server_that_ends_in_the_middle_ends(void)
+{
+    mem_client c;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    send(&c, "point", "\"index\":1");
+    send(&c, "knob", "\"size\":12");
+    for (int i = 0; i < 3; i++) turn(&c, NULL);
+    mem_end(&c);
+    for (int i = 0; i < 3; i++) turn(NULL, NULL);
+    end();
+}
+
+int main(void)
+{
+    clay_make(&clay, 2, 0.1);
+    setting(0, "subdivision_fem", "", 1);
+    setting(1, "fem", "hex8_bbar", 8);
+    setting(2, "subdivision_fem", "", 2);
+    RUN(two_clients_see_a_point_of_the_study);
+    RUN(tools_stay_with_who_holds_them);
+    RUN(what_cannot_be_is_refused_with_a_sentence);
+    RUN(a_server_that_ends_in_the_middle_ends);
+    clay_free(&clay);
+    return check_report();
+}
