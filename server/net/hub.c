@@ -442,6 +442,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         pal_hub_room *room = &hub->room[i];
         const pal_scene *scene = pal_session_scene(session[i]);
         room->session = session[i];
+        room->step_s = scene->step_s;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
         if (options->setting && options->n_setting[i] > 0) {

@@ -53,6 +53,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_STUDY;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
+    study->step_ms = 1e3 * room->step_s;
     for (int i = 0; i < n; i++) n_front += room->setting[i].front;
     /* as many as fit, those of the front before others */
     int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
@@ -112,14 +113,23 @@ static double known(double value)
     return isfinite(value) ? value : NAN;
 }
 
-static void put_neighbour(const pal_priced_setting *from, const pal_setting *now, pal_wire_neighbour *to)
+/* a step's milliseconds as those of as many steps as go into one of the scene as it was opened: shorter steps are not
+ * cheaper for being more */
+static double price(const pal_hub_room *room, double ms, double step_s)
+{
+    return isfinite(ms) && step_s > 0 ? ms * room->step_s / step_s : NAN;
+}
+
+static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *from, const pal_setting *now,
+                          pal_wire_neighbour *to)
 {
     const pal_setting *s = &from->setting;
     char text[PAL_SETTING_TEXT];
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
     bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
-    *to = (pal_wire_neighbour){.ms = known(from->ms), .error_m = known(from->error_m)};
+    *to = (pal_wire_neighbour){.ms = price(room, from->ms, s->step_s > 0 ? s->step_s : now->step_s),
+                               .error_m = known(from->error_m)};
     if (s->size > 0 && s->size != now->size) to->size = (uint32_t)s->size;
     if (step) to->step_ms = 1e3 * s->step_s;
     if (tolerance) to->tolerance = s->tolerance;
@@ -132,19 +142,20 @@ static void put_neighbour(const pal_priced_setting *from, const pal_setting *now
     pal_plain_text(to->label, sizeof to->label, pal_setting_text(s, text));
 }
 
-static void put_estimate(const pal_estimate *from, const pal_setting *now, pal_wire_estimate *to)
+static void put_estimate(const pal_hub_room *room, const pal_estimate *from, const pal_setting *now,
+                         pal_wire_estimate *to)
 {
     to->tick = from->tick;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
-    if (isfinite(from->ms) && from->ms > 0) to->ms = from->ms;
+    if (isfinite(from->ms) && from->ms > 0) to->ms = price(room, from->ms, now->step_s);
     to->most_m = known(from->most_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m), to->zz_percent = known(from->zz_percent);
     to->locking = from->locking;
     pal_plain_text(to->note, sizeof to->note, from->note);
     for (int i = 0; i < from->n_neighbour && i < PAL_WIRE_NEIGHBOUR_MAX; i++)
-        put_neighbour(&from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
+        put_neighbour(room, &from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
 }
 
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
@@ -163,10 +174,10 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     pal_setting_of(pal_session_scene(c->room->session), b, &now);
     pal_plain_text(out->setting, sizeof out->setting, pal_setting_text(&now, text));
     out->point = point_of(c->room, b, &now);
-    out->ms = c->room->stream->step_ms > 0 ? c->room->stream->step_ms : NAN;
+    out->ms = c->room->stream->step_ms > 0 ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
     out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
         out->zz_percent = NAN;
-    if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(&estimate, &now, out);
+    if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     return pal_hub_encode(hub, hub->control);
 }
 

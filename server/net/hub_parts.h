@@ -61,6 +61,7 @@ typedef struct pal_hub_room {
     bool left_alone;                   /* nobody was here then */
     int n_estimate[PAL_BODY_MAX];      /* clients that look at an estimate */
     bool told_estimate[PAL_BODY_MAX];  /* the session knows that some do */
+    double step_s;                     /* of the scene as it was opened: what all prices are for */
     const pal_priced_setting *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
     int n_setting, setting_body;
     int tier_users[PAL_STREAM_TIER];

@@ -106,6 +106,7 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
     const pal_wire_study *study = &ada.last[PAL_CONTROL_STUDY].study;
     CHECK_TEXT(study->body, "organ");
     CHECK_INT(study->n_point, POINTS - 1);
+    CHECK_NEAR(study->step_ms, 1e3 * organ.scene.step_s, 1e-9);
     CHECK_INT(study->point[3].index, 4);
     CHECK_TEXT(study->point[3].method, "fem hex8_bbar");
     CHECK(study->point[0].front && !study->point[1].front && study->point[3].error_m == 1e-4);

@@ -169,7 +169,7 @@ static void what_is_not_known_is_not_written(void)
     REQUIRE(pal_control_put(text, sizeof text, &estimate, &n) == 0);
     CHECK(strstr(text, "\"error_m\":0"));
     static const char bad[] =
-        "{\"type\":\"study\",\"body\":\"a\",\"points\":[{\"index\":0,\"method\":\"fem\",\"label\":\"\","
+        "{\"type\":\"study\",\"body\":\"a\",\"step_ms\":1,\"points\":[{\"index\":0,\"method\":\"fem\",\"label\":\"\","
         "\"ms\":1}]}";
     CHECK_INT(pal_control_get(bad, sizeof bad - 1, true, &c), PAL_REFUSAL_FIELD);
 }

@@ -83,10 +83,11 @@ export class AccuracyPanel {
     this.show();
   }
 
-  /** @param {{body: string, points?: Point[]}} m control message `study` */
+  /** @param {{body: string, step_ms?: number, points?: Point[]}} m control message `study` */
   study(m) {
     if (m.body !== this.asked) return;
     this.points = m.points ?? [];
+    this.stepMs = m.step_ms ?? this.stepMs;
     this.front = frontOf(this.points);
     this.slider.max = String(Math.max(0, this.front.length - 1));
     this.at("front").hidden = this.front.length < 2;

@@ -112,9 +112,11 @@ export function layOut(points, estimate, box) {
   const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) => p !== null && positive(p.ms) && positive(p.error_m);
   const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
   const msRange = logRange([...shown.map((p) => /** @type {number} */ (p?.ms)), ...(positive(estimate?.ms) ? [estimate.ms] : [])]);
-  const errorRange = logRange(shown.map((p) => 1e3 * Math.max(LEAST_M, /** @type {number} */ (p?.error_m))));
+  // a body at rest is far below all that was studied: it stands at the foot of the plot
+  const least = Math.max(LEAST_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
+  const errorRange = logRange(shown.map((p) => 1e3 * Math.max(least, /** @type {number} */ (p?.error_m))));
   const x = (/** @type {number} */ ms) => logPlace(ms, msRange, box.left, box.right);
-  const y = (/** @type {number} */ m) => logPlace(1e3 * Math.max(LEAST_M, m), errorRange, box.bottom, box.top);
+  const y = (/** @type {number} */ m) => logPlace(1e3 * Math.max(least, m), errorRange, box.bottom, box.top);
   const methods = [...new Set(good.map((p) => p.method))];
   return {
     methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),

@@ -112,7 +112,7 @@ export class PlanPanel {
       const cell = row.insertCell();
       cell.className = "bar";
       const bar = document.createElement("i");
-      cell.append(bar);
+      if (on) cell.append(bar);
       const value = row.insertCell();
       value.textContent = on ? "–" : "off";
       return { bar, value, ms };

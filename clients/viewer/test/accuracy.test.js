@@ -70,6 +70,8 @@ test("without a study the live point has a plot of its own; without an error it 
   assert.equal(layOut([], null, BOX).live, null);
   const resting = layOut([], estimate({ error_m: 4e-17 }), BOX);
   assert.ok(resting.errorRange.low >= 1e-6 && resting.errorRange.high <= 1e-3, "rounding is no scale");
+  const studied = layOut(POINTS, estimate({ error_m: 4e-17 }), BOX);
+  assert.ok(studied.errorRange.low >= 1e-3 && Number(studied.live?.y) > Math.max(...studied.marks.map((m) => m.y)), "rest is at the foot of what was studied");
 });
 
 test("parts of the error are shares of their sum, and what nobody knows is no part", () => {
