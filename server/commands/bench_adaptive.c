@@ -190,6 +190,7 @@ static double go(pal_world *world, const pressed *p, double share, int n_step, d
     for (int step = 0; step < n_step; step++) {
         if (body->revision != seen) load(world, p, share);
         seen = body->revision;
+        pal_world_wake(world);
         uint64_t began = pal_clock_thread_ns();
         if (pal_world_step(world, step_s)) return -1;
         spent += pal_clock_thread_ns() - began;
@@ -319,6 +320,7 @@ static void tell_rows(pal_world *world, double *ms, int n_step, live_row *out)
 
 static double timed_step(pal_world *world)
 {
+    pal_world_wake(world);
     uint64_t began = pal_clock_thread_ns();
     if (pal_world_step(world, live_s)) return NAN;
     return 1e-6 * (double)(pal_clock_thread_ns() - began);

@@ -143,6 +143,7 @@ static pal_err run_world(const pal_scene *scene, result *out, pal_note *note)
     PAL_TRY(pal_world_create(scene, note, &world));
     pal_err err = PAL_ERR_OK;
     for (int i = -2; i < N_STEP && !err; i++) {
+        pal_world_wake(world);
         err = pal_world_step(world, scene->step_s);
         out->n_sub = pal_world_substeps(world);
         if (i < 0) continue;

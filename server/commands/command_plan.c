@@ -1,14 +1,16 @@
 /* `palpate plan`: the rows of a scene, their memory, and what they cost on this machine: the median over up to 60 steps
- * at rest, or as many as fit into two seconds. Of a body that adapts all its levels, and what of them is active now; of
- * a subdivided solid its elements as in Table 1 of paper A. */
+ * at rest (kept from sleeping), or as many as fit into two seconds; which entry called for each row, and what is not
+ * there, with the words that would call for it. Of a body that adapts all its levels, and what of them is active now;
+ * of a subdivided solid its elements as in Table 1 of paper A. */
 #include "server/base/clock.h"
 #include "server/commands/commands.h"
 #include "server/commands/median.h"
+#include "server/commands/plan_reasons.h"
 #include "server/commands/preflight_report.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
 #include "server/commands/studied_scene.h"
-#include "server/sim/effect.h"
+#include "server/sim/effect_list.h"
 #include "server/sim/shell.h"
 #include "server/sim/solid.h"
 #include "server/sim/world.h"
@@ -30,6 +32,7 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
     double start = pal_clock_s();
     int n_row = pal_world_rows(world);
     for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MOST_S); k++, out->n_step++) {
+        pal_world_wake(world);
         uint64_t before = pal_clock_thread_ns();
         PAL_TRY(pal_world_step(world, step_s));
         out->step_ms[k] = 1e-6 * (double)(pal_clock_thread_ns() - before);
@@ -70,6 +73,21 @@ static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
         cJSON_AddNumberToObject(body, kind[k], pal_cell_elements_percent(&solid->elements, (pal_cell_kind)k));
     cJSON_AddNumberToObject(body, "nodes", b->n_node);
     cJSON_AddNumberToObject(body, "solid_bytes", (double)solid->n_byte);
+}
+
+/* the effects that this scene has no row of */
+static void add_absent(cJSON *o, const pal_world *world)
+{
+    cJSON *absent = cJSON_AddArrayToObject(o, "absent");
+    for (int i = 0; i < PAL_EFFECT_COUNT; i++) {
+        char words[128];
+        const char *name = pal_effects[i]->name;
+        if (pal_plan_has(world, name)) continue;
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddItemToArray(absent, entry);
+        cJSON_AddStringToObject(entry, "name", name);
+        cJSON_AddStringToObject(entry, "wants", pal_effect_words(name, words));
+    }
 }
 
 /* the setting that was picked from the study, and what is to be known about that */
@@ -129,7 +147,9 @@ static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
         cJSON_AddStringToObject(entry, "stage", row.stage);
         cJSON_AddNumberToObject(entry, "bytes", (double)row.n_byte);
         cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0);
+        cJSON_AddStringToObject(entry, "why", row.why);
     }
+    add_absent(o, world);
     return o;
 }
 
@@ -153,6 +173,15 @@ static void print_solid(const pal_body_def *def, const pal_body *b)
            b->surface->n_tri, 1e-6 * (double)b->solid->n_byte);
 }
 
+static void print_absent(const pal_world *world)
+{
+    char words[128];
+    printf("\n%-52s %s\n", "not there: no row, no memory, no time", "would be called for by");
+    for (int i = 0; i < PAL_EFFECT_COUNT; i++)
+        if (!pal_plan_has(world, pal_effects[i]->name))
+            printf("  %-50s %s\n", pal_effects[i]->name, pal_effect_words(pal_effects[i]->name, words));
+}
+
 static void print(const pal_studied *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
@@ -171,13 +200,14 @@ static void print(const pal_studied *studied, pal_world *world, cost *c)
         printf("%s: %d tetrahedra, %d nodes, %d shown triangles\n", scene->body[b].name,
                scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
     }
-    printf("\n%-9s %-16s %-16s %10s %10s\n", "stage", "row", "body", "kB", "ms a step");
+    printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "row", "body", "kB", "ms a step", "because of");
     for (int r = 0; r < pal_world_rows(world); r++) {
         pal_row_info row;
         pal_world_row(world, r, &row);
-        printf("%-9s %-16s %-16s %10.1f %10.4f\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
-               r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0);
+        printf("%-9s %-16s %-16s %10.1f %10.4f  %s\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
+               r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0, row.why);
     }
+    print_absent(world);
     double step_ms = pal_median(c->step_ms, c->n_step), limit_s = pal_world_limit_s(world);
     printf("\na step of %.3f ms in %d sub-step%s", 1e3 * scene->step_s, pal_world_substeps(world),
            pal_world_substeps(world) == 1 ? "" : "s");

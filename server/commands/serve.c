@@ -142,7 +142,7 @@ static pal_err open_sessions(serve_run *run, pal_note *note)
         pal_preflight preflight;
         PAL_TRY(pal_preflight_look(scene, &preflight, note));
         pal_preflight_log(&preflight, scene->name);
-        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate};
+        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
         PAL_TRY(pal_session_open(scene, &options, note, &run->session[i]));

@@ -47,6 +47,7 @@ static void leave_room(pal_hub *hub, pal_client *c)
     pal_members_leave(&room->members, c->id);
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
+    pal_session_watch(room->session, false);
     c->id = 0;
     pal_hub_members_changed(hub, room);
 }
@@ -363,7 +364,7 @@ static void hub_wake(void *user)
         if (now < next) {
             if (!due || next < due) due = next;
         } else {
-            for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = t == 0 || room->tier_users[t] > 0;
+            for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = room->tier_users[t] > 0;
             if (pal_stream_turn(room->stream, now, used, room->tool)) offer_cycle(hub, room);
         }
         next = pal_hub_make_fields(hub, room, now);

@@ -83,7 +83,8 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
     }
     hub->count.n_joined++;
     c->patches = wanted->patches;
-    room->tier_users[c->tier]++;
+    pal_session_watch(room->session, true);
+    if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello says which tool was given; a refusal follows it */
     pal_err err = PAL_ERR_OK;
     if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);

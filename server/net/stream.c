@@ -205,8 +205,12 @@ static void encode_part(pal_stream *s, int p, int tier)
                              .hidden = part->places ? part->places->hidden : NULL};
     uint32_t change = part->places ? part->places->change : 0;
     pal_frame_result result;
-    uint64_t begin = pal_clock_ns();
     if (from->n_vertex != (int)part->info.n_vertex) return;
+    /* nobody looked, or nothing was shown anew since: a body asleep */
+    if (!s->frame->watched) return;
+    bool same = part->frame_output[tier] == from->n_output && part->frame_change[tier] == change;
+    if (part->frame[tier] && same) return;
+    uint64_t begin = pal_clock_ns();
     int refusal = pal_frame_put(s->coder->encoder[p][tier], &given, s->coder->buffer, s->coder->cap, &result);
     s->count.n_encode++;
     s->count.encode_ns += pal_clock_ns() - begin;
@@ -215,6 +219,7 @@ static void encode_part(pal_stream *s, int p, int tier)
             pal_log(PAL_LOG_ERROR, "frame", "part %s is not streamed: %s", part->info.name, pal_refusal_text(refusal));
         return;
     }
+    part->frame_output[tier] = from->n_output;
     if (!result.changed && part->frame[tier] && part->frame_change[tier] == change) return;
     pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
     if (!packet) return;

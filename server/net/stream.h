@@ -4,7 +4,8 @@
  * different, one TOOLS message. Frames stand alone, so the newest messages serve everybody: the client that keeps up,
  * the one that skipped cycles, and the one that has just come. Triangles of parts that adapt do not stand alone: they
  * go as differences to what the client has (places.h), with the frame of their vertices. Tiers are accuracies of the
- * same part; a tier that nobody uses is not encoded. Thread: [net], except open and close [load]. */
+ * same part; a tier that nobody uses is not encoded, nor is a part whose positions were not computed anew. Thread:
+ * [net], except open and close [load]. */
 #ifndef PAL_NET_STREAM_H
 #define PAL_NET_STREAM_H
 #include "protocol/control.h"
@@ -23,6 +24,7 @@ typedef struct pal_stream_part {
     pal_packet *frame[PAL_STREAM_TIER];       /* newest, NULL before the first          */
     uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that made it                     */
     uint32_t frame_change[PAL_STREAM_TIER];   /* table of triangles that it belongs to, of pal_places.change */
+    uint64_t frame_output[PAL_STREAM_TIER];   /* pal_frame_part.n_output that was encoded last */
     pal_places *places;                       /* of a part that adapts, else NULL       */
     pal_packet *field[PAL_FIELD_COUNT];       /* newest values, NULL: nobody looks or none yet */
     uint64_t field_made[PAL_FIELD_COUNT];     /* another number for every message       */

@@ -272,6 +272,12 @@ static void leave_gravity_out(pal_body_def *body)
     body->n_effect = kept;
 }
 
+/* a body that nobody touches costs nothing once it rests */
+static void let_sleep(pal_body_def *body)
+{
+    pal_item_init(&body->effect[body->n_effect++], "", "sleep");
+}
+
 /* model and solver as asked for */
 static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options,
                             const pal_surface_scene_report *report, pal_note *note)
@@ -302,6 +308,7 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(&scene->body[0]);
     PAL_TRY(choose_model(&scene->body[0], options, report, note));
+    let_sleep(&scene->body[0]);
     for (int k = 0; k < scene->body[0].n_effect; k++)
         snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;
@@ -406,6 +413,7 @@ static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal
     PAL_TRY(pal_item_put_number(&body->model, "levels",
                                 options->n_level ? options->n_level : choose_levels(&loaded->cells[0]), note));
     if (!options->gravity) leave_gravity_out(body);
+    let_sleep(body);
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) body->material = options->material;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);

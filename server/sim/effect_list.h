@@ -30,6 +30,7 @@
     X(tool_grab)                                                                                                       \
     X(refine)                                                                                                          \
     X(finite_guard)                                                                                                    \
+    X(sleep)                                                                                                           \
     X(surface_out)                                                                                                     \
     X(skin_out)                                                                                                        \
     X(field_out)

@@ -48,7 +48,8 @@ pal_err pal_field_add(pal_field_rows *rows, pal_plan *plan, int body, pal_field 
 {
     if (!pal_field_given(plan, body, field)) return refuse(plan, body, field, note);
     if (plan->body[body].field[field]) return PAL_ERR_OK;
-    pal_row row = {.effect = &pal_effect_field_out};
+    pal_row row = {.effect = pal_effect_find("field_out")};
+    if (!row.effect) return pal_note_set(note, PAL_ERR_REFUSED, "this build has no effect \"field_out\"");
     pal_arena *arena = pal_arena_create(4096, true);
     pal_err err = arena ? make_row(plan, body, field, arena, note, &row) : PAL_ERR_MEMORY;
     if (err) {

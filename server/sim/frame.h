@@ -58,6 +58,7 @@ typedef struct pal_frame {
     uint64_t end_ns;  /* pal_clock_ns at the end of the step                                     */
     uint64_t step_ns; /* processor time of the step                                              */
     int n_substep;
+    bool watched; /* positions are of this tick; false: nobody looks, they may be older */
     /* filled by the session */
     bool paused;
     double slowdown;    /* real over simulated time, 1: in time (mean over the last second)        */

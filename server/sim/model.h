@@ -4,7 +4,8 @@
 #include "server/sim/effect.h"
 
 typedef struct pal_model pal_model;
-/* the rows a model asks for, in order; items are filled with derived constants that the scene did not give */
+/* the rows a model asks for, in order, with a solver where the scene names none; items are filled with derived
+ * constants that the scene did not give */
 typedef struct pal_recipe {
     int n_row;
     pal_item row[PAL_ROW_ITEMS]; /* FORCE, SOLVE and extra rows by effect name */

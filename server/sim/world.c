@@ -403,6 +403,11 @@ pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body,
     return err;
 }
 
+void pal_world_wake(pal_world *world)
+{
+    for (int b = 0; b < world->plan.n_body; b++) world->plan.body[b].asleep = false;
+}
+
 void pal_world_watch(pal_world *world, bool watched)
 {
     world->unwatched = !watched;
@@ -529,8 +534,9 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         pal_step step = step_of(w, b);
         step.dt_s = dt_s;
         step.n_sub = 1;
-        bool output = stage == PAL_STAGE_OUTPUT, skips = output ? w->unwatched : step.body->asleep;
-        /* a body that fell asleep in this step is shown where it lies */
+        bool output = stage == PAL_STAGE_OUTPUT,
+             skips = output ? w->unwatched && !step.body->asleep : step.body->asleep;
+        /* a body that fell asleep in this step is shown where it lies: that is how tools are seen to come near */
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
             pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];

@@ -95,6 +95,8 @@ void pal_world_tidy(pal_world *world);
 pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
                              pal_note *note);
 
+/* Bodies that sleep (row sleep) are awake in the next step: for measuring what a step costs. [sim] */
+void pal_world_wake(pal_world *world);
 /* Nobody looks at the world (false) or somebody does (true, as after create): while nobody does, OUTPUT rows are run
  * only for bodies that a tool may touch in the coming step. Motion and hash know nothing of it. true brings what is
  * shown up to date at once. [sim] */

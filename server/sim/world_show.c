@@ -92,6 +92,7 @@ void pal_world_frame(const pal_world *world, pal_frame *out)
     out->end_ns = w->end_ns;
     out->step_ns = w->step_ns;
     out->n_substep = w->n_substep;
+    out->watched = !w->unwatched;
     for (int b = 0; b < out->n_part; b++) copy_part(&w->plan.body[b], &out->part[b]);
     out->n_tool = w->tools.n_tool;
     for (int t = 0; t < w->tools.n_tool; t++) copy_tool(w, t, &out->tool[t]);

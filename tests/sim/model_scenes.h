@@ -4,9 +4,9 @@
 #ifndef TESTS_SIM_MODEL_SCENES_H
 #define TESTS_SIM_MODEL_SCENES_H
 #include "server/mesh/cell_shapes.h"
-#include "server/mesh/stomach.h"
 #include "server/sim/world.h"
 #include "tests/check.h"
+#include "tests/session/small_scene.h"
 #include "tests/sim/boxes.h"
 
 typedef enum model_kind { SPRINGS, FEM, SHELL, SOLID, MODEL_KINDS } model_kind;
@@ -68,7 +68,7 @@ static inline void model_scene_make(model_scene *m, model_kind kind)
     if (kind == SPRINGS || kind == FEM) model_scene_box(m);
     if (kind == SOLID) model_scene_solid(m);
     if (kind == SHELL) {
-        if (pal_sphere_make(0.04, &m->mesh.surface)) abort();
+        if (!small_ball(&m->mesh.surface, 0.04, 8)) abort();
         pal_body_default(m->def, "thing", &m->mesh);
         pal_item_init(&m->def->output, "bodies[0].output", "surface_out");
     }

@@ -680,6 +680,12 @@ static bool settle(void *self, pal_step *step, const double *moved)
     return again;
 }
 
+/* the nearest vertex is taken within one and a half of the reach (close_on) */
+static double how_far_m(const void *self, const pal_tool *tool)
+{
+    return 1.5 * reach_m(self, tool);
+}
+
 static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply, .settle = settle};
 
 const pal_effect pal_effect_tool_grab = {.name = "tool_grab",
@@ -690,4 +696,5 @@ const pal_effect pal_effect_tool_grab = {.name = "tool_grab",
                                          .reset = reset,
                                          .hand = hand,
                                          .destroy = destroy,
+                                         .reach_m = how_far_m,
                                          .tangent = &tangent};

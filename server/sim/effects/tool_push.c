@@ -643,12 +643,7 @@ static pal_err run(void *self, pal_step *step)
 
 /* ---- implicit solvers ---- */
 
-static void linearise(void *self, const pal_body *body)
-{
-    /* the ties of a sub-step are made by run */
-    (void)self, (void)body;
-}
-
+/* the ties of a sub-step are made by run, so there is nothing to linearise */
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
     (void)body, (void)c;
@@ -687,7 +682,12 @@ static bool settle(void *self, pal_step *step, const double *moved)
     return again;
 }
 
-static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply, .settle = settle};
+static double how_far_m(const void *self, const pal_tool *tool)
+{
+    return tool->radius_m + near_m(self, tool->radius_m);
+}
+
+static const pal_tangent tangent = {.multiply = multiply, .settle = settle};
 
 const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .stage = PAL_STAGE_CONTACT,
@@ -696,4 +696,5 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .material = material,
                                          .reset = reset,
                                          .wanted = wanted,
+                                         .reach_m = how_far_m,
                                          .tangent = &tangent};

@@ -145,7 +145,7 @@ static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, 
     }
     if (def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
     if (k->refine && k->shell.n_level > 1) pal_item_init(row++, item->path, "refine");
-    pal_item_init(row++, item->path, "rk4");
+    if (!def->solver.name[0]) pal_item_init(row++, item->path, "rk4");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;
 }

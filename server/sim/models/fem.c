@@ -63,7 +63,7 @@ static pal_err list_rows(const pal_item *item, const pal_build *build, const fem
         choice->law && !strcmp(choice->law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
     if (own_law) PAL_TRY(pal_item_put_bool(row, "untangle", false, build->note));
     if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
-    pal_item_init(&out->row[out->n_row++], item->path, "implicit_euler");
+    if (!build->def->solver.name[0]) pal_item_init(&out->row[out->n_row++], item->path, "implicit_euler");
     return PAL_ERR_OK;
 }
 

@@ -192,7 +192,7 @@ static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, 
     if (k->operator) PAL_TRY(pal_item_put_text(row, "operator", k->operator, build->note));
     row++;
     if (build->def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
-    pal_item_init(row++, item->path, "central_cg");
+    if (!build->def->solver.name[0]) pal_item_init(row++, item->path, "central_cg");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;
 }

@@ -100,7 +100,7 @@ static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
     for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
         PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
     if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
-    pal_item_init(&out->row[out->n_row++], item->path, "verlet");
+    if (!build->def->solver.name[0]) pal_item_init(&out->row[out->n_row++], item->path, "verlet");
     return PAL_ERR_OK;
 }
 

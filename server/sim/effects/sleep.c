@@ -1,0 +1,202 @@
+/* Row sleep: a body at rest costs next to nothing until something comes near (numerics.md part 3: "sleep below
+ * threshold").
+ *
+ * It falls asleep when for `still_s` of simulated time no point was faster than speed_1_s S, the triangles were the
+ * same, no tool was near and no row's force changed by itself with time, and when after that the forces left over would
+ * move it by less than rest_1_s2 S in s^2, on average over its mass (S: the body's box diagonal). Velocities are then
+ * 0, positions stay as they are to the bit, and none of the body's rows is run. What CONTACT rows knew of tools is
+ * forgotten, as after a reset.
+ *
+ * It wakes in the step in which a tool comes as near as the CONTACT rows reach (their hook reach_m), swept along the
+ * tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
+ * reset. A tool that is near where the shown surface is farther away than one triangle's edge keeps it awake, so that
+ * nearness is a matter of vertices alone.
+ *
+ * Departure: numerics.md asks for a threshold of speed alone; a body that creeps against a drag of 1e6 times the
+ * critical one is slow and not at rest, hence the forces.
+ *
+ * Keys: still_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
+#include "server/base/vec3.h"
+#include "server/sim/effect.h"
+#include "server/sim/shell.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef struct sleeper {
+    double still_s, speed_1_s, rest_1_s2;
+    double calm_s;     /* for so long nothing has moved */
+    uint64_t revision; /* of the triangles, meanwhile   */
+    bool boxed;        /* box and edge_m are of now     */
+    double low[3], high[3], edge_m;
+} sleeper;
+
+static pal_err make(pal_item *item, pal_build *build, void **self)
+{
+    sleeper *row = PAL_NEW(build->arena, sleeper, 1);
+    if (!row) return PAL_ERR_MEMORY;
+    *row = (sleeper){.still_s = 0.5, .speed_1_s = 1e-4, .rest_1_s2 = 1e-4};
+    PAL_TRY(pal_item_number(item, "still_s", 0, 1e9, &row->still_s, build->note));
+    PAL_TRY(pal_item_number(item, "speed_1_s", 0, 1e3, &row->speed_1_s, build->note));
+    PAL_TRY(pal_item_number(item, "rest_1_s2", 0, 1e6, &row->rest_1_s2, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    *self = row;
+    return PAL_ERR_OK;
+}
+
+/* no point moves; a speed that is no number is not slow */
+static bool slow(const sleeper *row, const pal_body *body)
+{
+    double most = row->speed_1_s * body->size_m, most2 = most * most;
+    bool all = true;
+    for (int k = 0; k < body->n_active; k++) {
+        const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
+        all &= pal_dot3(v, v) <= most2;
+    }
+    return all;
+}
+
+/* does some row's force still change by itself? */
+static bool changes(const pal_row *row, int n, double time_s)
+{
+    for (int i = 0; i < n; i++)
+        if (row[i].effect->settled_s && !(time_s >= row[i].effect->settled_s(row[i].self))) return true;
+    return false;
+}
+
+static const float *shown_vertex(const pal_body *body, int k)
+{
+    return body->shown + 3 * (size_t)(body->shell ? body->active[k] : k);
+}
+
+/* box of what is shown and its longest edge */
+static void measure(sleeper *row, const pal_body *body)
+{
+    const int32_t *tri = body->shell ? body->shell->tri : body->surface->tri;
+    int n_tri = body->shell ? body->shell->n_tri : body->surface->n_tri;
+    int n_shown = body->shell ? body->n_active : body->n_shown;
+    double edge2 = 0;
+    for (int c = 0; c < 3; c++) row->low[c] = INFINITY, row->high[c] = -INFINITY;
+    for (int k = 0; k < n_shown; k++)
+        for (int c = 0; c < 3; c++) {
+            row->low[c] = fmin(row->low[c], (double)shown_vertex(body, k)[c]);
+            row->high[c] = fmax(row->high[c], (double)shown_vertex(body, k)[c]);
+        }
+    for (int i = 0; i < 3 * n_tri; i++) {
+        const float *a = body->shown + 3 * (size_t)tri[i], *b = body->shown + 3 * (size_t)tri[i - i % 3 + (i + 1) % 3];
+        double x = (double)a[0] - (double)b[0], y = (double)a[1] - (double)b[1], z = (double)a[2] - (double)b[2];
+        edge2 = fmax(edge2, x * x + y * y + z * z);
+    }
+    row->edge_m = sqrt(edge2);
+    row->boxed = true;
+}
+
+/* does the way a..b come within reach of the box? conservative: each axis on its own */
+static bool passes_box(const sleeper *row, const double a[3], const double b[3], double reach)
+{
+    bool all = true;
+    for (int c = 0; c < 3; c++)
+        all = all && fmin(a[c], b[c]) <= row->high[c] + reach && fmax(a[c], b[c]) >= row->low[c] - reach;
+    return all;
+}
+
+/* does it come within reach of a vertex? */
+static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
+{
+    int n_shown = body->shell ? body->n_active : body->n_shown;
+    double way[3], reach2 = reach * reach;
+    pal_sub3(way, b, a);
+    double way2 = pal_dot3(way, way);
+    for (int k = 0; k < n_shown; k++) {
+        const float *s = shown_vertex(body, k);
+        double from[3] = {(double)s[0] - a[0], (double)s[1] - a[1], (double)s[2] - a[2]};
+        double t = way2 > 0 ? fmin(fmax(pal_dot3(from, way) / way2, 0), 1) : 0;
+        pal_axpy3(from, -t, way);
+        if (pal_dot3(from, from) <= reach2) return true;
+    }
+    return false;
+}
+
+/* comes some tool as near in this step as some row of contact reaches? */
+static bool tool_near(sleeper *row, const pal_step *step)
+{
+    const pal_body *body = step->body;
+    for (int t = 0; t < step->tools->n_tool; t++) {
+        const pal_tool *tool = &step->tools->tool[t];
+        double reach = 0, a[3], b[3];
+        if (!tool->present && tool->ramp <= 0) continue;
+        for (int i = 0; i < step->n_contact; i++) {
+            const pal_row *of = &step->contact[i];
+            if (of->effect->reach_m) reach = fmax(reach, of->effect->reach_m(of->self, tool));
+        }
+        if (reach == 0) continue;
+        if (!row->boxed) measure(row, body);
+        /* no place of a triangle is farther from its nearest corner */
+        reach += row->edge_m * 0.57735026918962573;
+        pal_sub3(a, tool->last.position_m, body->offset_m);
+        pal_sub3(b, tool->next.position_m, body->offset_m);
+        if (passes_box(row, a, b, reach) && passes_vertex(body, a, b, reach)) return true;
+    }
+    return false;
+}
+
+/* sum of the forces left over against what rest allows */
+static bool balanced(const sleeper *row, pal_step *step)
+{
+    const pal_body *body = step->body;
+    double force = 0, mass = 0;
+    step->drag_apart = false;
+    if (pal_gather(step)) return false;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        mass += body->mass_kg[i];
+        if (!body->held[i]) force += pal_norm3(body->g + 3 * (size_t)i);
+    }
+    return force <= row->rest_1_s2 * body->size_m * mass;
+}
+
+static void fall_asleep(pal_step *step)
+{
+    pal_body *body = step->body;
+    for (int k = 0; k < body->n_active; k++) pal_set3(body->v + 3 * (size_t)pal_body_point(body, k), 0, 0, 0);
+    pal_body_place(body);
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_row *row = &step->contact[i];
+        if (row->effect->reset) row->effect->reset(row->self, body);
+    }
+    body->asleep = true;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    sleeper *row = self;
+    pal_body *body = step->body;
+    bool same = row->revision == body->revision;
+    row->revision = body->revision;
+    row->boxed = false;
+    bool calm = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
+                !changes(step->contact, step->n_contact, step->time_s) && !tool_near(row, step);
+    row->calm_s = calm ? row->calm_s + step->dt_s : 0;
+    /* a hair less, so that a sum of steps is what it is meant to be */
+    if (row->calm_s < row->still_s * (1 - 1e-9)) return PAL_ERR_OK;
+    row->calm_s = 0;
+    if (calm && balanced(row, step)) fall_asleep(step);
+    row->boxed = false;
+    return PAL_ERR_OK;
+}
+
+static bool wakes(void *self, pal_step *step)
+{
+    return tool_near(self, step);
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    sleeper *row = self;
+    (void)body;
+    row->calm_s = 0;
+    row->boxed = false;
+}
+
+const pal_effect pal_effect_sleep = {
+    .name = "sleep", .stage = PAL_STAGE_GUARD, .make = make, .run = run, .reset = reset, .wakes = wakes};
