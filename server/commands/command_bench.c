@@ -12,7 +12,7 @@ int command_bench(int argc, char **argv)
                               "adaptive: where the pressed vertex is over time (paper C Figs. 10 and 12)"}};
     const pal_flag_table table = {
         .usage = "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | calibrate [FOLDER] | protocol | "
-                 "latency [flags]",
+                 "sleep | latency [flags]",
         .about = "Measures this machine, medians of several runs:\n"
                  "  mesh      preparation of tetrahedra at several resolutions (of a "
                  "procedural organ without SURFACE)\n"
@@ -23,6 +23,7 @@ int command_bench(int argc, char **argv)
                  "  calibrate springs fitted to finite elements, by gradient and by "
                  "annealing (FOLDER: deploy/problems)\n"
                  "  protocol  encoding and decoding of frames\n"
+                 "  sleep     bodies at rest: awake, watched by nobody, asleep\n"
                  "  latency   from a pose put into a session to the frame that shows it\n",
         .flag = flag,
         .n_flag = sizeof flag / sizeof flag[0],
@@ -50,6 +51,7 @@ int command_bench(int argc, char **argv)
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "solids")) return bench_solids(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
+    if (!strcmp(word[0], "sleep")) return bench_sleep(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);
     fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);
     return 2;

@@ -29,6 +29,7 @@ int bench_mesh(const char *ply_path_or_null, bool json);
 int bench_springs(bool json);
 int bench_protocol(bool json);
 int bench_latency(bool json);
+int bench_sleep(bool json);
 int bench_fem(bool json);
 int bench_solids(bool json);
 int bench_adaptive(bool json, const char *picture); /* picture: SVG of the ways over time, or NULL */

@@ -58,6 +58,7 @@ static int compare(const void *a, const void *b)
 /* one step on the clock; false: it cannot go on */
 static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
 {
+    pal_world_wake(w->world);
     uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(w->world, w->set->scene.step_s);
     if (err == PAL_ERR_BUDGET) return pal_note_set(note, err, "needs more sub-steps than the scene allows");

@@ -178,7 +178,8 @@ static void bare_cells_become_a_scene(void)
     CHECK_NEAR(def->material.young_Pa, 9000, 0);
     CHECK_NEAR(def->support[0].fraction, 0.2, 0);
     CHECK_NEAR(loaded->scene.up[1], 1, 0);
-    CHECK_INT(def->n_effect, 3);
+    CHECK_INT(def->n_effect, 4);
+    CHECK_TEXT(def->effect[3].name, "sleep");
     CHECK(loaded->scene.tool[2].radius_m > 0);
     CHECK(!pal_scene_rename(loaded, "liver", "Liver", "us", &note));
     CHECK_TEXT(loaded->scene.body[0].name, "liver");
