@@ -31,7 +31,15 @@ static void reset(void *self, const pal_body *body)
     row->gone = true;
 }
 
-const pal_effect pal_effect_ease = {.name = "ease", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset};
+/* while it is there its load falls */
+static double settled_s(const void *self)
+{
+    (void)self;
+    return INFINITY;
+}
+
+const pal_effect pal_effect_ease = {
+    .name = "ease", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset, .settled_s = settled_s};
 
 /* ---- rows that come and go ---- */
 

@@ -418,6 +418,7 @@ void pal_world_watch(pal_world *world, bool watched)
 pal_err pal_world_ease(pal_world *world, int body, const double *force_N)
 {
     if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
+    world->plan.body[body].asleep = false;
     return pal_ease_rows_set(&world->eases, &world->plan, body, force_N);
 }
 
