@@ -11,6 +11,7 @@
 
 static pal_scene scene;
 static pal_prepared mesh;
+static const uint64_t patience_ns = 120000000000u; /* sanitizers on a busy machine */
 
 static int threads(void)
 {
@@ -31,10 +32,10 @@ static void ask(pal_session *s, bool wanted)
     CHECK(!pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = 0, .wanted = wanted}));
 }
 
-/* the first estimate, or one of a later tick; gives up after 20 s */
+/* the first estimate, or one of a later tick; gives up after two minutes */
 static bool wait_estimate(pal_session *s, uint64_t after, pal_estimate *out)
 {
-    uint64_t until = pal_clock_ns() + 20000000000u;
+    uint64_t until = pal_clock_ns() + patience_ns;
     while (!(pal_session_estimate(s, 0, out) && out->tick >= after)) {
         if (pal_clock_ns() > until) return false;
         sleep_ms(5);
@@ -44,7 +45,7 @@ static bool wait_estimate(pal_session *s, uint64_t after, pal_estimate *out)
 
 static bool wait_threads(int n)
 {
-    uint64_t until = pal_clock_ns() + 20000000000u;
+    uint64_t until = pal_clock_ns() + patience_ns;
     while (pal_estimator_threads() != n) {
         if (pal_clock_ns() > until) return false;
         sleep_ms(2);
@@ -365,13 +366,9 @@ static void a_pressed_body_is_estimated_while_it_runs(void)
     pal_session *s = NULL;
     pal_estimate e = {.tick = 0};
     fem->body[0].n_effect = scene.body[0].n_effect;
-    int n = 0;
-    for (int i = 0; i < scene.body[0].n_effect; i++)
-        if (strcmp(scene.body[0].effect[i].name, "gravity")) fem->body[0].effect[n++] = scene.body[0].effect[i];
-    fem->body[0].n_effect = n;
     REQUIRE(!pal_session_open(fem, NULL, NULL, &s));
     ask(s, true);
-    uint64_t until = pal_clock_ns() + 30000000000u;
+    uint64_t until = pal_clock_ns() + patience_ns;
     while (pal_clock_ns() < until && !(e.most_m > 1e-4 && e.discretisation_m > 0)) {
         const pal_pose pose = {.position_m = {0.048, 0, 0.01}, .quat = {1, 0, 0, 0}};
         CHECK(!pal_session_put_pose(s, 0, &pose));
@@ -386,9 +383,19 @@ static void a_pressed_body_is_estimated_while_it_runs(void)
     free(fem);
 }
 
+/* on a foot as small as a voxel the ball would fall over */
+static void without_gravity(pal_body_def *body)
+{
+    int n = 0;
+    for (int i = 0; i < body->n_effect; i++)
+        if (strcmp(body->effect[i].name, "gravity")) body->effect[n++] = body->effect[i];
+    body->n_effect = n;
+}
+
 int main(void)
 {
     if (!small_scene(&scene, &mesh, 8)) return 1;
+    without_gravity(&scene.body[0]);
     RUN(nothing_exists_while_nobody_looks);
     RUN(what_is_not_there_is_refused);
     RUN(looking_changes_nothing);
