@@ -11,8 +11,9 @@ int command_bench(int argc, char **argv)
     const pal_flag flag[] = {{"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
                               "adaptive: where the pressed vertex is over time (paper C Figs. 10 and 12)"}};
     const pal_flag_table table = {
-        .usage = "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | calibrate [FOLDER] | protocol | "
-                 "sleep | latency [flags]",
+        .usage =
+            "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | guards | calibrate [FOLDER] | protocol | "
+            "sleep | latency [flags]",
         .about = "Measures this machine, medians of several runs:\n"
                  "  mesh      preparation of tetrahedra at several resolutions (of a "
                  "procedural organ without SURFACE)\n"
@@ -22,6 +23,7 @@ int command_bench(int argc, char **argv)
                  "  solids    subdivided solids as finite elements (paper A Table 1)\n"
                  "  calibrate springs fitted to finite elements, by gradient and by "
                  "annealing (FOLDER: deploy/problems)\n"
+                 "  guards    what being on guard costs while nothing goes wrong, as a share of a step\n"
                  "  protocol  encoding and decoding of frames\n"
                  "  sleep     bodies at rest: awake, watched by nobody, asleep\n"
                  "  latency   from a pose put into a session to the frame that shows it\n",
@@ -50,6 +52,7 @@ int command_bench(int argc, char **argv)
     if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json, picture);
     if (!strcmp(word[0], "fem")) return bench_fem(common.json);
     if (!strcmp(word[0], "solids")) return bench_solids(common.json);
+    if (!strcmp(word[0], "guards")) return bench_guards(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "sleep")) return bench_sleep(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);

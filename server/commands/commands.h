@@ -32,6 +32,7 @@ int bench_latency(bool json);
 int bench_sleep(bool json);
 int bench_fem(bool json);
 int bench_solids(bool json);
+int bench_guards(bool json);
 int bench_adaptive(bool json, const char *picture); /* picture: SVG of the ways over time, or NULL */
 int bench_calibrate(const char *folder_or_null, bool json);
 #endif

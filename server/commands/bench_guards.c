@@ -1,0 +1,184 @@
+/* `palpate bench guards`: what it costs to be on guard while nothing goes wrong, as a share of a step, for every model:
+ * two worlds of one scene, one with the row finite_guard and one without, step in turn under the same load, medians of
+ * the processor time of each. What solvers check of themselves cannot be taken out: what they look at (is all finite;
+ * of implicit ones the energy before and after) is timed alone and named beside. Asked: 3 % for the rows and checks
+ * together. */
+#include "server/base/clock.h"
+#include "server/commands/commands.h"
+#include "server/commands/median.h"
+#include "server/mesh/cell_models.h"
+#include "server/mesh/organ.h"
+#include "server/sim/world.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_CASE = 4, N_STEP = 60, N_WARM = 5 };
+
+typedef struct guards {
+    const char *model;
+    int n_point, n_sub;
+    double with_ms, without_ms, row_ms, checks_ms;
+} guards;
+
+/* what scenes of the four models are made of */
+typedef struct bodies {
+    pal_prepared voxels, shell, boundary;
+    pal_cells cells;
+} bodies;
+
+static pal_err make_bodies(bodies *b, pal_note *note)
+{
+    pal_surface organ = {0}, faces = {0};
+    pal_voxel_options options = {.resolution = 18, .border = true, .fill = true};
+    pal_prepare_report report;
+    pal_err err = pal_organ_make(2000, &organ);
+    if (!err) err = pal_prepared_make(&organ, &options, &b->voxels, &report, note);
+    if (!err) err = pal_prepared_surface(&organ, &b->shell);
+    if (!err) err = pal_cell_model_make(pal_cell_model_find("chair"), &b->cells, note);
+    if (!err) err = pal_cells_boundary(&b->cells, &faces, NULL, NULL);
+    if (!err) err = pal_prepared_surface(&faces, &b->boundary);
+    pal_surface_free(&organ);
+    pal_surface_free(&faces);
+    return err;
+}
+
+static void free_bodies(bodies *b)
+{
+    pal_prepared_free(&b->voxels);
+    pal_prepared_free(&b->shell);
+    pal_prepared_free(&b->boundary);
+    pal_cells_free(&b->cells);
+}
+
+static const char *const model_name[N_CASE] = {"tet_springs", "fem", "adaptive_springs", "subdivision_fem"};
+
+static void dress(pal_scene *scene, const bodies *b, int which, bool guard)
+{
+    pal_scene_default(scene);
+    scene->n_body = 1;
+    pal_body_def *def = &scene->body[0];
+    if (which == 3)
+        pal_body_default_cells(def, "body", &b->boundary, &b->cells);
+    else
+        pal_body_default(def, "body", which == 2 ? &b->shell : &b->voxels);
+    pal_item_init(&def->model, "model", model_name[which]);
+    def->support[0].fraction = 0.15;
+    def->n_effect = 0;
+    pal_item_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
+    if (guard) pal_item_init(&def->effect[def->n_effect++], "effects[1]", "finite_guard");
+}
+
+static double row_ms(const pal_world *world, const char *name)
+{
+    for (int i = 0; i < pal_world_rows(world); i++) {
+        pal_row_info info;
+        pal_world_row(world, i, &info);
+        if (!strcmp(info.name, name)) return 1e-6 * (double)info.spent_ns;
+    }
+    return 0;
+}
+
+/* twice a look at every number, and of an implicit solver twice the energy */
+static double checks_ms(pal_world *world)
+{
+    double ms[N_STEP], sum = 0;
+    const pal_body *body = pal_world_body(world, 0);
+    for (int k = 0; k < N_STEP; k++) {
+        uint64_t before = pal_clock_thread_ns();
+        sum += pal_body_finite(body) + pal_body_finite(body);
+        if (body->implicit) sum += 0 * (pal_world_energy_J(world) + pal_world_energy_J(world));
+        ms[k] = 1e-6 * (double)(pal_clock_thread_ns() - before);
+    }
+    return sum > 0 ? pal_median(ms, N_STEP) : 0;
+}
+
+static pal_err step_ms(pal_world *world, double step_s, double *ms)
+{
+    uint64_t before = pal_clock_thread_ns();
+    pal_err err = pal_world_step(world, step_s);
+    *ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
+    return err;
+}
+
+static pal_err measure(const bodies *b, int which, guards *out, pal_note *note)
+{
+    static pal_scene scene[2];
+    pal_world *world[2] = {NULL, NULL};
+    double ms[2][N_STEP], row[N_STEP];
+    pal_err err = PAL_ERR_OK;
+    for (int g = 0; g < 2 && !err; g++) {
+        dress(&scene[g], b, which, g == 1);
+        err = pal_world_create(&scene[g], note, &world[g]);
+    }
+    for (int k = -N_WARM; k < N_STEP && !err; k++)
+        for (int turn = 0; turn < 2 && !err; turn++) {
+            /* who is first changes from step to step */
+            int g = (k + turn) & 1;
+            double took;
+            err = step_ms(world[g], scene[g].step_s, &took);
+            if (k >= 0) ms[g][k] = took;
+            if (k >= 0 && g == 1) row[k] = row_ms(world[1], "finite_guard");
+        }
+    if (!err) {
+        *out = (guards){.model = model_name[which],
+                        .n_point = pal_world_body(world[1], 0)->n_active,
+                        .n_sub = pal_world_substeps(world[1]),
+                        .with_ms = pal_median(ms[1], N_STEP),
+                        .without_ms = pal_median(ms[0], N_STEP),
+                        .row_ms = pal_median(row, N_STEP),
+                        .checks_ms = checks_ms(world[1])};
+    }
+    for (int g = 0; g < 2; g++) pal_world_destroy(world[g]);
+    return err;
+}
+
+static void print(const guards *r)
+{
+    printf("%-18s %8s %10s %12s %12s %12s %14s\n", "model", "points", "sub-steps", "ms with", "ms without", "row %",
+           "own checks %");
+    for (int k = 0; k < N_CASE; k++)
+        printf("%-18s %8d %10d %12.4f %12.4f %12.2f %14.2f\n", r[k].model, r[k].n_point, r[k].n_sub, r[k].with_ms,
+               r[k].without_ms, 100 * r[k].row_ms / r[k].with_ms, 100 * r[k].checks_ms / r[k].with_ms);
+}
+
+static void print_json(const guards *r)
+{
+    cJSON *o = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(o, "guards");
+    cJSON_AddBoolToObject(o, "ok", true);
+    for (int k = 0; k < N_CASE; k++) {
+        cJSON *one = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, one);
+        cJSON_AddStringToObject(one, "model", r[k].model);
+        cJSON_AddNumberToObject(one, "points", r[k].n_point);
+        cJSON_AddNumberToObject(one, "with_ms", r[k].with_ms);
+        cJSON_AddNumberToObject(one, "without_ms", r[k].without_ms);
+        cJSON_AddNumberToObject(one, "row_share", r[k].row_ms / r[k].with_ms);
+        cJSON_AddNumberToObject(one, "checks_share", r[k].checks_ms / r[k].with_ms);
+    }
+    char *text = cJSON_PrintUnformatted(o);
+    if (text) printf("%s\n", text);
+    cJSON_free(text);
+    cJSON_Delete(o);
+}
+
+int bench_guards(bool json)
+{
+    bodies b = {0};
+    guards r[N_CASE] = {0};
+    pal_note note = {""};
+    pal_err err = make_bodies(&b, &note);
+    for (int k = 0; k < N_CASE && !err; k++) err = measure(&b, k, &r[k], &note);
+    free_bodies(&b);
+    if (err) {
+        fprintf(stderr, "palpate bench: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        return 3;
+    }
+    if (json)
+        print_json(r);
+    else
+        print(r);
+    return 0;
+}
