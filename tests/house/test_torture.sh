@@ -29,7 +29,7 @@ end() {
     fi
 }
 run() {
-    timeout 120 "$palpate" torture "$@" >out 2>err </dev/null
+    timeout 600 "$palpate" torture "$@" >out 2>err </dev/null
     code=$?
 }
 has() { grep -q -- "$1" "$2"; }
