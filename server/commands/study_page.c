@@ -69,7 +69,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->most_m);
         print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->most_m);
         print_cell(to, 9, "%.4f", 1e3 * p->way_most_m);
-        fprintf(to, " %8d %6d  %s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text));
+        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text),
+                p->why[0] ? "; " : "", p->why);
     }
     fprintf(to,
             "* the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with shorter "
@@ -230,7 +231,7 @@ static void put_row(FILE *to, const pal_study *s, const pal_study_point *p)
                             : " class=\"bad\"",
             p->priced.front ? "&#9733;" : "");
     put_text(to, pal_setting_text(&p->priced.setting, text));
-    if (!measured) {
+    if (!measured || p->why[0]) {
         fputs("<br>", to);
         put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
     }

@@ -20,9 +20,9 @@
 enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_WAY = 512 };
 
 typedef struct pal_study_point {
-    pal_priced_setting priced; /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
-    pal_err err;               /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
-    char why[PAL_SETTING_TEXT];
+    pal_priced_setting priced;  /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
+    pal_err err;                /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
+    char why[PAL_SETTING_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged by" */
     int n_node, n_substep;
     double ms_p95;
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */

@@ -1,4 +1,5 @@
-/* Springs fitted to the study's reference: homogeneous constants of edges and volumes, by the adjoint. */
+/* Springs fitted to the study's reference: homogeneous constants of edges and volumes, by the adjoint. Where there are
+ * several loads the last one is not fitted to, so that the point is judged by a load it has never seen as well. */
 #include "server/base/vec3.h"
 #include "server/lab/calibrate.h"
 #include "server/lab/study_parts.h"
@@ -50,7 +51,8 @@ pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
     pal_calibrate_default(&options);
     options.voxel.resolution = setting->size;
     options.without_area = true;
-    for (int k = 0; k < job->n_load && !err; k++) {
+    int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
+    for (int k = 0; k < n_fit && !err; k++) {
         err = take_samples(job, k, &samples[k]);
         cases[k] = (pal_calibrate_case){
             .load_case = job->load[k], .samples = &samples[k], .truth_name = "reference", .fit = true};
@@ -58,10 +60,10 @@ pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
     if (job->problem->n_support == 0)
         err = pal_note_set(note, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
     if (!err)
-        err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, job->n_load, &options,
+        err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
                                      &calibration, note);
     if (!err) err = fit(calibration, setting, note);
     pal_calibration_destroy(calibration);
-    for (int k = 0; k < job->n_load; k++) pal_samples_free(&samples[k]);
+    for (int k = 0; k < n_fit; k++) pal_samples_free(&samples[k]);
     return err;
 }

@@ -175,6 +175,7 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
     out->ms_p95 = out->static_rms_m = out->static_most_m = out->way_rms_m = out->way_most_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
     if (wish->calibrate && fit(job, out)) return PAL_ERR_OK;
+    if (wish->calibrate && job->n_load == 1) snprintf(out->why, sizeof out->why, "fitted to the load it is judged by");
     if (!job->rest.known || !same_rest(&job->rest.of, &out->priced.setting))
         find_rest(job, &out->priced.setting, &n_node);
     out->n_node = n_node;
