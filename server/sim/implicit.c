@@ -11,6 +11,9 @@
 static const double most_move_S = 0.2;
 /* of a step's loads: residuals below are not worth an iteration, so that a body at rest costs none */
 static const double floor_share = 1e-7;
+/* of 10 E h^2 (load_cap_N), the same for a body without loads: forces that move a node by less of an element are the
+ * rounding of positions, and conjugate gradients and the watch of energy would go on over it */
+static const double still_share = 1e-11;
 /* most iterations of a step that began with one and gained energy */
 enum { rescue_newton = 8 };
 /* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
@@ -369,7 +372,8 @@ static double total_energy(pal_implicit *core, const double *velocity, double *s
         pal_system_contact(&core->system, 1, 0, p, q);
         work -= 0.5 * pal_sum_products(core->cg.n, p, q);
     }
-    *slack = 1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows);
+    *slack =
+        1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows) + still_share * still_share * body->load_cap_N * body->h_m;
     return kinetic + rows - work;
 }
 
@@ -421,6 +425,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
         if (k == 0) {
             core->reference = fmax(size, floor_share * fmax(tau * load_size(core), left));
+            core->reference = fmax(core->reference, still_share * tau * body->load_cap_N * sqrt(body->n_dof));
         }
         double best = core->wish.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
