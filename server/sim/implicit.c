@@ -356,6 +356,12 @@ static void iterate(pal_implicit *core, double tau, double target)
     core->report.step_size = 1;
 }
 
+/* a force on a node that is nothing; a body without a cap has none */
+static double still_N(const pal_body *body)
+{
+    return isfinite(body->load_cap_N) ? still_share * body->load_cap_N : 0;
+}
+
 /* energy at velocities v, the body being at its x: kinetic, of the rows, less the work of loads and contact since the
  * sub-step's begin; *slack: what of it is not worth an iteration */
 static double total_energy(pal_implicit *core, const double *velocity, double *slack)
@@ -372,8 +378,7 @@ static double total_energy(pal_implicit *core, const double *velocity, double *s
         pal_system_contact(&core->system, 1, 0, p, q);
         work -= 0.5 * pal_sum_products(core->cg.n, p, q);
     }
-    *slack =
-        1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows) + still_share * still_share * body->load_cap_N * body->h_m;
+    *slack = 1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows) + still_share * still_N(body) * body->h_m;
     return kinetic + rows - work;
 }
 
@@ -425,7 +430,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
         if (k == 0) {
             core->reference = fmax(size, floor_share * fmax(tau * load_size(core), left));
-            core->reference = fmax(core->reference, still_share * tau * body->load_cap_N * sqrt(body->n_dof));
+            core->reference = fmax(core->reference, tau * still_N(body) * sqrt(body->n_dof));
         }
         double best = core->wish.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
