@@ -42,6 +42,7 @@ typedef struct serve_run {
     pal_loaded_scene *scene[MOST_SESSIONS];
     const char *word[MOST_SESSIONS];    /* as it was given; NULL: none                     */
     pal_studied studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
+    pal_preflight preflight[MOST_SESSIONS];
     pal_session *session[MOST_SESSIONS];
     const pal_priced_setting *setting[MOST_SESSIONS]; /* what the server borrows of them */
     int n_setting[MOST_SESSIONS], setting_body[MOST_SESSIONS];
@@ -139,9 +140,7 @@ static pal_err open_sessions(serve_run *run, pal_note *note)
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
-        pal_preflight preflight;
-        PAL_TRY(pal_preflight_look(scene, &preflight, note));
-        pal_preflight_log(&preflight, scene->name);
+        PAL_TRY(pal_preflight_look(scene, &run->preflight[i], note));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
@@ -171,6 +170,8 @@ static pal_err open_server(serve_run *run, pal_note *note)
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");
     pal_server_connect(run->server, run->gate);
+    /* only now: who is refused is told that and nothing else */
+    for (int i = 0; i < run->n; i++) pal_preflight_log(&run->preflight[i], run->studied[i].scene->name);
     return PAL_ERR_OK;
 }
 
