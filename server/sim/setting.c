@@ -207,12 +207,9 @@ bool pal_setting_box(const pal_scene *scene, int body, int support, pal_support 
 {
     const pal_body_def *def = &scene->body[body];
     const pal_support *from = &def->support[support];
-    const double *x = def->cells                   ? def->cells->x
-                      : def->mesh->tets.n_node > 0 ? def->mesh->tets.x
-                                                   : def->mesh->surface.x;
-    int n = def->cells                   ? def->cells->n_vertex
-            : def->mesh->tets.n_node > 0 ? def->mesh->tets.n_node
-                                         : def->mesh->surface.n_vertex;
+    /* of the shape that every mesh is made from: nodes of a mesh of whole voxels stand up to one of them beyond it */
+    const double *x = def->cells ? def->cells->x : def->mesh->surface.x;
+    int n = def->cells ? def->cells->n_vertex : def->mesh->surface.n_vertex;
     int axis = 0;
     double low = INFINITY, high = -INFINITY, far = 0;
     for (int c = 1; c < 3; c++)

@@ -193,8 +193,8 @@ static void the_lowest_part_is_held_as_a_box(void)
     organ_make(&o, true);
     o.scene->body[0].support[0] = (pal_support){.lowest = true, .fraction = 0.2};
     double low = INFINITY, high = -INFINITY;
-    for (int i = 0; i < o.mesh.tets.n_node; i++)
-        low = fmin(low, o.mesh.tets.x[3 * i + 2]), high = fmax(high, o.mesh.tets.x[3 * i + 2]);
+    for (int i = 0; i < o.mesh.surface.n_vertex; i++)
+        low = fmin(low, o.mesh.surface.x[3 * i + 2]), high = fmax(high, o.mesh.surface.x[3 * i + 2]);
     for (int size = 7; size <= 15; size += 4) {
         pal_set_scene *set = NULL;
         double nearest = 1, top = low + 0.2 * (high - low);
@@ -217,6 +217,32 @@ static void the_lowest_part_is_held_as_a_box(void)
     CHECK_NEAR(box.low_m[2], high - 0.2 * (high - low), 1e-8);
     pal_set3(o.scene->up, 0.6, 0, 0.8);
     CHECK(!pal_setting_box(o.scene, 0, 0, &box));
+    organ_free(&o);
+}
+
+/* springs' own meshes keep every voxel that the surface touches: nodes up to a voxel below it are no reason to hold
+ * nothing on another mesh */
+static void the_lowest_part_of_whole_voxels_is_held_on_every_mesh(void)
+{
+    organ o;
+    organ_make(&o, true);
+    pal_prepared_free(&o.mesh);
+    pal_voxel_options voxel = {.resolution = 12, .border = true};
+    REQUIRE(!pal_prepared_make(&o.surface, &voxel, &o.mesh, NULL, &o.note));
+    o.scene->body[0].support[0] = (pal_support){.lowest = true, .fraction = 0.05};
+    for (int k = 0; k < 6; k++) {
+        pal_set_scene *set = NULL;
+        pal_world *world = NULL;
+        pal_setting to = {.model = "fem", .size = k % 3 == 0 ? 8 : k % 3 == 1 ? 16 : 24};
+        if (k > 2) snprintf(to.model, sizeof to.model, "tet_springs");
+        CHECK(!pal_setting_make(o.scene, 0, &to, &o.note, &set));
+        CHECK(set && !pal_world_create(&set->scene, &o.note, &world));
+        int n_held = 0;
+        for (int i = 0; world && i < pal_world_body(world, 0)->n_dof; i++) n_held += pal_world_body(world, 0)->held[i];
+        CHECK(n_held >= 4);
+        pal_world_destroy(world);
+        pal_set_scene_free(set);
+    }
     organ_free(&o);
 }
 
@@ -333,6 +359,7 @@ int main(void)
     RUN(keys_that_a_setting_does_not_speak_of_stay);
     RUN(voxels_end_where_the_support_does);
     RUN(the_lowest_part_is_held_as_a_box);
+    RUN(the_lowest_part_of_whole_voxels_is_held_on_every_mesh);
     RUN(a_hollow_body_adapts_or_is_refined);
     RUN(cells_go_into_voxels);
     RUN(what_does_not_fit_is_refused_in_a_sentence);
