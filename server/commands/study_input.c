@@ -115,7 +115,11 @@ static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
 void pal_study_input_describe(const pal_study_input *in, const pal_study_question *q, pal_study_file *file)
 {
     const pal_scene *scene = in->scene;
-    uint64_t sum = add_numbers(0, &scene->step_s, 1);
+    /* whatever the reference depends on beside the body itself */
+    uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
+    pal_setting now;
+    pal_setting_of(scene, in->body, &now);
+    sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
     char loads[80] = "three presses";
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
     for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);

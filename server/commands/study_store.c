@@ -91,6 +91,22 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
     return add_numbers(sum, r->grid_density_kg_m3, n);
 }
 
+/* effects that move a body which nobody touches: gravity, inflate, penalty */
+static uint64_t add_effect(uint64_t sum, const pal_item *item)
+{
+    static const char *const quiet[] = {"tool_push", "tool_grab", "finite_guard", "sleep"};
+    for (size_t k = 0; k < sizeof quiet / sizeof *quiet; k++)
+        if (!strcmp(item->name, quiet[k])) return sum;
+    sum = pal_study_sum(sum, item->name, strlen(item->name));
+    for (int k = 0; k < item->n_value; k++) {
+        const pal_value *v = &item->value[k];
+        sum = pal_study_sum(pal_study_sum(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
+        sum = add_numbers(sum, v->number, (size_t)(v->kind == PAL_VALUE_NUMBER ? 1 : v->n_number));
+        sum = add_numbers(sum, &(double){v->flag}, 1);
+    }
+    return sum;
+}
+
 const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
 {
     uint64_t sum = 0;
@@ -114,6 +130,7 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
         const double kind[] = {p->radius_m, p->soft, p->young_factor, p->density_factor};
         sum = add_numbers(add_numbers(sum, p->at_m, 3), kind, 4);
     }
+    for (int k = 0; k < body->n_effect; k++) sum = add_effect(sum, &body->effect[k]);
     snprintf(out, PAL_STUDY_SHAPE, "%016" PRIx64, sum);
     return out;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 enum { PRESSES = 3, COARSE = 10 };
+static const double coarse_share = 0.6; /* of the reference's size, at least COARSE: a thin tip is stiff in fewer */
 /* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
 static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
 
@@ -84,14 +85,15 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
 
 static pal_setting coarse(const pal_study_job *job)
 {
-    pal_setting s = {.size = job->shell ? 1 : COARSE, .step_s = PAL_STUDY_FRAME_S};
+    int size = (int)(coarse_share * job->reference);
+    pal_setting s = {.size = job->shell ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
     snprintf(s.model, PAL_NAME, "%s", job->shell ? "adaptive_springs" : "fem");
     snprintf(s.law, PAL_NAME, "%s", job->shell ? "" : "linear");
     return s;
 }
 
-/* the larger the farther it moves: scaled to what the coarse body answers, which is linear in it or nearly so */
-static pal_err scale_load(pal_study_job *job, int index, int place, double size_m)
+/* so that what it moves most moves by its share: by what the coarse body answers, which is linear in it or nearly so */
+static pal_err scale_load(pal_study_job *job, int index, double size_m)
 {
     pal_setting s = coarse(job);
     double *total = job->problem->load_case[index].load[0].total_N;
@@ -102,7 +104,8 @@ static pal_err scale_load(pal_study_job *job, int index, int place, double size_
     for (int round = 0; round < (job->shell ? 2 : 1); round++) {
         int n_node;
         PAL_TRY(pal_study_static(job, &s, job->load[index], job->now, &n_node, job->note));
-        double moved = pal_norm3(job->now + 3 * place);
+        double moved = 0;
+        for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
         if (!(moved > 0) || !isfinite(moved))
             return pal_note_set(job->note, PAL_ERR_REFUSED, "press %d of %g N moves nothing", index + 1,
                                 pal_norm3(total));
@@ -130,7 +133,7 @@ pal_err pal_study_presses(pal_study_job *job)
         place_load(job, k, surface, job->probe + 3 * place[k], patch_share * size_m);
     pal_study_close(&w);
     job->n_load = job->problem->n_case = PRESSES;
-    for (int k = 0; k < PRESSES && !err; k++) err = scale_load(job, k, place[k], size_m);
+    for (int k = 0; k < PRESSES && !err; k++) err = scale_load(job, k, size_m);
     return err;
 }
 

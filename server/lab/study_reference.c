@@ -78,29 +78,41 @@ static double most_between(const double *a, const double *b, int n)
     return most;
 }
 
-/* the first load at two coarser sizes: what the next change would be, summed up (Richardson) */
+/* what is left of one load, from its rest at two coarser sizes: what the next changes would be, summed up (Richardson)
+ */
+static pal_err estimate_load(pal_study_job *job, int load, const int size[3], double *u[2], double *out)
+{
+    double h[3];
+    for (int k = 0; k < 2; k++) {
+        int n_node;
+        pal_setting s = reference_setting(job, size[k]);
+        PAL_TRY(pal_study_static(job, &s, job->load[load], u[k], &n_node, job->note));
+    }
+    for (int k = 0; k < 3; k++) h[k] = job->shell ? exp2(-size[k]) : 1.0 / size[k];
+    double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
+    double order = pal_richardson_order(h, first, last);
+    /* nearly no order is no order: what is left would be any number; and of chance more than the elements have */
+    order = isnan(order) ? 1 : fmin(fmax(order, least_order), 2);
+    *out = last / (pow(h[1] / h[2], order) - 1);
+    return PAL_ERR_OK;
+}
+
+/* the largest over the loads */
 static pal_err estimate(pal_study_job *job, double *out)
 {
     int size[3] = {pal_study_fit_size(job, job->reference / 2.0), pal_study_fit_size(job, job->reference / 1.42),
-                   job->reference},
-        n_node;
-    double h[3], *u[2] = {NULL, NULL};
+                   job->reference};
     if (job->shell) size[0] = job->reference - 2, size[1] = job->reference - 1;
     if (size[1] >= size[2]) size[1] = size[2] - 1;
     if (size[0] >= size[1]) size[0] = size[1] - 1;
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < 2 && !err; k++) {
-        pal_setting s = reference_setting(job, size[k]);
-        u[k] = calloc(3 * (size_t)job->n_probe, sizeof(double));
-        err = u[k] ? pal_study_static(job, &s, job->load[0], u[k], &n_node, job->note) : PAL_ERR_MEMORY;
-    }
-    for (int k = 0; k < 3; k++) h[k] = job->shell ? exp2(-size[k]) : 1.0 / size[k];
-    if (!err) {
-        double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[0], job->n_probe);
-        double order = pal_richardson_order(h, first, last);
-        /* nearly no order is no order: what is left would be any number */
-        order = isnan(order) ? 1 : fmax(order, least_order);
-        *out = last / (pow(h[1] / h[2], order) - 1);
+    double *u[2];
+    for (int k = 0; k < 2; k++) u[k] = calloc(3 * (size_t)job->n_probe, sizeof(double));
+    pal_err err = u[0] && u[1] ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    *out = 0;
+    for (int k = 0; k < job->n_load && !err; k++) {
+        double left = 0;
+        err = estimate_load(job, k, size, u, &left);
+        *out = fmax(*out, left);
     }
     free(u[0]), free(u[1]);
     return err;
