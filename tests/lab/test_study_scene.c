@@ -70,7 +70,8 @@ static void a_full_organ_is_pressed(void)
     const pal_study *s = o.study;
     show(s);
     CHECK(s->most_m > 0.01 * s->size_m && s->most_m < 0.05 * s->size_m);
-    CHECK(s->reference_m > 0 && s->reference_m < 0.1 * s->most_m);
+    /* the worst of three loads, of a reference as coarse as quick ones are */
+    CHECK(s->reference_m > 0 && s->reference_m < 0.2 * s->most_m);
     double coarse = NAN, fine = NAN, fitted = NAN, plain = NAN;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
