@@ -23,14 +23,20 @@ static bool measured(const pal_study_point *p)
            isfinite(p->priced.error_m);
 }
 
+/* what was fitted to the one load that judges it says nothing of any other */
+static bool judged(const pal_study_point *p)
+{
+    return measured(p) && !p->why[0];
+}
+
 void pal_study_front(pal_study *study)
 {
     for (int i = 0; i < study->n_point; i++) {
         pal_priced_setting *p = &study->point[i].priced;
-        p->front = measured(&study->point[i]);
+        p->front = judged(&study->point[i]);
         for (int k = 0; k < study->n_point && p->front; k++) {
             const pal_priced_setting *q = &study->point[k].priced;
-            if (!measured(&study->point[k]) || k == i) continue;
+            if (!judged(&study->point[k]) || k == i) continue;
             bool no_worse = q->ms <= p->ms && q->error_m <= p->error_m;
             bool better = q->ms < p->ms || q->error_m < p->error_m;
             p->front = !(no_worse && (better || k < i));
@@ -44,7 +50,7 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
     double own = study->reference_m > 0 ? study->reference_m : 0;
     for (int i = 0; i < study->n_point; i++) {
         const pal_priced_setting *p = &study->point[i].priced;
-        if (!measured(&study->point[i])) continue;
+        if (!judged(&study->point[i])) continue;
         if (!isnan(within_m) && !(p->error_m + own <= within_m)) continue;
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
