@@ -1,9 +1,9 @@
 /* A live switch of method, resolution, step or tolerance of one body: another world is made beside the running one
  * (pal_switch_prepare, slow), and takes over between two steps with pal_session_follow and pal_switch_carry, without a
  * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
- * within 2 % of what it was (where both meshes are of one mass and held alike), the mismatch of forces let go over 10
- * steps (sim/transfer.h). What tools hold they go on
- * holding, lasting loads stay; brushes are over. Thread: one at a time. */
+ * within 2 % of what it was (where both meshes are of one mass and held alike; else that, or as near as displacements
+ * PAL_TRANSFER_SCALE times as long or as short come), the mismatch of forces let go over 10 steps (sim/transfer.h).
+ * What tools hold they go on holding, lasting loads stay; brushes are over. Thread: one at a time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H
 #include "server/sim/setting.h"
@@ -15,7 +15,8 @@ typedef struct pal_switch pal_switch;
 typedef struct pal_switch_report {
     double energy_before_J, energy_after_J; /* of the whole world: kinetic and elastic */
     double most_move_m;                     /* of a shown vertex, between the frame before and the one after */
-    double scale;                           /* of displacements, for the sake of the energy; 1: none */
+    double scale; /* of displacements, for the sake of the energy; 1: none, PAL_TRANSFER_SCALE or
+                   * 1 over it: at its bound, the energy is off by more */
 } pal_switch_report;
 
 /* The scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body). It is made

@@ -15,16 +15,22 @@
  * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),
  * until the elastic energy is what it was, or 40 times (200 where it is half as much again); what is left is made up
  * for by the length of the displacement from rest (of a body that nothing holds, from its best rigid place) and of the
- * velocity. A body that rests under a load with the same elastic energy stands about half way between where it rested
- * before and where it will: a point moves by half of what the methods differ in, which is less than the sum of their
- * errors. The other half is let go as the difference of all forces goes out (ease.h). Momentum: a body that nothing
- * holds keeps momentum and spin of before; what they ask for of the kinetic energy they have (equal masses: the same).
+ * velocity, by PAL_TRANSFER_SCALE at most: where the two bodies differ in mass or in how they are held (springs of
+ * whole voxels and elements of cut ones) a point may have to go farther than that, and then the energy is off; the
+ * report's scale stands at the bound. A body that rests under a load with the same elastic energy stands about half way
+ * between where it rested before and where it will: a point moves by half of what the methods differ in, which is less
+ * than the sum of their errors. The other half is let go as the difference of all forces goes out (ease.h). Momentum: a
+ * body that nothing holds keeps momentum and spin of before; what they ask for of the kinetic energy they have (equal
+ * masses: the same).
  *
  * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
  * tool holds (pal_effect.hand). Contact begins anew where it is, brushes are over. Thread: one at a time. */
 #ifndef PAL_SIM_TRANSFER_H
 #define PAL_SIM_TRANSFER_H
 #include "server/sim/world.h"
+
+/* most that a displacement or a velocity is lengthened, or shortened, for the sake of the energy */
+#define PAL_TRANSFER_SCALE 1.5
 
 typedef struct pal_transfer pal_transfer;
 

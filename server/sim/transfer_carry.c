@@ -15,7 +15,7 @@
 enum { N_SMOOTH = 40, N_SMOOTH_FAR = 200, N_SCALE = 8 };
 #define FAR        1.5 /* times the energy wanted: more rounds than usual */
 #define SAME       1e-4
-#define MOST_SCALE 1.5
+#define MOST_SCALE PAL_TRANSFER_SCALE
 #define INERTIA    0.8
 /* velocities stay as they are while the kinetic energy is off by less than this part of all */
 #define SPARE 0.01

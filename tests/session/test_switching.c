@@ -24,11 +24,12 @@ static const pal_frame *wait_tick(pal_session *s, uint64_t tick)
     return f;
 }
 
-static pal_session *begin(void)
+/* paused: steps come one by one, so that what is seen does not depend on the clock */
+static pal_session *begin(bool paused)
 {
     pal_note note = {""};
     pal_session *s = NULL;
-    pal_session_options options = {.lease_s = 60};
+    pal_session_options options = {.lease_s = 60, .start_paused = paused};
     if (pal_session_open(&scene, &options, &note, &s)) CHECK_FAIL("%s", note.text);
     return s;
 }
@@ -47,16 +48,30 @@ static pal_session *change_to(pal_session *s, const pal_setting *to, pal_switch 
     return next;
 }
 
-static void a_running_session_changes_its_method_and_comes_back(void)
+/* the frame after n more steps; paused: exactly so many */
+static const pal_frame *take_steps(pal_session *s, bool paused, uint64_t tick, int n)
+{
+    for (int i = 0; i < n && paused; i++) CHECK(!pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_STEP}));
+    const pal_frame *f = wait_tick(s, tick + (uint64_t)n);
+    if (paused) CHECK_INT(f->tick, tick + (uint64_t)n);
+    return f;
+}
+
+static bool at_bound(double scale)
+{
+    return fabs(scale - PAL_TRANSFER_SCALE) < 1e-9 || fabs(scale - 1 / PAL_TRANSFER_SCALE) < 1e-9;
+}
+
+static void a_session_changes_its_method_and_comes_back(bool paused)
 {
     const pal_setting list[] = {{.model = "fem", .element = "hex8_bbar", .size = 8},
                                 {.model = "fem", .element = "tet4", .size = 6, .step_s = 0.01, .tolerance = 1e-3},
                                 {.model = "tet_springs", .size = 0, .step_s = 0.005, .k_area_J = -1}};
-    pal_session *s = begin();
+    pal_session *s = begin(paused);
     pal_switch *old = NULL;
     pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
     CHECK(!pal_session_put_pose(s, 0, &pose));
-    uint64_t tick = wait_tick(s, 20)->tick;
+    uint64_t tick = take_steps(s, paused, 0, 20)->tick;
     for (int i = 0; i < 3; i++) {
         pal_switch *change = NULL;
         pal_switch_report r;
@@ -65,13 +80,15 @@ static void a_running_session_changes_its_method_and_comes_back(void)
         pal_switch_report_of(change, &r);
         /* the springs' own voxels are full to their border: another mass, and held farther out. Lengthening the
          * displacement cannot make up for that, and 200 rounds of smoothing do not reach it */
-        if (i < 2) CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+        double off = fabs(r.energy_after_J / r.energy_before_J - 1);
+        if (i < 2) CHECK(off <= 0.02 || (!paused && at_bound(r.scale)));
+        CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_SCALE * (1 + 1e-9));
         CHECK(r.energy_before_J > 0 && isfinite(r.energy_after_J));
         CHECK_LE(r.most_move_m, 0.005); /* of a ball of 100 mm that a tool presses */
         pal_session_close(s);
         pal_switch_free(old);
         s = next, old = change;
-        const pal_frame *f = wait_tick(s, tick + 10);
+        const pal_frame *f = take_steps(s, paused, tick, 10);
         CHECK(f->tick >= tick + 10); /* counts on */
         CHECK(f->tool[0].present);
         tick = f->tick;
@@ -86,6 +103,38 @@ static void a_running_session_changes_its_method_and_comes_back(void)
     pal_switch_free(old);
 }
 
+static void a_running_session_changes_its_method_and_comes_back(void)
+{
+    a_session_changes_its_method_and_comes_back(false);
+}
+
+/* the same at known steps: there the energy is within 2 %, always */
+static void step_by_step_the_energy_is_kept(void)
+{
+    a_session_changes_its_method_and_comes_back(true);
+}
+
+/* One step after the tool has come, where the springs of whole voxels give most: elements of cut ones would have to lie
+ * more than half as far again from rest. They go to the bound, and the report says so */
+static void what_the_bound_leaves_is_said(void)
+{
+    pal_session *s = begin(true);
+    pal_switch *change = NULL;
+    pal_switch_report r;
+    pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
+    uint64_t tick = take_steps(s, true, 0, 9)->tick;
+    CHECK(!pal_session_put_pose(s, 0, &pose));
+    take_steps(s, true, tick, 1);
+    pal_session *next = change_to(s, &(pal_setting){.model = "fem", .element = "hex8_bbar", .size = 8}, &change);
+    REQUIRE(next);
+    pal_switch_report_of(change, &r);
+    CHECK_NEAR(r.scale, PAL_TRANSFER_SCALE, 1e-9);
+    CHECK_NEAR(r.energy_after_J / r.energy_before_J, 0.911, 0.02);
+    pal_session_close(s);
+    pal_session_close(next);
+    pal_switch_free(change);
+}
+
 static void what_cannot_be_made_is_refused_with_a_sentence(void)
 {
     const struct {
@@ -97,7 +146,7 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
                {{.model = "fem", .size = 100000}, "size"},
                {{.model = "fem", .size = 8, .step_s = 3}, "step_s"},
                {{.model = "tet_springs", .k_area_J = -1}, "already"}};
-    pal_session *s = begin();
+    pal_session *s = begin(false);
     wait_tick(s, 3);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         pal_note note = {""};
@@ -150,6 +199,8 @@ int main(void)
     scene.body[0].material.young_Pa = 5e4;
     scene.body[0].support[0].fraction = 0.2; /* so that every mesh is held by as much */
     RUN(a_running_session_changes_its_method_and_comes_back);
+    RUN(step_by_step_the_energy_is_kept);
+    RUN(what_the_bound_leaves_is_said);
     RUN(what_cannot_be_made_is_refused_with_a_sentence);
     RUN(what_is_not_taken_changes_nothing);
     pal_prepared_free(&mesh);
