@@ -120,6 +120,7 @@ static double price(const pal_hub_room *room, double ms, double step_s)
     return isfinite(ms) && step_s > 0 ? ms * room->step_s / step_s : NAN;
 }
 
+/* a neighbour's ms is what a step as it is now would take: one of half the length is in there twice already */
 static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *from, const pal_setting *now,
                           pal_wire_neighbour *to)
 {
@@ -128,8 +129,7 @@ static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *fr
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
     bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
-    *to = (pal_wire_neighbour){.ms = price(room, from->ms, s->step_s > 0 ? s->step_s : now->step_s),
-                               .error_m = known(from->error_m)};
+    *to = (pal_wire_neighbour){.ms = price(room, from->ms, now->step_s), .error_m = known(from->error_m)};
     if (s->size > 0 && s->size != now->size) to->size = (uint32_t)s->size;
     if (step) to->step_ms = 1e3 * s->step_s;
     if (tolerance) to->tolerance = s->tolerance;

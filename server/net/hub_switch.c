@@ -57,7 +57,14 @@ static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_orde
         pal_hub_complain(hub, c, "args", "knob: size %g is no number of voxels or levels", size->value);
         return false;
     }
-    if (size && size->value != 0) to->size = (int)size->value;
+    bool other = size && size->value != 0 && (int)size->value != to->size;
+    if (other && to->k_distance_J > 0) {
+        pal_hub_complain(hub, c, "refused",
+                         "knob: the springs are calibrated for %d voxels, and their constants hold for no other size",
+                         to->size);
+        return false;
+    }
+    if (other) to->size = (int)size->value;
     if (step && step->value != 0) to->step_s = 1e-3 * step->value;
     if (tolerance && tolerance->value != 0) to->tolerance = tolerance->value;
     return true;

@@ -5,16 +5,18 @@
  *   discretisation  the rest under those loads on this mesh and on its voxels merged by eights: the largest distance at
  *                   nodes that both have, over 2^1.5 - 1 (Richardson; for any true order from 1 to 2 that is off by a
  *                   factor of 0.55 to 1.64). Springs: of finite elements on their voxels
- *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh
+ *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh; about
+ *                   twice too large for tetrahedra of ten nodes
  *   model           the largest distance between the rest by the neo-Hookean law and by the body's own; of springs:
  *                   between where they come to rest and where finite elements (hex8_bbar, corotational) do
  *   time            what the steps of the next tenth of a second (12 at most) are off, the loads staying as they are:
  *                   those steps against twice as many of half the length, over 1 - 2^-order of the solver
  *   algebraic       the same steps against those of a solver that leaves next to nothing
  * error_m is their sum, which is above the truth where parts have opposite signs, and below it where elements lock or
- * a part is not known. tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where
- * nothing locks. A moving support counts as standing where it is. Of control cells (subdivision_fem) time and algebraic
- * part alone are known, of bodies that adapt nothing.
+ * a small part is not known. There is none where the discretisation is not known, or of springs the model.
+ * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where nothing locks. A moving
+ * support counts as standing where it is. Of control cells (subdivision_fem) time and algebraic part alone are known
+ * and so no sum, of bodies that adapt nothing.
  *
  * Nothing of it exists while nobody looks: no thread, no world, no copy. Thread: as said at each function. */
 #ifndef PAL_SESSION_ESTIMATE_H
@@ -29,7 +31,7 @@ typedef struct pal_estimate {
     double time_s;
     double most_m; /* largest displacement then                              */
     /* largest displacement errors, m; NaN: not known for this body (note says why) */
-    double error_m; /* of all parts together: the sum of those that are known; NaN: none is */
+    double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
     double discretisation_m, algebraic_m, time_m, model_m;
     double zz_percent; /* energy norm of the error over that of the solution    */
     bool locking;      /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */

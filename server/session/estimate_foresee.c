@@ -9,7 +9,7 @@ static const double least_step_s = 1e-4, most_step_s = 0.1, least_tolerance = 1e
 static void add(pal_estimate *out, const pal_setting *setting, double ms, double change_m)
 {
     double error_m = out->error_m + change_m;
-    if (!(ms > 0) || !(error_m >= 0) || out->n_neighbour == PAL_ESTIMATE_NEIGHBOURS) return;
+    if (!(ms > 0) || isnan(change_m) || error_m < 0 || out->n_neighbour == PAL_ESTIMATE_NEIGHBOURS) return;
     out->neighbour[out->n_neighbour++] = (pal_priced_setting){.setting = *setting, .ms = ms, .error_m = error_m};
 }
 
@@ -17,7 +17,8 @@ static void sizes(const pal_foresight *from, pal_estimate *out)
 {
     double growth = pow(NODES_TIMES, from->growth), shrink = exp2(-from->order);
     pal_setting to = from->setting;
-    if (!(from->setting.size > 0)) return;
+    /* calibrated constants hold for the size that they were found for */
+    if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
     to.size = from->setting.size / 2;
     if (to.size >= LEAST_SIZE) add(out, &to, out->ms / growth, out->discretisation_m * (1 / shrink - 1));
     to.size = from->setting.size * 2;

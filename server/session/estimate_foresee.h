@@ -3,6 +3,7 @@
  *
  * ms is what a step of the scene takes, as it is now (setting.h: a shorter step is priced by two of them).
  * size: half and twice; time goes with n^growth, n being 8 times the nodes, the part of discretisation with h^order.
+ * None for calibrated springs, whose constants are of one size.
  * step (implicit solvers): half and twice; each of them takes as long, the part of time goes with step^solver order.
  * tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was
  * measured to cost. */
@@ -20,6 +21,7 @@ typedef struct pal_foresight {
     double decade;       /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
 } pal_foresight;
 
-/* fills neighbour from ms and the parts that out has; those whose ms or error_m cannot be foreseen are left out */
+/* fills neighbour from ms and the parts that out has; those whose ms or change of
+ * the error cannot be foreseen are left out; error_m NaN where out's is */
 void pal_estimate_foresee(const pal_foresight *from, pal_estimate *out);
 #endif

@@ -489,12 +489,12 @@ static double known(double part)
     return isnan(part) ? 0 : part;
 }
 
-static void sum_up(pal_estimate *out)
+/* without the large parts a sum would pass for the whole, beside those of a study that are whole */
+static void sum_up(const pal_estimate_work *w, pal_estimate *out)
 {
-    bool any = !isnan(out->discretisation_m) || !isnan(out->algebraic_m) || !isnan(out->time_m) || !isnan(out->model_m);
-    out->error_m =
-        any ? known(out->discretisation_m) + known(out->algebraic_m) + known(out->time_m) + known(out->model_m)
-            : (double)NAN;
+    bool whole = !isnan(out->discretisation_m) && !(w->springs && isnan(out->model_m));
+    out->error_m = whole ? out->discretisation_m + known(out->algebraic_m) + known(out->time_m) + known(out->model_m)
+                         : (double)NAN;
 }
 
 bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
@@ -511,7 +511,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
     memcpy(out->note, w->note, sizeof out->note);
     look_ahead(w, out);
     if (!stopped(w)) find_rests(w, out);
-    sum_up(out);
+    sum_up(w, out);
     if (!stopped(w)) price_size(w);
     pal_estimate_foresee(&w->foresight, out);
     return !stopped(w);

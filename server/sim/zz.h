@@ -7,8 +7,10 @@
  * strains in any rotation, else the measure that rows themselves have.
  *
  * Zero for a field of constant stress; eta^2 goes with h^2 for a smooth one on linear elements. What locks is not seen
- * (numerics.md part 2). Rows without a stress hook (springs, cell_elastic) have no such estimate. Heap memory while it
- * runs, nothing else: a world that is never asked has no trace of it. Thread: that of the world, between steps. */
+ * (numerics.md part 2). Tetrahedra of ten nodes: about twice too large, as their stress varies within an
+ * element, of which the mean alone is recovered from. Rows without a stress hook (springs, cell_elastic) have no such
+ * estimate. Heap memory while it runs, nothing else: a world that is never asked has no trace of it. Thread: that of
+ * the world, between steps. */
 #ifndef PAL_SIM_ZZ_H
 #define PAL_SIM_ZZ_H
 #include "server/sim/world.h"

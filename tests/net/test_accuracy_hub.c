@@ -36,7 +36,6 @@ static void begin(bool with_study)
 {
     static const pal_priced_setting *list[1];
     static int n_setting[1] = {POINTS}, body[1] = {0};
-    pal_session *sessions[1];
     pal_note note = {""};
     list[0] = setting;
     gate = pal_server_gate_create();
@@ -44,8 +43,7 @@ static void begin(bool with_study)
     pal_server_options net = {
         .road = "mem", .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body};
     if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    sessions[0] = session;
-    if (pal_server_open(&net, sessions, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
     pal_server_connect(server, gate);
     road = pal_server_transport(server);
     now_ns = 1000000000ull;
@@ -148,6 +146,67 @@ static void without_a_study_there_is_the_estimate_alone(void)
     end();
 }
 
+/* what a choice is foreseen to cost is for the same time of the body as what it costs now */
+static void neighbours_are_priced_once(void)
+{
+    pal_body_def *def = &organ.scene.body[0], *was = malloc(sizeof *was);
+    mem_client ada;
+    int n_step = 0, n_size = 0;
+    REQUIRE(was);
+    *was = *def;
+    def->n_effect = 0;
+    pal_item_init(&def->model, "model", "fem");
+    pal_item_init(&def->solver, "solver", "implicit_euler");
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_text(&ada, LOOK(1));
+    const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
+    UNTIL(e->n_neighbour >= 2 && e->ms > 0, &ada, NULL);
+    double step_ms = 1e3 * organ.scene.step_s;
+    for (uint32_t i = 0; i < e->n_neighbour; i++) {
+        const pal_wire_neighbour *near = &e->neighbour[i];
+        bool step = !strcmp(near->knob, "step"), size = !strcmp(near->knob, "resolution");
+        n_step += step, n_size += size;
+        if (step) CHECK_NEAR(near->ms * near->step_ms, e->ms * step_ms, 1e-9 * step_ms);
+        if (size) CHECK((near->ms > e->ms) == (near->error_m < e->error_m));
+    }
+    CHECK_INT(n_step, 2);
+    printf("  %u neighbours, %d in size\n", e->n_neighbour, n_size);
+    mem_end(&ada);
+    end();
+    *def = *was;
+    free(was);
+}
+
+/* their constants hold for the size that they were found for */
+static void calibrated_springs_keep_their_size(void)
+{
+    pal_item *model = &organ.scene.body[0].model, was = *model;
+    pal_setting now;
+    mem_client ada;
+    char text[160], said[64];
+    CHECK(!pal_item_put_number(model, "k_distance_J", 1e-3, NULL));
+    CHECK(!pal_item_put_text(model, "weights", "volume", NULL));
+    pal_setting_of(&organ.scene, 0, &now);
+    CHECK(now.k_distance_J > 0 && now.size > 0);
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    turn(&ada, NULL);
+    for (int k = 0; k < 2; k++) {
+        snprintf(text, sizeof text, "{\"type\":\"command\",\"verb\":\"knob\",\"args\":{\"size\":%d,\"step_ms\":%.9g}}",
+                 now.size + (k == 0), 1e3 * now.step_s);
+        mem_text(&ada, text);
+        UNTIL(ada.n_text[PAL_CONTROL_ERROR] + ada.n_text[PAL_CONTROL_ANSWER] == k + 1, &ada, NULL);
+    }
+    snprintf(said, sizeof said, "calibrated for %d voxels", now.size);
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, said) != NULL);
+    CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 1);
+    CHECK_INT(ada.n_text[PAL_CONTROL_ANSWER], 1);
+    mem_end(&ada);
+    end();
+    *model = was;
+}
+
 static void bad_orders_are_refused_with_a_sentence(void)
 {
     static const char *const bad[] = {
@@ -177,6 +236,8 @@ int main(void)
     RUN(nothing_is_estimated_while_nobody_looks);
     RUN(who_asks_sees_study_and_estimate_until_the_last_has_gone);
     RUN(without_a_study_there_is_the_estimate_alone);
+    RUN(neighbours_are_priced_once);
+    RUN(calibrated_springs_keep_their_size);
     RUN(bad_orders_are_refused_with_a_sentence);
     pal_prepared_free(&organ.mesh);
     return check_report();

@@ -5,6 +5,7 @@
 #include "server/session/estimate_work.h"
 #include "server/session/session.h"
 #include "tests/check.h"
+#include "tests/session/clay.h"
 #include "tests/session/small_scene.h"
 
 #include <dirent.h>
@@ -328,6 +329,41 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
     pal_estimate_foresee(&from, &e);
     CHECK_INT(e.n_neighbour, 2);
     CHECK_INT(e.neighbour[0].setting.size, 20);
+    /* what a choice costs is known without the error that it changes */
+    e.error_m = NAN;
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 2);
+    CHECK_NEAR(e.neighbour[1].ms, 4, 1e-12);
+    CHECK(isnan(e.neighbour[0].error_m) && isnan(e.neighbour[1].error_m));
+}
+
+/* constants of springs go with the cube of their edge */
+static void calibrated_springs_have_no_neighbour_in_size(void)
+{
+    pal_foresight from = {.setting = {.model = "tet_springs", .size = 20, .step_s = 0.01}, .growth = 1.5, .order = 1.5};
+    pal_estimate e = {.ms = 2, .discretisation_m = 0.8, .model_m = 0.1, .error_m = 0.9};
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 2);
+    from.setting.k_distance_J = 1e-3;
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 0);
+}
+
+/* of control cells time and algebraic part alone are known: their sum is not the error */
+static void small_parts_alone_are_no_error(void)
+{
+    clay_scene clay;
+    pal_estimate e;
+    clay_make(&clay, 2, 0.1);
+    pal_item_init(&clay.scene.body[0].solver, "solver", "implicit_euler");
+    pal_world *w = swinging(&clay.scene, 2);
+    REQUIRE(estimate_of(&clay.scene, w, &e));
+    CHECK(e.time_m > 0 && e.algebraic_m >= 0 && isnan(e.discretisation_m) && isnan(e.model_m));
+    CHECK(isnan(e.error_m));
+    CHECK(e.n_neighbour >= 2 && isnan(e.neighbour[0].error_m));
+    CHECK_NEAR(e.neighbour[0].ms, e.ms / 2, 1e-12);
+    pal_world_destroy(w);
+    clay_free(&clay);
 }
 
 static void elements_that_lock_say_so(void)
@@ -354,6 +390,8 @@ static void a_body_at_rest_has_no_error(void)
     REQUIRE(!pal_world_create(fem, NULL, &w));
     fem->body[0].n_effect = 0;
     REQUIRE(estimate_of(fem, w, &e));
+    printf("  at rest: discretisation %.3g, time %.3g, algebraic %.3g, model %.3g m, %s\n", e.discretisation_m,
+           e.time_m, e.algebraic_m, e.model_m, e.note);
     CHECK_LE(e.error_m, 1e-12);
     CHECK_LE(e.most_m, 0);
     pal_world_destroy(w);
@@ -406,6 +444,8 @@ int main(void)
     RUN(a_looser_solver_leaves_more);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);
+    RUN(calibrated_springs_have_no_neighbour_in_size);
+    RUN(small_parts_alone_are_no_error);
     RUN(elements_that_lock_say_so);
     RUN(a_body_at_rest_has_no_error);
     pal_prepared_free(&mesh);
