@@ -244,7 +244,7 @@ int command_plan(int argc, char **argv)
     if (!err && (err = pal_world_create(studied.scene, &why, &world)))
         pal_note_set(&note, err, "%s: %s", word[0], why.text);
     pal_preflight preflight = {0};
-    if (!err && (err = pal_preflight_look(studied.scene, &preflight, &why)))
+    if (!err && (err = pal_preflight_look(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &why)))
         pal_note_set(&note, err, "%s: %s", word[0], why.text);
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, studied.scene->step_s, &measured);

@@ -3,6 +3,7 @@
 #include "server/commands/commands.h"
 #include "server/commands/report.h"
 #include "server/commands/scene_arg.h"
+#include "server/commands/studied_scene.h"
 #include "server/commands/torture_picture.h"
 
 #include <math.h>
@@ -36,6 +37,7 @@ static cJSON *result_json(const pal_torture_result *r)
     cJSON_AddBoolToObject(o, "stopped", r->frozen);
     add_number(o, "energy_excess", r->energy);
     add_number(o, "energy_limit", r->limit);
+    add_number(o, "energy_forgiven", r->forgiven);
     add_number(o, "left_S", r->left_S);
     add_number(o, "back_s", r->back_s);
     add_number(o, "simulated_s", r->simulated_s);
@@ -65,13 +67,14 @@ static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options
 
 static void print_result(const pal_torture_result *r)
 {
-    char energy[24] = "-", left[24] = "-", rescue[64] = "";
+    char energy[24] = "-", forgiven[24] = "-", left[24] = "-", rescue[64] = "";
+    if (isfinite(r->forgiven)) snprintf(forgiven, sizeof forgiven, "%.1g", r->forgiven);
     if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
     if (isfinite(r->left_S)) snprintf(left, sizeof left, "%.2g", 100 * r->left_S);
     uint64_t n = pal_rescues_sum(&r->rescue);
     if (n > 0)
         snprintf(rescue, sizeof rescue, " (%llu rescues, %.3g ms)", (unsigned long long)n, 1e-6 * (double)r->rescue.ns);
-    printf("%-11s %-14s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, left,
+    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, forgiven, left,
            r->simulated_s, r->took_s, r->note, rescue);
     if (r->verdict != PAL_VERDICT_FAILED) return;
     printf("%26s%s\n%26sasked: %s\n", "", r->what, "", r->criterion);
@@ -80,8 +83,8 @@ static void print_result(const pal_torture_result *r)
 static void print(const pal_scene *scene, const pal_torture_report *report)
 {
     printf("%s: %s\n\n", scene->title, report->rests ? "comes to rest by itself" : "DOES NOT COME TO REST by itself");
-    printf("%-11s %-14s %9s %9s %8s %7s  %s\n", "insult", "verdict", "energy +", "% S left", "sim s", "cpu s",
-           "what happened");
+    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "insult", "verdict", "energy +", "forgiven", "% S left", "sim s",
+           "cpu s", "what happened");
     for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
     printf("\n%d passed, %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
            report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
@@ -130,20 +133,26 @@ int command_torture(int argc, char **argv)
     options.seed = (uint64_t)seed, options.most_s = seconds, options.only = only;
     options.progress = show, options.user = &common;
     pal_loaded_scene *loaded = NULL;
+    pal_studied studied = {0};
     pal_note note = {""}, why = {""};
     pal_torture_report *report = calloc(1, sizeof *report);
     pal_err err = report ? pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note) : PAL_ERR_MEMORY;
-    if (!err && (err = pal_torture(&loaded->scene, &options, report, &why)))
+    /* what serve would run: the setting that the scene asks for */
+    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &note);
+    const pal_scene *scene = studied.scene;
+    if (!err && (err = pal_torture(scene, &options, report, &why)))
         pal_note_set(&note, err, "%s: %s", word[0], why.text);
     pal_report_progress(NULL, 0, &common);
-    if (!err && picture) err = pal_torture_picture(report, loaded->scene.title, picture, &note);
+    if (!err && picture) err = pal_torture_picture(report, scene->title, picture, &note);
     if (err) {
         code = pal_report_refusal(&common, err, &note);
     } else {
-        code = common.json ? pal_report_json(&common, as_json(&loaded->scene, &options, report)) : 0;
-        if (!common.json && !common.quiet) print(&loaded->scene, report);
+        code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
+        if (!common.json && !common.quiet && studied.said[0]) printf("%s\n", studied.said);
+        if (!common.json && !common.quiet) print(scene, report);
         if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
     }
+    pal_studied_close(&studied);
     pal_scene_free(loaded);
     free(report);
     return code;

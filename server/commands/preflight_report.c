@@ -76,7 +76,7 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
         if (body->condition > condition) condition = body->condition;
     }
     pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
-            "%s: %d sub-step%s a step, condition %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
+            "%s: %d sub-step%s a step, condition at least %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
             n_sub == 1 ? "" : "s", condition, 1e-6 * (double)preflight->n_byte, n_weak,
             n_weak > 0 ? " (palpate plan says which)" : "");
 }

@@ -140,7 +140,7 @@ static pal_err open_sessions(serve_run *run, pal_note *note)
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
-        PAL_TRY(pal_preflight_look(scene, &run->preflight[i], note));
+        PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], note));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;

@@ -14,7 +14,7 @@
 #include <string.h>
 
 static const double least_shape = 0.1, least_edge_S = 1e-6, least_fill = 0.05, least_mass = 1e-3;
-enum { MOST_CG = 250, MOST_LANCZOS = 24 };
+enum { MOST_LANCZOS = 24 };
 
 typedef struct probe {
     pal_world *world;
@@ -24,6 +24,7 @@ typedef struct probe {
     double way_m; /* of the differences */
     double *x, *low;
     bool failed;
+    int most_cg; /* iterations for each axis of the slowest motion */
 } probe;
 
 /* ---- places ---- */
@@ -226,7 +227,7 @@ static double slow(probe *p, double *room)
             u[i] = 0;
             b[i] = cg.r[i] = i % 3 == axis && !body->held[i / 3] ? body->mass_kg[i / 3] : 0;
         }
-        (void)pal_conjugate_run(&cg, u, 0.03 * sqrt(pal_sum_products((int)n, b, b)), 1, MOST_CG);
+        (void)pal_conjugate_run(&cg, u, 0.03 * sqrt(pal_sum_products((int)n, b, b)), 1, p->most_cg);
         /* u'Ku = u'(b - r) */
         for (size_t i = 0; i < n; i++) uf += u[i] * (b[i] - cg.r[i]), uu += body->mass_kg[i / 3] * u[i] * u[i];
         if (uu > 0 && uf / uu < least) least = uf / uu;
@@ -256,7 +257,8 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
 
 /* ---- cost ---- */
 
-/* ns of a row for one evaluation, from what `palpate bench` measured on the machine of README's tables; 0: not known */
+/* ns of a row for one evaluation, from what `palpate bench` measured on the machine of README's tables; NaN: not known
+ */
 static double row_ns(const pal_body *body, const char *name)
 {
     const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->shell ? body->shell->n_spring : 0;
@@ -271,7 +273,7 @@ static double row_ns(const pal_body *body, const char *name)
                 {"viscous", 0.5 * body->n_node}, {"gravity", 1.0 * body->n_node}};
     for (size_t k = 0; k < sizeof cost / sizeof cost[0]; k++)
         if (!strcmp(name, cost[k].name)) return cost[k].ns;
-    return 0;
+    return NAN;
 }
 
 /* A step under load. Explicit: forces and one pass over the points for every sub-step, four of each with rk4, the
@@ -302,10 +304,10 @@ static double foresee_ms(const probe *p, const pal_body *body, int n_sub, int b)
 
 /* ---- all ---- */
 
-static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, pal_preflight_body *out)
+static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int most_cg, pal_preflight_body *out)
 {
     pal_body *body = pal_world_body(world, b);
-    probe p = {.world = world, .body = body};
+    probe p = {.world = world, .body = body, .most_cg = most_cg};
     for (int i = 0; i < pal_world_rows(world); i++) {
         const pal_row *row = pal_world_effect(world, i);
         pal_row_info info;
@@ -328,7 +330,7 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, pal
     return PAL_ERR_OK;
 }
 
-pal_err pal_preflight_look(const pal_scene *scene, pal_preflight *out, pal_note *note)
+pal_err pal_preflight_look(const pal_scene *scene, int most_cg, pal_preflight *out, pal_note *note)
 {
     pal_world *world = NULL;
     *out = (pal_preflight){.n_body = scene->n_body};
@@ -336,7 +338,7 @@ pal_err pal_preflight_look(const pal_scene *scene, pal_preflight *out, pal_note 
     out->n_byte = pal_world_bytes(world);
     pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) {
-        err = look_at_body(world, scene, b, &out->body[b]);
+        err = look_at_body(world, scene, b, most_cg, &out->body[b]);
         out->foreseen_ms += out->body[b].foreseen_ms;
     }
     pal_world_destroy(world);

@@ -19,10 +19,13 @@ typedef struct pal_rig {
     pal_torture_result *out;
     /* energy less the work of lasting loads: since the last change of those it may only fall */
     double base_J, scale_J, excess_J, allowed_J;
+    double forgiven_J; /* rises that were not judged, summed */
     uint64_t n_split;
     int n_skip, since;
-    uint64_t count; /* random numbers drawn */
-    bool may_freeze, needs_rest;
+    uint64_t count;              /* random numbers drawn */
+    bool rests;                  /* the scene does by itself: else nothing can be said about coming back */
+    bool needs_rest, asked_back; /* ... has to come back; all bodies that have to did                    */
+    bool may_stop[PAL_BODY_MAX], may_stay[PAL_BODY_MAX], stopped[PAL_BODY_MAX]; /* of each body */
     pal_err err;
 } pal_rig;
 
@@ -39,10 +42,13 @@ void pal_rig_moved(pal_rig *rig); /* the same after positions were set */
 void pal_rig_say(pal_rig *rig, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void pal_rig_skip(pal_rig *rig, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void pal_rig_fail(pal_rig *rig, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void pal_rig_undecided(pal_rig *rig, const char *format, ...) __attribute__((format(printf, 2, 3))); /* unless failed */
+/* a rise to this energy is not judged, but summed up */
+void pal_rig_forgive(pal_rig *rig, double energy_J);
 double pal_rig_random(pal_rig *rig);                /* in (0, 1) */
 int pal_rig_far_node(const pal_rig *rig, int body); /* in use and farthest from what is held */
 void pal_rig_box(const pal_rig *rig, int body, double low_m[3], double high_m[3]); /* of the nodes now, scene frame */
-bool pal_rig_springs(const pal_rig *rig);                                          /* a body is of model tet_springs */
+bool pal_rig_springs(const pal_rig *rig, int body);                                /* it is of model tet_springs */
 double pal_rig_cap_N(const pal_rig *rig, int body); /* load_cap_N, or what its weight would be where that is less */
 
 typedef struct pal_insult {

@@ -59,6 +59,8 @@ static void release(pal_rig *rig, bool good)
 {
     let_go(rig);
     for (int i = 0; i < 12 && good; i++) good = tool_step(rig, 2, 0);
+    /* what the contacts' last steps gave, or took, is the begin of coming back */
+    pal_rig_forgive(rig, pal_rig_energy(rig));
     rig->base_J = pal_rig_energy(rig);
     if (good) pal_rig_relax(rig, back_s);
     if (rig->out->back_s < INFINITY) pal_rig_say(rig, "back after %.2g s", rig->out->back_s);
@@ -182,14 +184,15 @@ void pal_insult_numbers(pal_rig *rig)
     n_taken += !pal_world_step(rig->world, 0) + !pal_world_reset_body(rig->world, PAL_BODY_MAX);
     if (n_taken > 0) pal_rig_fail(rig, "%d of them were taken", n_taken);
     if (hash != pal_world_hash(rig->world)) pal_rig_fail(rig, "the state changed");
+    if (n_taken == 0) pal_rig_say(rig, "all refused");
     /* 1e300 N is a number: it is shortened */
     if (!pal_world_load(rig->world, 0, node, (const double[3]){0, 1e300, 0})) {
         bool good = true;
         for (int i = 0; i < 6 && good; i++) good = pal_rig_step(rig, rig->scene->step_s);
         (void)pal_world_load(rig->world, 0, node, (const double[3]){0, 0, 0});
         if (good) pal_rig_relax(rig, back_s);
+        if (good) pal_rig_say(rig, "1e300 N on a node is shortened");
     }
-    pal_rig_say(rig, "all refused; 1e300 N on a node is shortened");
 }
 
 /* ---- supports ---- */
@@ -256,7 +259,10 @@ void pal_insult_supports(pal_rig *rig)
             return;
         }
     pal_scene *other = malloc(sizeof *other);
-    if (!other) return;
+    if (!other) {
+        pal_rig_undecided(rig, "not judged, there is no memory for the scene with other supports");
+        return;
+    }
     *other = *rig->scene;
     support_top(rig, other);
     double jump = 0;

@@ -45,6 +45,8 @@ for scene in fem springs; do
     check "counts" has "^18 passed, 0 failed, 0 undecided, 0 do not apply" out
     check "it says that the scene rests" has "comes to rest by itself" out
     check "the poisoned body names its node" has "poisoned .*beam stopped: node [0-9]* of .* at (.*) mm: its position" out
+    check "the hour was watched whole" has "hour  *passed .*3600 s watched" out
+    check "it says since when it slept" has "hour .*asleep from [0-9.e+-]* s on" out
     check "a picture" has "</svg>" picture.svg
     check "of well-formed text" has "start\" font-size=" picture.svg
     end
@@ -74,9 +76,41 @@ check "it says what was stopped" has "FAILED .*beam stopped: node .*, 0.0[0-9]* 
 check "counts" has "^0 passed, 1 failed" out
 end
 
-begin "a body that nothing calms does not come back, and that fails"
+begin "a strict guard is not excused by springs beside it"
+cp -r strict both
+cp springs/beam.palmesh both/springs.palmesh
+python3 - <<'TEXT'
+import json
+both, springs = (json.load(open(name + "/scene.json")) for name in ("both", "springs"))
+body = springs["bodies"][0]
+body.update(name="springs", mesh="springs.palmesh")
+both["bodies"].append(body)
+json.dump(both, open("both/scene.json", "w"))
+TEXT
+run both --only stretched --seconds 8
+check "exit code 1, not $code" code_is 1
+check "it says which was stopped" has "stretched *FAILED .*beam was stopped" out
+end
+
+begin "less than an hour is no hour"
+run springs --only hour --seconds 0.5
+check "exit code 1, not $code" code_is 1
+check "undecided" has "^0 passed, 0 failed, 1 undecided" out
+check "it says so" has "give more --seconds" out
+end
+
+begin "a scene that does not rest is told, and what needs rest is undecided"
 cp -r springs ringing
 sed -i 's/"damping_1_s":[[:space:]]*[0-9.]*/"damping_1_s": 0/' ringing/scene.json
+cp -r ringing swinging
+sed -i 's/"effects":[[:space:]]*\[/&{"name": "gravity"}, /' swinging/scene.json
+run swinging --only poisoned --seconds 4 --json
+check "exit code 1, not $code" code_is 1
+check "not ok" has '"ok":false' out
+check "undecided, as it does not rest" has '"rests":false.*"undecided":1' out
+end
+
+begin "a body that nothing calms does not come back, and that fails"
 run ringing --only meganewton --seconds 4
 check "exit code 1, not $code" code_is 1
 check "it says so" has "FAILED .*back after inf s" out

@@ -15,7 +15,7 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     int near = box_node(n, 2, 1, 2);
     box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-4;
     pal_scene *scene = box_scene(&box, true, false);
-    REQUIRE(!pal_preflight_look(scene, &p, &note));
+    REQUIRE(!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note));
     const pal_preflight_body *b = &p.body[0];
     CHECK_INT(b->n_point, 80);
     CHECK_INT(b->n_element, 180);
@@ -35,7 +35,8 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     /* both ends at one place: no length is told too */
     box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-9;
     scene->most_substep = 2000000000;
-    if (!pal_preflight_look(scene, &p, &note)) CHECK(p.body[0].edge.n > 0 && p.body[0].edge.value < 2e-9);
+    if (!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note))
+        CHECK(p.body[0].edge.n > 0 && p.body[0].edge.value < 2e-9);
     free(scene);
     box_free(&box);
 }
@@ -49,7 +50,7 @@ static void the_slowest_motion_of_a_bar_is_that_of_beams(void)
     beam_make(&b, 16, 2, 2, 0.01, true);
     beam_element(&b, "hex8_bbar", "corotational");
     b.def->material = (pal_material){.young_Pa = 1e4, .poisson = 0.3, .density_kg_m3 = 1000, .damping_1_s = 4};
-    REQUIRE(!pal_preflight_look(b.scene, &p, &note));
+    REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_FULL, &p, &note));
     double wanted = 1.8751 * 1.8751 * sqrt(1e4 * 0.02 * 0.02 / 12 / 1000) / (0.16 * 0.16);
     printf("  slowest %.4g of %.4g 1/s, fastest %.4g 1/s\n", p.body[0].slow_1_s, wanted, p.body[0].fast_1_s);
     CHECK_NEAR(p.body[0].slow_1_s / wanted, 1, 0.1);
@@ -58,12 +59,38 @@ static void the_slowest_motion_of_a_bar_is_that_of_beams(void)
     CHECK(p.body[0].flat.n == 0 && p.body[0].edge.n == 0 && p.body[0].light.n == 0 && p.body[0].thin.n == 0);
     CHECK(p.body[0].foreseen_ms > 0.01 && p.body[0].foreseen_ms < 10);
     CHECK(p.n_byte > 100000);
+    /* few iterations: the quotient is from above, so the condition is a lower bound of the same size */
+    pal_preflight quick;
+    REQUIRE(!pal_preflight_look(b.scene, 3, &quick, &note));
+    CHECK(quick.body[0].slow_1_s > 1.001 * p.body[0].slow_1_s);
+    CHECK(quick.body[0].condition < p.body[0].condition);
+    REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_QUICK, &quick, &note));
+    CHECK_LE(p.body[0].slow_1_s, (1 + 1e-9) * quick.body[0].slow_1_s);
+    CHECK_LE(quick.body[0].slow_1_s, 2 * p.body[0].slow_1_s);
     /* four times as stiff: twice as fast, the same condition */
     double slow = p.body[0].slow_1_s, condition = p.body[0].condition;
     b.def->material.young_Pa *= 4;
-    REQUIRE(!pal_preflight_look(b.scene, &p, &note));
+    REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_FULL, &p, &note));
     CHECK_NEAR(p.body[0].slow_1_s / slow, 2, 0.01);
     CHECK_NEAR(p.body[0].condition / condition, 1, 0.02);
+    beam_free(&b);
+}
+
+/* a row whose cost nobody measured: no figure instead of one that leaves it out */
+static void what_costs_of_unknown_rows_is_not_foreseen(void)
+{
+    fem_beam b;
+    pal_preflight p;
+    beam_make(&b, 4, 2, 2, 0.01, true);
+    beam_element(&b, "tet4", "corotational");
+    REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_QUICK, &p, &note));
+    CHECK(p.body[0].foreseen_ms > 0 && p.foreseen_ms > 0);
+    pal_item_init(&b.def->effect[b.def->n_effect], "effects", "penalty");
+    b.def->n_effect++;
+    const pal_err err = pal_preflight_look(b.scene, PAL_PREFLIGHT_QUICK, &p, &note);
+    if (err) CHECK_FAIL("%s", note.text);
+    REQUIRE(!err);
+    CHECK(isnan(p.body[0].foreseen_ms) && isnan(p.foreseen_ms));
     beam_free(&b);
 }
 
@@ -73,7 +100,7 @@ static void what_nothing_holds_has_no_slowest_motion(void)
     pal_preflight p;
     beam_make(&b, 4, 2, 2, 0.01, false);
     beam_element(&b, "tet4", "corotational");
-    REQUIRE(!pal_preflight_look(b.scene, &p, &note));
+    REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_FULL, &p, &note));
     CHECK(isnan(p.body[0].slow_1_s) && isnan(p.body[0].condition) && p.body[0].fast_1_s > 0);
     char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE];
     CHECK_INT(pal_preflight_say(&p.body[0], line), 1);
@@ -88,7 +115,7 @@ static void what_cannot_run_is_refused_with_the_node_that_is_to_blame(void)
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, false);
     scene->body[0].material.young_Pa = 1e12;
-    CHECK_INT(pal_preflight_look(scene, &p, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note), PAL_ERR_BUDGET);
     CHECK(strstr(note.text, "most_substep allows 2000") != NULL);
     CHECK(strstr(note.text, "node ") != NULL && strstr(note.text, " mm sets it") != NULL);
     free(scene);
@@ -99,6 +126,7 @@ int main(void)
 {
     RUN(the_limit_is_the_bodys_and_its_node_is_found);
     RUN(the_slowest_motion_of_a_bar_is_that_of_beams);
+    RUN(what_costs_of_unknown_rows_is_not_foreseen);
     RUN(what_nothing_holds_has_no_slowest_motion);
     RUN(what_cannot_run_is_refused_with_the_node_that_is_to_blame);
     return check_report();
