@@ -11,6 +11,7 @@
 #include "server/base/ring.h"
 #include "server/base/trio.h"
 #include "server/session/input_log.h"
+#include "server/session/rows_off.h"
 #include "server/session/watch.h"
 
 #include <math.h>
@@ -54,6 +55,7 @@ struct pal_session {
     uint64_t step_ns, lease_ns;
     pal_row_info *row;
     int n_row;
+    pal_rows_off off; /* since sessions before this one */
     pal_shown part[PAL_BODY_MAX];
     bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
     int n_part;
@@ -499,41 +501,34 @@ void pal_session_close(pal_session *s)
     release(s);
 }
 
-/* rows that were switched off stay off, as far as the new scene has them */
-static void hand_rows(pal_session *to, const pal_session *from)
-{
-    for (int k = 0; k < from->n_row; k++) {
-        bool there = false;
-        for (int i = 0; i < pal_world_rows(from->world) && !there; i++) {
-            pal_row_info now;
-            pal_world_row(from->world, i, &now);
-            there = !strcmp(now.name, from->row[k].name) && !strcmp(now.body, from->row[k].body);
-        }
-        for (int b = 0; b < to->scene->n_body && !there; b++)
-            if (!strcmp(to->scene->body[b].name, from->row[k].body))
-                (void)pal_world_switch_row(to->world, to->scene, b, from->row[k].name, false, NULL);
-    }
-}
-
-/* what the thread of `from` knew and that of `to` goes on with; poses that had not been taken yet as well */
-static void hand_over(pal_session *to, pal_session *from)
+/* Tools as they are held, and poses that had not been taken yet. Nobody could send one while neither thread ran, for
+ * away_ns: that time counts for no lease */
+static void hand_tools(pal_session *to, pal_session *from, uint64_t away_ns)
 {
     for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
         tool_place *a = &to->tool[t], *b = &from->tool[t];
         const pose_slot *slot = pal_trio_take(&b->trio);
         if (slot) {
-            *(pose_slot *)pal_trio_slot(&a->trio) = *slot;
+            pose_slot *kept = pal_trio_slot(&a->trio);
+            *kept = *slot;
+            kept->arrived_ns += away_ns;
             pal_trio_publish(&a->trio);
         }
+        b->arrived_ns += away_ns;
         a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
     }
+}
+
+/* what the thread of `from` knew and that of `to` goes on with, but tools */
+static void hand_over(pal_session *to, pal_session *from)
+{
     to->paused = from->paused, to->single = from->single;
     to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
                           memory_order_relaxed);
     atomic_store_explicit(&to->n_watch, atomic_load_explicit(&from->n_watch, memory_order_relaxed),
                           memory_order_relaxed);
-    hand_rows(to, from);
+    pal_rows_off_hand(&to->off, &from->off, from->row, from->n_row, from->world, to->world, to->scene);
     memcpy(to->n_look, from->n_look, sizeof to->n_look);
     pal_watch_hand_over(&to->watch, &from->watch);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
@@ -548,9 +543,11 @@ static void hand_over(pal_session *to, pal_session *from)
 
 pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
 {
+    uint64_t began_ns = pal_clock_ns();
     stop(before);
     hand_over(next, before);
     carry(user, next->world, before->world);
+    hand_tools(next, before, pal_clock_ns() - began_ns);
     pal_err err = start(next, note);
     if (!err && before->log)
         pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",

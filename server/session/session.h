@@ -65,7 +65,8 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
 pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out);
 /* Lets `next`, opened with hold, go on where `before` is: stops the thread of before between two steps, hands its
  * world's state over (carry; what it does not do is at rest), and pause, poses, counts and looked-at fields, and starts
- * the thread of next. A tool's holder goes on sending poses, to next. before keeps its last frame and can only be
+ * the thread of next. The time in between counts for no lease, and rows that were switched off stay off, for good. A
+ * tool's holder goes on sending poses, to next. before keeps its last frame and can only be
  * closed; a record ends there. INTERNAL: the thread could not be started, then before has gone on. Not while another
  * thread uses either. [net] */
 typedef void pal_session_carry(void *user, pal_world *next, const pal_world *before);

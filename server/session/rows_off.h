@@ -1,0 +1,20 @@
+/* Rows of the plan that were switched off, by name, so that they stay off through any number of sessions that follow
+ * one another, those whose methods have no such row as well. Thread: of who opens, follows and closes sessions. */
+#ifndef PAL_SESSION_ROWS_OFF_H
+#define PAL_SESSION_ROWS_OFF_H
+#include "server/sim/world.h"
+
+enum { PAL_ROWS_OFF = 64 };
+
+typedef struct pal_rows_off {
+    int n;
+    struct {
+        char body[PAL_NAME], row[PAL_NAME];
+    } at[PAL_ROWS_OFF]; /* more are on again after a switch */
+} pal_rows_off;
+
+/* What is off in `before` (not in its plan though it was at open, row [n_row], or known to be off since an earlier
+ * session, *from) is switched off in `next`, a new world of scene, where that has it, and kept in *to */
+void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_row_info *row, int n_row,
+                       const pal_world *before, pal_world *next, const pal_scene *scene);
+#endif
