@@ -37,25 +37,32 @@ struct pal_estimator {
     pal_estimate_state *state; /* of work; whose it is says `place` */
     pthread_mutex_t lock;
     pal_estimate newest; /* tick 0: none yet */
-    bool there;
+    bool there, refused;
+    unsigned newest_life; /* in which life of the body; refused: any */
+    /* how often the body has frozen and come back: odd while it is frozen */
+    _Atomic unsigned life;
+    _Atomic uint64_t frozen_tick;
+    unsigned looked_life; /* of the state; goes with `place` */
     /* the simulation's own */
     uint64_t looked_ns, looked_tick;
     float ms[PAL_ESTIMATE_STEPS];
     uint64_t n_ms;
     double step_s;
+    bool slept; /* it has been looked at since it fell asleep */
 };
 
-static void publish(pal_estimator *e, const pal_estimate *estimate)
+static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused)
 {
     pthread_mutex_lock(&e->lock);
     e->newest = *estimate;
-    e->there = true;
+    e->there = true, e->refused = refused;
+    e->newest_life = e->looked_life;
     pthread_mutex_unlock(&e->lock);
     atomic_fetch_add_explicit(&n_made, 1, memory_order_relaxed);
 }
 
 /* nothing is known, and why */
-static void publish_refusal(pal_estimator *e, const pal_note *note)
+static pal_estimate nothing(const char *why)
 {
     pal_estimate none = {.error_m = NAN,
                          .discretisation_m = NAN,
@@ -65,8 +72,14 @@ static void publish_refusal(pal_estimator *e, const pal_note *note)
                          .zz_percent = NAN,
                          .most_m = NAN,
                          .ms = NAN};
-    snprintf(none.note, sizeof none.note, "%.159s", note->text);
-    publish(e, &none);
+    snprintf(none.note, sizeof none.note, "%.159s", why);
+    return none;
+}
+
+static void publish_refusal(pal_estimator *e, const pal_note *note)
+{
+    pal_estimate none = nothing(note->text);
+    publish(e, &none, true);
 }
 
 static bool wait_state(pal_estimator *e)
@@ -92,7 +105,7 @@ static void *estimate(void *user)
         uint64_t before = pal_clock_thread_ns();
         bool whole = pal_estimate_work_run(e->work, &out);
         out.own_ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
-        if (whole) publish(e, &out);
+        if (whole) publish(e, &out, false);
     }
     pal_estimate_work_close(e->work);
     e->work = NULL;
@@ -167,9 +180,22 @@ static void copy_times(const pal_estimator *e, pal_estimate_state *to)
     for (int i = 0; i < to->n_ms; i++) to->ms[i] = e->ms[(e->n_ms - 1 - (uint64_t)i) % PAL_ESTIMATE_STEPS];
 }
 
+/* what was known of a body is over when it freezes; it is another one when it comes back */
+static void note_frozen(pal_estimator *e, const pal_world *world, bool frozen)
+{
+    unsigned life = atomic_load_explicit(&e->life, memory_order_relaxed);
+    if ((life % 2 == 1) == frozen) return;
+    if (frozen) atomic_store_explicit(&e->frozen_tick, pal_world_tick(world), memory_order_relaxed);
+    atomic_store_explicit(&e->life, life + 1, memory_order_release);
+}
+
 void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms)
 {
+    const pal_body *body = pal_world_look(world, e->body);
+    note_frozen(e, world, body->frozen);
     if (!isnan(step_ms)) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
+    if (!body->asleep) e->slept = false;
+    if (e->slept) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
     uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
     /* nothing has moved since */
@@ -177,6 +203,8 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
     if (e->looked_ns && now - e->looked_ns < period_ns) return;
     if (!pal_estimate_copy(e->state, world, e->body)) return;
     e->looked_ns = now, e->looked_tick = tick;
+    e->slept = body->asleep;
+    e->looked_life = atomic_load_explicit(&e->life, memory_order_relaxed);
     copy_times(e, e->state);
     atomic_store_explicit(&e->place, BUSY, memory_order_release);
     sem_post(&e->wake);
@@ -184,11 +212,15 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
 
 bool pal_estimator_read(pal_estimator *e, pal_estimate *out)
 {
+    unsigned life = atomic_load_explicit(&e->life, memory_order_acquire);
     pthread_mutex_lock(&e->lock);
-    bool there = e->there;
+    bool there = e->there && (e->refused || e->newest_life == life), frozen = life % 2 == 1;
     if (there) *out = e->newest;
     pthread_mutex_unlock(&e->lock);
-    return there;
+    if (there || !frozen) return there;
+    *out = nothing("the body is frozen: nothing is known of it until it is reset");
+    out->tick = atomic_load_explicit(&e->frozen_tick, memory_order_relaxed);
+    return true;
 }
 
 int pal_estimator_threads(void)

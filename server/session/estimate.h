@@ -14,7 +14,8 @@
  *   algebraic       the same steps against those of a solver that leaves next to nothing
  * error_m is their sum, which is above the truth where parts have opposite signs, and below it where elements lock or
  * a small part is not known. There is none where the discretisation is not known, or of springs the model.
- * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where nothing locks. A moving
+ * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where nothing locks. Rows that
+ * are switched off are off in its worlds as well. A moving
  * support counts as standing where it is. Of control cells (subdivision_fem) time and algebraic part alone are known
  * and so no sum, of bodies that adapt nothing.
  *
@@ -53,9 +54,11 @@ void pal_estimator_leave(pal_estimator *estimator);
 bool pal_estimator_gone(const pal_estimator *estimator); /* the thread has ended: close does not wait. [any] */
 void pal_estimator_close(pal_estimator *estimator);      /* leaves, joins the thread; NULL is fine */
 /* After every step (step_ms NaN: none was made, as while paused): notes what it took, and copies the state as it is now
- * when the estimator is free and it is time for another one. Never waits, takes no memory. One thread. [sim] */
+ * when the estimator is free and it is time for another one; of a body that sleeps once, until it wakes. Never waits,
+ * takes no memory. One thread. [sim] */
 void pal_estimator_look(pal_estimator *estimator, const pal_world *world, double step_ms);
-/* newest; false: none yet. Copies. [any] */
+/* newest; false: none yet, or none since the body was frozen and reset. While it is frozen: nothing known, and why.
+ * Copies. [any] */
 bool pal_estimator_read(pal_estimator *estimator, pal_estimate *out);
 /* how many threads of estimators there are in this process, and how many estimates they have made, for tests [any] */
 int pal_estimator_threads(void);

@@ -292,6 +292,7 @@ static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const dou
 {
     pal_body *own = pal_world_body(r->world, 0);
     pal_material now;
+    PAL_TRY(pal_estimate_rows(state, r->world, r->scene, false));
     pal_world_material_now(r->world, 0, &now);
     if (memcmp(&now, &state->material, sizeof now)) {
         PAL_TRY(pal_world_material(r->world, 0, &state->material, NULL));

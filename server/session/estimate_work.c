@@ -27,6 +27,7 @@ static const double locks_above = 0.47;
 struct pal_estimate_work {
     const _Atomic bool *stop;
     pal_scene *scene; /* the body alone, without tools and what is shown */
+    pal_scene *exact_scene;
     pal_estimate_state state;
     pal_world *live;        /* as it runs                                                     */
     pal_world *exact;       /* the same with a solver that leaves next to nothing; NULL: it solves nothing */
@@ -128,14 +129,16 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
     f->order = order;
     f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : usual_tolerance;
     if (!implicit && !cg) return PAL_ERR_OK;
-    pal_item *item = &w->scene->body[0].solver, was = *item;
+    w->exact_scene = malloc(sizeof *w->exact_scene);
+    if (!w->exact_scene) return PAL_ERR_MEMORY;
+    *w->exact_scene = *w->scene;
+    pal_item *item = &w->exact_scene->body[0].solver;
     if (!item->name[0]) pal_item_init(item, "solver", solver);
     put_number(item, "tolerance", tight);
     if (implicit) put_number(item, "iterations", 400);
-    pal_err err = pal_world_create(w->scene, note, &w->exact);
-    *item = was;
-    if (!err) pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
-    return err;
+    PAL_TRY(pal_world_create(w->exact_scene, note, &w->exact));
+    pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
+    return PAL_ERR_OK;
 }
 
 /* ---- bodies at rest ---- */
@@ -215,6 +218,12 @@ static pal_err take_state(pal_estimate_work *w)
     s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
     s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
+    for (int i = 0; i < pal_world_rows(w->live); i++) {
+        const pal_effect *effect = pal_world_effect(w->live, i)->effect;
+        if (effect->stage != PAL_STAGE_FORCE || s->n_row == PAL_ESTIMATE_ROWS) continue;
+        s->row[s->n_row] = effect->name;
+        s->row_on[s->n_row++] = true;
+    }
     return s->x && s->v && s->load && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -256,7 +265,7 @@ void pal_estimate_work_close(pal_estimate_work *w)
     pal_world_destroy(w->exact);
     pal_rest_free(&w->fine), pal_rest_free(&w->coarse), pal_rest_free(&w->model);
     pal_hexes_free(&w->voxels.hexes);
-    free(w->scene);
+    free(w->scene), free(w->exact_scene);
     free(w->state.x), free(w->state.v), free(w->state.load);
     free(w->first), free(w->second);
     free(w);
@@ -265,6 +274,30 @@ void pal_estimate_work_close(pal_estimate_work *w)
 pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work)
 {
     return &work->state;
+}
+
+static bool has_row(const pal_world *world, int body, const char *name)
+{
+    const char *of = pal_world_look(world, body)->name;
+    for (int i = 0; i < pal_world_rows(world); i++) {
+        pal_row_info row;
+        pal_world_row(world, i, &row);
+        if (row.body == of && !strcmp(row.name, name)) return true;
+    }
+    return false;
+}
+
+pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe)
+{
+    const pal_body_def *def = &scene->body[0];
+    for (int k = 0; k < state->n_row; k++) {
+        bool has = has_row(world, 0, state->row[k]), may = recipe || has;
+        for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->row[k]);
+        if (has == state->row_on[k] || !may) continue;
+        PAL_TRY(pal_world_switch_row(world, scene, 0, state->row[k], state->row_on[k], NULL));
+        pal_world_body(world, 0)->load_cap_N = INFINITY;
+    }
+    return PAL_ERR_OK;
 }
 
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
@@ -280,6 +313,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
     pal_world_material_now(world, body, &state->material);
+    for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;
 }
 
@@ -299,10 +333,12 @@ static double median_ms(pal_estimate_state *s)
 }
 
 /* the state into a world of the same mesh, under its loads */
-static pal_err set_state(pal_world *world, const pal_estimate_state *s)
+static pal_err set_state(const pal_estimate_work *w, pal_world *world)
 {
+    const pal_estimate_state *s = &w->state;
     pal_body *body = pal_world_body(world, 0);
     pal_material now;
+    PAL_TRY(pal_estimate_rows(s, world, world == w->exact ? w->exact_scene : w->scene, true));
     pal_world_material_now(world, 0, &now);
     if (memcmp(&now, &s->material, sizeof now)) {
         PAL_TRY(pal_world_material(world, 0, &s->material, NULL));
@@ -322,7 +358,7 @@ static pal_err set_state(pal_world *world, const pal_estimate_state *s)
 static bool go_ahead(const pal_estimate_work *w, pal_world *world, int n, double dt_s, double *x, double *ms)
 {
     const pal_body *body = pal_world_body(world, 0);
-    bool good = !set_state(world, &w->state);
+    bool good = !set_state(w, world);
     uint64_t began = pal_clock_thread_ns();
     for (int i = 0; i < n && good; i++) good = !stopped(w) && !pal_world_step(world, dt_s);
     *ms = 1e-6 * (double)(pal_clock_thread_ns() - began) / n;
@@ -386,6 +422,7 @@ static void price_size(pal_estimate_work *w)
     if (!pal_world_create(scene, NULL, &small)) {
         const pal_body *loaded = pal_world_look(w->coarse.world, 0);
         pal_body *body = pal_world_body(small, 0);
+        (void)pal_estimate_rows(&w->state, small, scene, true);
         body->load_cap_N = INFINITY;
         for (int i = 0; i < body->n_node && body->n_node == loaded->n_node; i++)
             (void)pal_world_load(small, 0, i, loaded->outer + 3 * (size_t)i);
@@ -428,7 +465,7 @@ static bool settle_springs(pal_estimate_work *w)
     pal_body *body = pal_world_body(w->live, 0);
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     double energy_J = 0, last_m = 0, began_s = 1e-9 * (double)pal_clock_thread_ns();
-    if (set_state(w->live, &w->state)) return false;
+    if (set_state(w, w->live)) return false;
     memset(body->v, 0, n_byte);
     memcpy(w->first, body->x, n_byte);
     for (int k = 0; k < MOST_SETTLE && 1e-9 * (double)pal_clock_thread_ns() - began_s < settle_s; k++) {

@@ -6,7 +6,7 @@
 
 #include <stdatomic.h>
 
-enum { PAL_ESTIMATE_STEPS = 256 };
+enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
 /* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */
 typedef struct pal_estimate_state {
@@ -17,6 +17,10 @@ typedef struct pal_estimate_state {
     double *load;  /* lasting and contact loads, N [n_node][3] */
     int n_substep; /* of the step */
     pal_material material;
+    /* FORCE rows of the body: names from open on, and which of them are not switched off */
+    const char *row[PAL_ESTIMATE_ROWS];
+    bool row_on[PAL_ESTIMATE_ROWS];
+    int n_row;
     float ms[PAL_ESTIMATE_STEPS]; /* of the last steps, any order */
     int n_ms;
 } pal_estimate_state;
@@ -31,6 +35,9 @@ pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work);
 /* the state of `body` of a world made from the scene; false: that is no state to look at (not finite, frozen, another
  * number of points). Copies, no memory. [sim] */
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body);
+/* the rows of a world of the same body, made from `scene`, as those of the state; recipe: rows of the model too, which
+ * is the state's. What pal_world_switch_row gives. Heap memory */
+pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe);
 /* estimates the state; false: it was stopped */
 bool pal_estimate_work_run(pal_estimate_work *work, pal_estimate *out);
 #endif

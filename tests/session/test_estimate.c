@@ -382,6 +382,107 @@ static void elements_that_lock_say_so(void)
     }
 }
 
+static bool estimate_again(pal_estimate_work *work, const pal_world *w, pal_estimate *out)
+{
+    return pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, out);
+}
+
+/* at rest while gravity is off, not so when it is on */
+static void rows_switched_off_are_off_for_the_estimate(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_estimate_work *work = NULL;
+    pal_world *w = NULL;
+    pal_estimate e, fresh;
+    pal_item_init(&fem->body[0].effect[0], "effect", "gravity");
+    pal_item_put_number(&fem->body[0].effect[0], "acceleration_m_s2", 0.2, NULL);
+    fem->body[0].n_effect = 1;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
+    for (int round = 0; round < 2; round++) {
+        CHECK(!pal_world_switch_row(w, fem, 0, "gravity", false, NULL));
+        REQUIRE(estimate_again(work, w, &e));
+        REQUIRE(estimate_of(fem, w, &fresh));
+        CHECK_LE(fresh.error_m, 1e-12);
+        CHECK_LE(e.error_m, round ? 1e-9 : 1e-12);
+        CHECK(!pal_world_switch_row(w, fem, 0, "gravity", true, NULL));
+        REQUIRE(estimate_again(work, w, &e));
+        REQUIRE(estimate_of(fem, w, &fresh));
+        printf("  on: %.6g, made for it %.6g mm; algebraic %.3g, %.3g mm\n", 1e3 * e.discretisation_m,
+               1e3 * fresh.discretisation_m, 1e3 * e.algebraic_m, 1e3 * fresh.algebraic_m);
+        CHECK(fresh.discretisation_m > 1e-7);
+        CHECK_NEAR(e.discretisation_m, fresh.discretisation_m, 1e-3 * fresh.discretisation_m);
+        CHECK_NEAR(e.algebraic_m, fresh.algebraic_m, 1e-3 * fresh.algebraic_m + 1e-12);
+    }
+    pal_estimate_work_close(work);
+    pal_world_destroy(w);
+    free(fem);
+}
+
+/* looks until there are so many estimates, or a while has gone by */
+static uint64_t look_for(pal_estimator *e, pal_world *w, uint64_t n, uint64_t while_ns)
+{
+    uint64_t made = pal_estimator_made(), until = pal_clock_ns() + while_ns;
+    while (pal_estimator_made() - made < n && pal_clock_ns() < until) {
+        CHECK(!pal_world_step(w, scene.step_s));
+        pal_estimator_look(e, w, 1);
+        sleep_ms(5);
+    }
+    return pal_estimator_made() - made;
+}
+
+static void a_sleeping_body_is_looked_at_once(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_world *w = NULL;
+    pal_estimator *e = NULL;
+    pal_estimate estimate;
+    pal_item_init(&fem->body[0].effect[0], "effect", "sleep");
+    fem->body[0].n_effect = 1;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    for (int i = 0; i < 200 && !pal_world_look(w, 0)->asleep; i++) CHECK(!pal_world_step(w, fem->step_s));
+    REQUIRE(pal_world_look(w, 0)->asleep);
+    REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
+    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    uint64_t tick = pal_estimator_read(e, &estimate) ? estimate.tick : 0;
+    CHECK_INT((long long)look_for(e, w, 1, 600000000), 0);
+    CHECK(pal_estimator_read(e, &estimate) && estimate.tick == tick);
+    /* a load wakes it */
+    CHECK(!pal_world_load(w, 0, 0, (double[3]){1e-3, 0, 0}));
+    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    CHECK(pal_estimator_read(e, &estimate) && estimate.tick > tick && estimate.most_m > 0);
+    pal_estimator_close(e);
+    pal_world_destroy(w);
+    free(fem);
+}
+
+static void nothing_is_known_of_a_frozen_body(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_world *w = NULL;
+    pal_estimator *e = NULL;
+    pal_estimate estimate;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
+    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    CHECK(pal_estimator_read(e, &estimate) && estimate.error_m >= 0);
+    pal_world_body(w, 0)->frozen = true;
+    pal_estimator_look(e, w, 1);
+    REQUIRE(pal_estimator_read(e, &estimate));
+    CHECK(isnan(estimate.error_m) && isnan(estimate.most_m) && estimate.tick == pal_world_tick(w));
+    CHECK(strstr(estimate.note, "frozen") != NULL);
+    /* what was known before is not what is known after */
+    CHECK(!pal_world_reset_body(w, 0));
+    pal_estimator_look(e, w, NAN);
+    CHECK(!pal_estimator_read(e, &estimate));
+    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    for (int k = 0; k < 100 && !pal_estimator_read(e, &estimate); k++) look_for(e, w, 1, patience_ns);
+    CHECK(pal_estimator_read(e, &estimate) && estimate.error_m >= 0);
+    pal_estimator_close(e);
+    pal_world_destroy(w);
+    free(fem);
+}
+
 static void a_body_at_rest_has_no_error(void)
 {
     pal_scene *fem = fem_scene();
@@ -447,6 +548,9 @@ int main(void)
     RUN(calibrated_springs_have_no_neighbour_in_size);
     RUN(small_parts_alone_are_no_error);
     RUN(elements_that_lock_say_so);
+    RUN(rows_switched_off_are_off_for_the_estimate);
+    RUN(a_sleeping_body_is_looked_at_once);
+    RUN(nothing_is_known_of_a_frozen_body);
     RUN(a_body_at_rest_has_no_error);
     pal_prepared_free(&mesh);
     return check_report();
