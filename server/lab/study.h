@@ -10,7 +10,10 @@
  * Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own
  * error is estimated from its last changes (Richardson); its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s);
  * adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of the coarse surface; or
- * samples that the caller has. Deterministic but for the milliseconds and seconds. */
+ * samples that the caller has. Deterministic but for the milliseconds and seconds.
+ * Calibrated springs are fitted to the reference under all loads but the last, which judges them unseen; where there is
+ * one load only, the point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor
+ * picked. */
 #ifndef PAL_LAB_STUDY_H
 #define PAL_LAB_STUDY_H
 #include "server/lab/sample_points.h"
