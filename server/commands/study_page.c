@@ -51,6 +51,9 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
     fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
             1e3 * s->most_m);
+    if (s->reference_m > 0.25 * s->most_m)
+        fprintf(to, "Nearly as much as it moves: is the body held by too little (palpate prepare --hold 20), or was it "
+                    "--quick?\n");
     fprintf(to, "%1s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "ms", "p95", "live", "rest RMS", "most mm",
             "RMS %", "most %", "way mm", "nodes", "steps", "setting");
     pal_study_order(s, order);

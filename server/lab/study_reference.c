@@ -105,6 +105,8 @@ static pal_err estimate(pal_study_job *job, double *out)
     if (job->shell) size[0] = job->reference - 2, size[1] = job->reference - 1;
     if (size[1] >= size[2]) size[1] = size[2] - 1;
     if (size[0] >= size[1]) size[0] = size[1] - 1;
+    const int nearer[3] = {pal_study_fit_size(job, job->reference / 1.5), pal_study_fit_size(job, job->reference / 1.2),
+                           job->reference};
     double *u[2];
     for (int k = 0; k < 2; k++) u[k] = calloc(3 * (size_t)job->n_probe, sizeof(double));
     pal_err err = u[0] && u[1] ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -112,6 +114,9 @@ static pal_err estimate(pal_study_job *job, double *out)
     for (int k = 0; k < job->n_load && !err; k++) {
         double left = 0;
         err = estimate_load(job, k, size, u, &left);
+        /* coarse voxels that hold too little of it, or fold: nearer to the reference's own */
+        if ((err == PAL_ERR_REFUSED || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN) && !job->shell)
+            err = estimate_load(job, k, nearer, u, &left);
         *out = fmax(*out, left);
     }
     free(u[0]), free(u[1]);
