@@ -170,7 +170,7 @@ static void a_grid_finds_the_hard_half_of_the_cube(void)
     medians(&e, median, &right);
     CHECK(homogeneous >= 5 * e.result.value.error_percent);
     HARD_CASE_MISSED("poisson_static", "tet_springs", "soft on stiff, 3 constants fitted: RMS off finite elements",
-                     homogeneous, 3, "%");
+                     homogeneous, 3, 13, "%");
     HARD_CASE("poisson_static", "tet_springs", "soft on stiff, constants fitted on a grid: RMS off finite elements",
               e.result.value.error_percent, 3, "%");
     CHECK(median[1] >= 8 * median[0]);

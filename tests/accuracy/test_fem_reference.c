@@ -35,6 +35,7 @@ static pal_problem *open_problem(const char *folder, pal_surface *surface)
 }
 
 static bool on_record; /* in the table of hard cases: the cube of nu 0.499 */
+static double others_percent;
 
 static void check_row(const pal_problem *problem, const pal_surface *surface, const row *r)
 {
@@ -68,9 +69,8 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     CHECK_LE(rms, r->rms_percent);
     if (on_record && !strcmp(r->element, "hex8_bbar"))
         HARD_CASE("poisson_static", "fem", "soft on stiff, 729 and 4,913 nodes: RMS off the reference", rms, 3, "%");
-    else if (on_record)
-        HARD_CASE_MISSED("poisson_static", "fem", "elements that are not the default (tet4, hex8): the same", rms, 3,
-                         "%");
+    else if (on_record && strcmp(r->element, "tet10") != 0)
+        others_percent = fmax(others_percent, rms);
     if (r->n_node > 0) CHECK_INT(result.n_node, r->n_node);
     /* supports bear what the loads give */
     for (int c = 0; c < 3; c++)
@@ -153,6 +153,9 @@ static void other_elements_reach_what_is_known_of_them(void)
     };
     CHECK_ROWS("beam", beam);
     CHECK_ROWS("cube", cube);
+    if (others_percent > 0)
+        HARD_CASE_MISSED("poisson_static", "fem", "elements that are not the default (tet4, hex8): the same",
+                         others_percent, 3, 12.2, "%");
 }
 
 int main(void)

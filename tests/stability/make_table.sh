@@ -44,7 +44,7 @@ tables() { # RECORDS part(whole|matrix)
         }
         {
             n = ++count[$1, $2]
-            kind[$1, $2, n] = $3; what[$1, $2, n] = $4; value[$1, $2, n] = $5; bound[$1, $2, n] = $6
+            ceiling[$1, $2, n] = $10; kind[$1, $2, n] = $3; what[$1, $2, n] = $4; value[$1, $2, n] = $5; bound[$1, $2, n] = $6
             unit[$1, $2, n] = $7; test[$1, $2, n] = $8
         }
         END {
@@ -72,7 +72,7 @@ tables() { # RECORDS part(whole|matrix)
                         if (part != "whole") continue
                         shall = kind[i] == "none" ? "" : kind[i] == "all" ? "all" : "<= " bound[i] (unit[i] == "" ? "" : " " unit[i])
                         f = figure(kind[i], value[i], bound[i], unit[i])
-                        if (kind[i] == "missed" && value[i] > bound[i]) f = "**" f "**, missed"
+                        if (kind[i] == "missed" && value[i] > bound[i]) f = "**" f "**, missed; the test holds it at <= " ceiling[i]
                         print "| " id " | " model[m] " | " what[i] " | " f " | " shall " | " test[i] " |"
                     }
                     row = row " | " (best ? cell(kind[best], value[best], bound[best], unit[best]) : "?")

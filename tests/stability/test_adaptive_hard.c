@@ -330,7 +330,7 @@ static void a_free_shell_keeps_its_momentum(void)
     }
     pal_body_momentum(s.body, after);
     HARD_CASE("momentum", "adaptive_springs", "drift of momentum in 6 s, levels changing",
-              pal_dist3(before, after) / pal_norm3(before), 1e-4, "");
+              pal_dist3(before, after) / pal_norm3(before), 1e-4, "in 360 steps");
     HARD_CASE("no_drag", "adaptive_springs", "levels changing: energy over the first", high / energy, 1.01, "");
     printf("  %d to %d nodes while it flew\n", least, most);
     /* what is left is a steady turn, and that changes nothing */

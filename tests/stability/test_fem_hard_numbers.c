@@ -83,6 +83,7 @@ static void materials_that_are_none_are_refused(void)
 static void a_contrast_of_a_million_is_solved(void)
 {
     static const char *const solvers[] = {"implicit_euler", "static_newton"};
+    int free_end = 0;
     for (int k = 0; k < HARD_KINDS; k++)
         for (int s = 0; s < 3; s++) {
             bool hard_first = s < 2, rest = s == 1;
@@ -117,8 +118,7 @@ static void a_contrast_of_a_million_is_solved(void)
             if (hard_first)
                 HARD_CASE("contrast", "fem", "hard half held: iterations to 1e-6", most, 30, "");
             else
-                HARD_CASE_MISSED("contrast", "fem", "hard half at the free end: iterations to 1e-6", most, 30, "");
-            CHECK_LE(most, hard_first ? 30 : 100);
+                free_end = most > free_end ? most : free_end;
             double hard = 0, soft = 0;
             for (int i = 0; i < b.body->n_node; i++) {
                 double *to = (b.body->x_rest[3 * i] < 0.03 + 1e-9) == hard_first ? &hard : &soft;
@@ -130,6 +130,7 @@ static void a_contrast_of_a_million_is_solved(void)
                    solvers[rest], hard_first ? "held" : "free", most, hard / soft);
             beam_free(&b);
         }
+    HARD_CASE_MISSED("contrast", "fem", "hard half at the free end: iterations to 1e-6", free_end, 30, 100, "");
 }
 
 /* a box in its own units of length, stress and mass: where a node is after 20 steps */
@@ -375,7 +376,8 @@ static void a_free_body_keeps_its_momentum_for_ten_thousand_steps(void)
             if (i % 100 == 0) CHECK_LE(pal_world_energy_J(b.world), energy * (1 + 1e-6));
         }
         pal_body_momentum(b.body, now);
-        HARD_CASE("momentum", "fem", "drift of momentum", pal_dist3(now, before) / pal_norm3(before), 1e-4, "");
+        HARD_CASE("momentum", "fem", "drift of momentum", pal_dist3(now, before) / pal_norm3(before), 1e-4,
+                  "in 10,000 steps");
         beam_free(&b);
     }
 }

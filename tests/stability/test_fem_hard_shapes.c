@@ -60,8 +60,8 @@ static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
                 HARD_CASE(insult_cases[insult], "fem", "energy over the insult's", run.most, 1.01, "");
                 /* known to fail: a neo-Hookean tet4 body, hardly compressible, on a point stays folded on its split */
                 if (k == HARD_NEO_TET && q == 2 && insult == HARD_POINT)
-                    HARD_CASE_MISSED("point", "fem", "tet4, neo-Hookean, nu 0.499: stays folded; at rest after",
-                                     run.back_s, most_s, "s");
+                    HARD_CASE_MISSED("point", "fem", "tet4, neo-Hookean, nu 0.499: stays folded, off rest after 10 s",
+                                     100 * hard_rms(b.body) / b.body->size_m, 0.1, 75, "% S");
                 else
                     HARD_CASE(insult_cases[insult], "fem", "within 0.1 % S of rest after", run.back_s, most_s, "s");
             }

@@ -193,7 +193,7 @@ static void slivers_are_borne_or_refused(void)
                 REQUIRE(four_step(&s, 1, 1.0 / 60) && four_step(&plain, 1, 1.0 / 60));
                 const double times = (double)pal_world_substeps(s.world) / pal_world_substeps(plain.world);
                 if (m == FOUR_SPRINGS && !flat)
-                    HARD_CASE_MISSED("slivers", four_name[m], what, times, 1.1, "");
+                    HARD_CASE_MISSED("slivers", four_name[m], what, times, 1.1, 26, "");
                 else
                     HARD_CASE("slivers", four_name[m], what, times, 1.1, "");
                 if (times < 2)

@@ -172,7 +172,8 @@ static void bodies_on_a_moving_anchor_come_to_rest_on_it(void)
         }
         printf("  %s: %.3g %% S away at most, sags by %.3g %%, off by %.2g %%\n", four_name[m], far, four_off(&still),
                100 * worst / s.body->size_m);
-        HARD_CASE("anchors", four_name[m], "farthest from rest on the way", far, 400, "% S");
+        /* 2 S of it are the anchor's own way: bounded, but no figure of merit */
+        CHECK_LE(far, 400);
         HARD_CASE("anchors", four_name[m], "off the body whose anchor stood still", 100 * worst / s.body->size_m, 0.1,
                   "% S");
         four_close(&s), four_close(&still);

@@ -78,7 +78,8 @@ static void springs_keep_momentum_for_ten_thousand_steps(void)
     const double dt_s = 0.9 * pal_world_limit_s(s.world), first = pal_world_energy_J(s.world);
     for (int i = 0; i < CHECK_REPEATS(10000, 1000); i++) REQUIRE(four_step(&s, 1, dt_s));
     pal_body_momentum(s.body, after);
-    HARD_CASE("momentum", "tet_springs", "drift of momentum", pal_dist3(before, after) / pal_norm3(before), 1e-4, "");
+    HARD_CASE("momentum", "tet_springs", "drift of momentum", pal_dist3(before, after) / pal_norm3(before), 1e-4,
+              "in 10,000 steps");
     CHECK_LE(pal_world_energy_J(s.world), 1.02 * first);
     four_close(&s);
 }
@@ -160,9 +161,8 @@ static void springs_at_any_poisson_ratio_stay_bounded(void)
          */
         if (q == 2) {
             HARD_CASE_MISSED("poisson_step", "tet_springs", "energy over the first at 0.4999, with heavier nodes",
-                             most / first, 1.01, "");
+                             most / first, 1.01, 1.5, "");
             CHECK(s.body->rescue.n_heavy > 0);
-            CHECK_LE(most, 1.5 * first);
         } else
             HARD_CASE("poisson_step", "tet_springs", "energy over the first", most / first, 1.01, "");
         four_close(&s);

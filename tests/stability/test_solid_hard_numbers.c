@@ -81,7 +81,7 @@ static void hardly_compressible_cubes_are_too_stiff_by_a_bounded_part(void)
         CHECK_LE(fabs(solid / fem - 1), most[q]);
         if (q == 2)
             HARD_CASE_MISSED("poisson_static", "subdivision_fem", "729 nodes, too stiff beside model fem by",
-                             100 * fabs(solid / fem - 1), 3, "%");
+                             100 * fabs(solid / fem - 1), 3, 100 * most[q], "%");
     }
 }
 
@@ -127,8 +127,7 @@ static void a_contrast_of_a_million_costs_few_iterations(void)
     }
     printf("  %d iterations at most, hard part moves %.2g of the soft one\n", most, hard / soft);
     CHECK(soft > 1e-4);
-    CHECK_LE(most, 35);
-    HARD_CASE_MISSED("contrast", "subdivision_fem", "painted: iterations to 1e-6", most, 30, "");
+    HARD_CASE_MISSED("contrast", "subdivision_fem", "painted: iterations to 1e-6", most, 30, 35, "");
     HARD_CASE("contrast", "subdivision_fem", "hard part moves, over the soft one", hard / soft, 1e-4, "");
     solid_scene_close(&s);
     /* explicit steps are a thousand times as many: refused with the number */
@@ -239,7 +238,7 @@ static void drag_without_end_creeps_and_none_keeps_energy(void)
     }
     printf("  without drag energy stays between %.4f and %.4f of the first\n", least / first, most / first);
     HARD_CASE_MISSED("no_drag", "subdivision_fem", "explicit: energy off the first (v half a sub-step behind x)",
-                     100 * fmax(most / first - 1, 1 - least / first), 1, "%");
+                     100 * fmax(most / first - 1, 1 - least / first), 1, 6, "%");
     CHECK_LE(most, 1.06 * first);
     CHECK(least > 0.94 * first);
     solid_scene_close(&s);
@@ -270,7 +269,7 @@ static void momentum_of_a_free_body_stays(void)
         }
         printf("  %s: momentum drifts by %.2g, angular momentum ends at %.4f, at most %.4f\n", solid_kinds[k].shown,
                drift / of, pal_norm3(l[1]) / pal_norm3(l[0]), spin / pal_norm3(l[0]));
-        HARD_CASE("momentum", "subdivision_fem", "drift of momentum in 2 s", drift / of, 1e-4, "");
+        HARD_CASE("momentum", "subdivision_fem", "drift of momentum in 2 s", drift / of, 1e-4, "in 120 steps");
         CHECK_LE(drift, 1e-9 * of);
         if (solid_kinds[k].energy) CHECK_LE(spin, 1.01 * pal_norm3(l[0]));
         solid_scene_close(&s);

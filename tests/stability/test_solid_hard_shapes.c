@@ -48,12 +48,16 @@ static void a_corner_that_is_turned_over_turns_back(void)
             HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 2, "s");
         } else
             HARD_CASE_MISSED("inverted", "subdivision_fem",
-                             "explicit, operator edges: stays bounded, energy over the insult's", run.most, 1.01, "");
+                             "explicit, operator edges: stays bounded, energy over the insult's", run.most, 1.01, 60,
+                             "");
         solid_scene_close(&s);
     }
 }
 
 static const char *const solid_cases[] = {"plane", "point", "mirror", "blown_up", "shuffle", "shuffle"};
+
+/* of those blown up whose volume hardly changes */
+static double blown_late;
 
 /* returns after how long all were back; INFINITY: one was not */
 static double insult_all(int kind, double poisson, int n_seed, double *most)
@@ -79,7 +83,7 @@ static double insult_all(int kind, double poisson, int n_seed, double *most)
         HARD_CASE(id, "subdivision_fem", "energy over the insult's", *most, 1.01, "");
         /* no more than 0.2 S in a step of the implicit solver */
         if (insult == SOLID_BLOWN && poisson > 0.49)
-            HARD_CASE_MISSED(id, "subdivision_fem", "nu 0.499: within 0.1 % S of rest after", late, 10, "s");
+            blown_late = fmax(blown_late, late);
         else
             HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
         printf(" %s %d of %d (%.2f s)", solid_insults[insult], back, n, late);
@@ -103,6 +107,7 @@ static void flat_collapsed_mirrored_blown_up_and_shuffled_solids_come_back(void)
         CHECK_LE(insult_all(SOLID_EXPLICIT, poisson[q], 3, &most), 10);
         CHECK_LE(most, 1.01);
     }
+    HARD_CASE_MISSED("blown_up", "subdivision_fem", "nu 0.499: within 0.1 % S of rest after", blown_late, 10, 25, "s");
 }
 
 static void operator_edges_comes_back_with_the_implicit_solver(void)
