@@ -150,6 +150,7 @@ static void without_a_study_there_is_the_estimate_alone(void)
 static void neighbours_are_priced_once(void)
 {
     pal_body_def *def = &organ.scene.body[0], *was = malloc(sizeof *was);
+    pal_setting now;
     mem_client ada;
     int n_step = 0, n_size = 0;
     REQUIRE(was);
@@ -163,12 +164,13 @@ static void neighbours_are_priced_once(void)
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
     UNTIL(e->n_neighbour >= 2 && e->ms > 0, &ada, NULL);
     double step_ms = 1e3 * organ.scene.step_s;
+    pal_setting_of(&organ.scene, 0, &now);
     for (uint32_t i = 0; i < e->n_neighbour; i++) {
         const pal_wire_neighbour *near = &e->neighbour[i];
         bool step = !strcmp(near->knob, "step"), size = !strcmp(near->knob, "resolution");
         n_step += step, n_size += size;
         if (step) CHECK_NEAR(near->ms * near->step_ms, e->ms * step_ms, 1e-9 * step_ms);
-        if (size) CHECK((near->ms > e->ms) == (near->error_m < e->error_m));
+        if (size) CHECK((near->ms > e->ms) == ((int)near->size > now.size));
     }
     CHECK_INT(n_step, 2);
     printf("  %u neighbours, %d in size\n", e->n_neighbour, n_size);
