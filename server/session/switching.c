@@ -21,6 +21,10 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
         s->from.body[body] = *base;
         s->from.body[body].material = scene->body[body].material;
     }
+    double n_node = pal_setting_nodes(&s->from, body, to);
+    if (n_node > PAL_SWITCH_NODES)
+        return pal_note_set(note, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
+                            to->size, n_node, PAL_SWITCH_NODES);
     PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
     pal_setting_of(scene, body, &now);
     pal_setting_of(&s->set->scene, body, &next);

@@ -10,6 +10,9 @@
 #include "server/sim/transfer.h"
 #include "server/sim/world.h"
 
+/* most nodes of a mesh that is made while sessions run, for the sake of their memory */
+enum { PAL_SWITCH_NODES = 100000 };
+
 typedef struct pal_switch pal_switch;
 /* what the carry saw, for people and tests */
 typedef struct pal_switch_report {
@@ -22,8 +25,9 @@ typedef struct pal_switch_report {
 /* The scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body). It is made
  * from `scene`, whose world runs, with the body as `base` has it: as it was before its first switch, with the cells and
  * voxels that it came with, so that every setting can be come back to; NULL: as scene has it. Materials and step are
- * those of scene. Borrows scene's and base's meshes, copies both. REFUSED as of pal_setting_make and, besides, what it
- * is already; BUDGET, MEMORY. [any] */
+ * those of scene. REFUSED, before anything is made, when the new mesh would have more than PAL_SWITCH_NODES nodes
+ * (pal_setting_nodes). Borrows scene's and base's meshes, copies both. REFUSED as of pal_setting_make and, besides,
+ * what it is already; BUDGET, MEMORY. [any] */
 pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
                            pal_note *note, pal_switch **out);
 const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */

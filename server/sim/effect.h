@@ -128,8 +128,9 @@ typedef struct pal_effect {
     /* live edit: constants that the scene did not give are derived again. REFUSED: nothing changed */
     pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note);
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
-    /* CONTACT: this row goes on where the row `before` of the same effect on another body is (transfer.h): `place` has
-     * the nodes of `from` as weighted sums of this body's; NULL: they are the same nodes. Both bodies stand still */
+    /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h):
+     * `place` has the nodes of `from` as weighted sums of this body's; NULL: they are the same nodes. Both bodies stand
+     * still */
     void (*hand)(void *self, const pal_body *body, const void *before, const pal_body *from,
                  const pal_point_rows *place);
     /* optional, for implicit solvers; a body with an implicit solver refuses `internal` rows without it */

@@ -469,6 +469,25 @@ pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to,
     return PAL_ERR_OK;
 }
 
+double pal_setting_nodes(const pal_scene *from, int body, const pal_setting *to)
+{
+    const pal_body_def *def = &from->body[body];
+    const pal_surface *surface = &def->mesh->surface;
+    pal_setting now;
+    pal_setting_of(from, body, &now);
+    if (is(to->model, "adaptive_springs") && to->size > 0 && to->size != now.size)
+        return ldexp(surface->n_vertex, 2 * (to->size - 1));
+    if (!is_voxels(to->model) || keeps_mesh(def, &now, to) || to->size < 1 || surface->n_vertex < 1) return 0;
+    double low[3], high[3], box = 1, h = longest_side(surface) / to->size;
+    pal_surface_box(surface, low, high);
+    for (int c = 0; c < 3; c++) box *= high[c] - low[c];
+    /* half of the skin are nodes beside those of one to a voxel, half of it voxels that the surface cuts and that are
+     * kept. Of an open surface the volume is not known */
+    double volume = fabs(pal_surface_volume(surface)), skin = pal_surface_area(surface) / (h * h);
+    double n = (volume > 0 && volume <= box ? volume : box) / (h * h * h) + skin + 3.0 * to->size + 1;
+    return is(to->element, "tet10") ? 7 * n : n;
+}
+
 void pal_set_scene_free(pal_set_scene *set)
 {
     if (!set) return;

@@ -4,7 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
 #include "server/num/polar.h"
-#include "server/sim/shell.h"
+#include "server/sim/shell_like.h"
 #include "server/sim/world_parts.h"
 
 #include <stdlib.h>
@@ -196,52 +196,12 @@ static void set_points(pal_transfer *t, const pal_body *from, const pal_body *to
     }
 }
 
-/* ---- adaptive surfaces: numbers of levels that both have are the same ---- */
-
-/* splits what is split in the old surface, coarse faces first, as far as the new one goes */
-static void refine_like(const pal_body *from, pal_body *to)
-{
-    const pal_levels *levels = &to->shell->levels;
-    int n_level = levels->n_level < from->shell->levels.n_level ? levels->n_level : from->shell->levels.n_level;
-    pal_shell_level(to->shell, to, 0);
-    (void)pal_shell_update(to->shell, to);
-    for (int32_t f = 0; n_level > 1 && f < levels->first_face[n_level - 1]; f++)
-        if (from->shell->face_state[f] == PAL_FACE_SPLIT) (void)pal_shell_split(to->shell, to, f, 0);
-    (void)pal_shell_update(to->shell, to);
-}
-
-static bool in_use(const pal_shell *s, int32_t i)
-{
-    return i < s->levels.n_vertex[s->levels.n_level - 1] && pal_shell_has(s, i);
-}
-
-/* vertices that the old surface has not stand between the ends of their edge, as far off it as at rest */
-static void set_vertices(pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    const pal_levels *levels = &to->shell->levels;
-    for (int32_t i = 0; i < to->n_dof; i++) {
-        double *x = t->x + 3 * (size_t)i, *v = t->v + 3 * (size_t)i;
-        pal_copy3(x, to->x_rest + 3 * (size_t)i);
-        pal_set3(v, 0, 0, 0);
-        if (!pal_shell_has(to->shell, i) || to->held[i] == 1) continue;
-        if (in_use(from->shell, i)) {
-            pal_copy3(x, from->x + 3 * (size_t)i);
-            pal_copy3(v, from->v + 3 * (size_t)i);
-            continue;
-        }
-        const int32_t *end = levels->edge[pal_levels_vertex_parent(levels, i)].vertex;
-        for (int k = 0; k < 2; k++) {
-            pal_axpy3(x, 0.5, t->x + 3 * (size_t)end[k]);
-            pal_axpy3(x, -0.5, to->x_rest + 3 * (size_t)end[k]);
-            pal_axpy3(v, 0.5, t->v + 3 * (size_t)end[k]);
-        }
-    }
-}
+/* ---- adaptive surfaces ---- */
 
 /* an old vertex by new ones: itself, or the ends of its edge */
 static void add_vertex(pal_row_build *rows, const pal_shell *from, const pal_shell *to, int32_t i, double weight)
 {
-    if (in_use(to, i)) {
+    if (pal_shell_uses(to, i)) {
         pal_row_add(rows, i, weight);
         return;
     }
@@ -518,7 +478,7 @@ static double most_move(const pal_transfer *t, const pal_body *from, const pal_b
         return most;
     }
     for (int i = 0; i < n_common && t->shell; i++)
-        if (in_use(from->shell, i) && in_use(to->shell, i))
+        if (pal_shell_uses(from->shell, i) && pal_shell_uses(to->shell, i))
             most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
     for (int i = 0; i < from->n_node && !t->shell; i++) {
         double move[3] = {0, 0, 0};
@@ -540,8 +500,8 @@ static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
         set_points(t, from, to);
         return;
     }
-    if (refines(next, t->body)) refine_like(from, to);
-    set_vertices(t, from, to);
+    if (refines(next, t->body)) pal_shell_like(to, from);
+    pal_shell_places(to, from, t->x, t->v);
     (void)make_back(t, from, to);
 }
 

@@ -173,7 +173,7 @@ static void show(pal_world *w, int b)
     step.body->stale = false;
 }
 
-static void run_output(pal_world *w)
+void pal_world_show_all(pal_world *w)
 {
     for (int b = 0; b < w->plan.n_body; b++) show(w, b);
 }
@@ -197,7 +197,7 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
     PAL_TRY(pal_field_check(&w->plan, note));
     PAL_TRY(check_budget(w, note));
     w->n_substep = count_substeps(w, w->step_s, find_limit(w, 0));
-    run_output(w);
+    pal_world_show_all(w);
     return PAL_ERR_OK;
 }
 
@@ -279,7 +279,7 @@ pal_err pal_world_reset_body(pal_world *world, int body)
     if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
     rest_body(world, body);
     find_limit(world, 0);
-    run_output(world);
+    pal_world_show_all(world);
     return PAL_ERR_OK;
 }
 
@@ -294,37 +294,7 @@ void pal_world_reset(pal_world *world)
     world->tick = 0;
     world->time_s = 0;
     find_limit(world, 0);
-    run_output(world);
-}
-
-void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v)
-{
-    pal_world *w = world;
-    w->time_s = before->time_s, w->tick = before->tick, w->end_ns = before->end_ns;
-    w->tools = before->tools;
-    memcpy(w->asked, before->asked, sizeof w->asked);
-    memcpy(w->has_asked, before->has_asked, sizeof w->has_asked);
-    memcpy(w->pose_ns, before->pose_ns, sizeof w->pose_ns);
-    for (int b = 0; b < w->plan.n_body && b < before->plan.n_body; b++) {
-        pal_body *body = &w->plan.body[b];
-        const pal_body *from = &before->plan.body[b];
-        /* changed while this world was made */
-        if (memcmp(&w->material[b], &before->material[b], sizeof w->material[b]) != 0)
-            (void)pal_world_material(w, b, &before->material[b], NULL);
-        size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
-        const double *to_x = b == edited ? x : from->x, *to_v = b == edited ? v : from->v;
-        bool known = b == edited || (body->n_dof == from->n_dof && !body->shell);
-        if (known && to_x) memcpy(body->x, to_x, n_byte);
-        if (known && to_v) memcpy(body->v, to_v, n_byte);
-        /* what is held from now on stands still */
-        for (int i = 0; i < body->n_dof; i++)
-            if (body->held[i] == 1) pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
-        pal_body_place(body);
-        body->frozen = from->frozen;
-        memcpy(body->why, from->why, sizeof body->why);
-        pal_world_moved(w, b);
-    }
-    run_output(w);
+    pal_world_show_all(world);
 }
 
 static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_note *note)

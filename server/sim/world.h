@@ -103,10 +103,10 @@ void pal_world_wake(pal_world *world);
 void pal_world_watch(pal_world *world, bool watched);
 
 /* A world made from an edited scene goes on where another is: its time, tools and poses, materials as they are by now
- * (but one that the edited body is too stiff or too light for), and x and v of all bodies that have as many points
- * (bodies that adapt begin at rest). x, v [n_dof][3] are the state of body `edited` in their place (v NULL: at rest;
- * edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are over. Both stand still. Heap memory
- * when a material has changed. [sim] */
+ * (but one that the edited body is too stiff or too light for), rescue counts, and of all other bodies that have as
+ * many points x, v, lasting loads and, of those that adapt, the levels. x, v [n_dof][3] are the state of body `edited`
+ * in their place (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are
+ * over. Both stand still. Heap memory when a material has changed. [sim] */
 void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */

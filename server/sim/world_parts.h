@@ -1,4 +1,4 @@
-/* What world.c, world_show.c and transfer_carry.c share: the world's record. Private to these. */
+/* What world.c, world_show.c, world_follow.c and transfer_carry.c share: the world's record. Private to these. */
 #ifndef PAL_SIM_WORLD_PARTS_H
 #define PAL_SIM_WORLD_PARTS_H
 #include "server/sim/brush_rows.h"
@@ -37,6 +37,8 @@ struct pal_world {
 /* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact: for those who look between
  * steps */
 pal_err pal_world_pull(pal_world *world, int body);
+/* OUTPUT rows of all bodies, so that what is shown is where they are */
+void pal_world_show_all(pal_world *world);
 
 /* ", node 512 at (1, 2, 3) mm sets it": the node that the rows' bounds make responsible. Where bounds are of nodes that
  * are not the points, and without bounds, nothing. The forces' room is free between steps */

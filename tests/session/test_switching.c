@@ -257,6 +257,8 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
                {{.model = "marble"}, "no model"},
                {{.model = "fem", .element = "hex9", .size = 8}, "no element"},
                {{.model = "fem", .size = 100000}, "size"},
+               {{.model = "fem", .size = 400}, "a live switch takes 100000 at most"},
+               {{.model = "fem", .element = "tet10", .size = 32}, "a live switch takes 100000 at most"},
                {{.model = "fem", .size = 8, .step_s = 3}, "step_s"},
                {{.model = "tet_springs", .k_area_J = -1}, "already"}};
     pal_session *s = begin(false);

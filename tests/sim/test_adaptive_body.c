@@ -153,6 +153,54 @@ static bool change(shell_scene *s, unsigned *seed, int n)
     return pal_shell_update(shell, s->body);
 }
 
+/* a world in which body 0 is another goes on where body 1, split, bent, loaded and with a count of rescues, is */
+static void another_body_is_switched_and_this_one_goes_on(void)
+{
+    shell_scene s;
+    pal_world *next = NULL;
+    pal_stomach stomach;
+    REQUIRE(!pal_stomach_make(&stomach));
+    shell_scene_take(&s, &stomach.surface);
+    pal_stomach_free(&stomach);
+    shell_scene_number(&s, "levels", 3);
+    s.scene->body[1] = s.scene->body[0];
+    s.scene->n_body = 2;
+    snprintf(s.scene->body[1].name, sizeof s.scene->body[1].name, "beside");
+    REQUIRE(shell_scene_start(&s));
+    pal_body *first = s.body, *body = s.body = pal_world_body(s.world, 1);
+    unsigned seed = 3;
+    for (int i = 0; i < 20; i++) change(&s, &seed, 20);
+    REQUIRE(body->shell->finest == 2);
+    CHECK_INT(pal_world_load(s.world, 1, front(&s), (double[3]){0, 0, -0.02}), 0);
+    for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1e-3), 0);
+    body->rescue.n_capped = 7, first->rescue.n_heavy = 5;
+    REQUIRE(!pal_world_create(s.scene, &s.note, &next));
+    for (int round = 0; round < 2; round++) pal_world_follow(next, s.world, 0, first->x, first->v);
+    pal_body *to = pal_world_body(next, 1);
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    CHECK_INT(to->shell->n_leaf, body->shell->n_leaf);
+    CHECK(!memcmp(to->shell->face_state, body->shell->face_state, (size_t)body->shell->levels.first_face[3]));
+    CHECK(!memcmp(to->x, body->x, n_byte) && !memcmp(to->v, body->v, n_byte));
+    CHECK(to->outer && !memcmp(to->outer, body->outer, n_byte));
+    CHECK_INT(to->rescue.n_capped, 7);
+    CHECK_INT(pal_world_body(next, 0)->rescue.n_heavy, 5);
+    CHECK(pal_world_hash(next) == pal_world_hash(s.world));
+    CHECK(pal_body_kinetic_J(body) > 0);
+    CHECK_NEAR(pal_body_kinetic_J(to) / pal_body_kinetic_J(body), 1, 1e-12);
+    for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1e-3) || pal_world_step(next, 1e-3), 0);
+    double off = 0, moved = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) {
+        off = fmax(off, fabs(to->x[i] - body->x[i]));
+        moved = fmax(moved, fabs(body->x[i] - body->x_rest[i]));
+    }
+    printf("  %.2g mm apart after 20 steps, of %.2g mm from rest\n", 1e3 * off, 1e3 * moved);
+    CHECK(moved > 1e-5);
+    CHECK_LE(off, 0.02 * moved);
+    pal_world_destroy(next);
+    s.body = first;
+    shell_scene_close(&s);
+}
+
 static bool same_table(const pal_frame *frame, const pal_shell *shell)
 {
     return !memcmp(frame->part[0].slot, shell->slot, 3 * sizeof *shell->slot * (size_t)shell->n_slot);
@@ -420,6 +468,7 @@ static void a_step_too_long_for_the_finest_level_is_refused_at_load(void)
 
 int main(void)
 {
+    RUN(another_body_is_switched_and_this_one_goes_on);
     RUN(steps_without_the_heap_while_levels_switch);
     RUN(a_reset_brings_the_start_back_to_the_bit);
     RUN(a_lasting_load_needs_a_node_in_use);

@@ -352,9 +352,40 @@ static void settings_have_a_text(void)
     CHECK(strlen(pal_setting_text(&other, text)) < PAL_SETTING_TEXT);
 }
 
+static void nodes_are_known_before_they_are_made(void)
+{
+    const pal_setting list[] = {{.model = "fem", .size = 8},
+                                {.model = "fem", .size = 20},
+                                {.model = "tet_springs", .size = 30, .k_distance_J = 1e-3, .k_volume_J = 4e-3},
+                                {.model = "fem", .element = "tet10", .size = 10}};
+    organ o;
+    organ_make(&o, true);
+    for (size_t k = 0; k < sizeof list / sizeof *list; k++) {
+        pal_setting to = list[k];
+        pal_set_scene *set = NULL;
+        double n = pal_setting_nodes(o.scene, 0, &to);
+        REQUIRE(!pal_setting_make(o.scene, 0, &to, &o.note, &set));
+        double made = set->mesh.tets.n_node;
+        if (to.element[0]) {
+            pal_world *w = NULL;
+            REQUIRE(!pal_world_create(&set->scene, &o.note, &w));
+            made = pal_world_body(w, 0)->n_node;
+            pal_world_destroy(w);
+        }
+        printf("  %s %d: %.0f nodes said, %.0f made\n", to.element[0] ? to.element : to.model, to.size, n, made);
+        CHECK_NEAR(n / made, 1, 0.25);
+        pal_set_scene_free(set);
+    }
+    CHECK(pal_setting_nodes(o.scene, 0, &(pal_setting){.model = "tet_springs", .size = 12}) == 0);
+    /* nobody has to wait for these */
+    CHECK(pal_setting_nodes(o.scene, 0, &(pal_setting){.model = "fem", .size = 400}) > 1e7);
+    organ_free(&o);
+}
+
 int main(void)
 {
     RUN(settings_have_a_text);
+    RUN(nodes_are_known_before_they_are_made);
     RUN(a_full_body_runs_in_every_setting);
     RUN(keys_that_a_setting_does_not_speak_of_stay);
     RUN(voxels_end_where_the_support_does);
