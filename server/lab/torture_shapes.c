@@ -328,16 +328,16 @@ static bool settle_loaded(pal_rig *rig, double *ms)
 void pal_insult_hour(pal_rig *rig)
 {
     enum { HOUR_S = 3600 };
-    const double most_drift = 1e-6, most_kinetic = 1e-9, most_room_s = 8, step = rig->scene->step_s;
+    const double most_drift = 1e-6, most_kinetic = 1e-9, most_plan_s = 8, step = rig->scene->step_s;
     double ms = 1, drift = 0, kinetic = 0, slept_s = NAN;
     load_all(rig, 0.1, true);
     if (!settle_loaded(rig, &ms)) return;
     take_start(rig);
     pal_rig_rebase(rig);
-    double room_s = fmin(most_room_s, rig->deadline_s - 1e-9 * (double)pal_clock_thread_ns()),
-           begin = rig->out->simulated_s;
+    double room_s = rig->deadline_s - 1e-9 * (double)pal_clock_thread_ns(), begin = rig->out->simulated_s;
     /* implicit steps may be long: as many as there is time for, of at most ten seconds */
-    double n = fmax(1, 0.8e3 * room_s / ms), dt = implicit(rig) ? fmin(10, fmax(step, HOUR_S / n)) : step;
+    double n = fmax(1, 0.8e3 * fmin(most_plan_s, room_s) / ms),
+           dt = implicit(rig) ? fmin(10, fmax(step, HOUR_S / n)) : step;
     double late_s = 1e-9 * (double)pal_clock_thread_ns() + 0.9 * room_s;
     while (rig->out->simulated_s - begin < HOUR_S) {
         if (1e-9 * (double)pal_clock_thread_ns() > late_s) break;
