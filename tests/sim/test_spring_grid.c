@@ -70,6 +70,7 @@ static bool bench_varied(bench *b, const char *weights)
 
 static void bench_close(bench *b)
 {
+    pal_plan_free(&b->plan);
     pal_arena_destroy(b->arena);
     free(b->scene);
     box_free(&b->box);

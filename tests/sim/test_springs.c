@@ -55,6 +55,7 @@ static bool bench_open(bench *b, int nx, int ny, int nz, double damping_Js)
 
 static void bench_close(bench *b)
 {
+    pal_plan_free(&b->plan);
     pal_arena_destroy(b->arena);
     free(b->scene);
     box_free(&b->box);
@@ -279,6 +280,7 @@ static void a_scaled_tetrahedron_has_the_analytic_energy_and_virial(void)
         for (int i = 0; i < 12; i++) virial += body->f[i] * body->x[i];
         CHECK_NEAR(virial, -many * k[power - 1] * c * power * pow(s, power), 1e-11);
     }
+    pal_plan_free(&plan);
     pal_arena_destroy(arena);
     free(scene);
     box_free(&box);

@@ -343,6 +343,7 @@ static void prints_its_plan_in_the_order_of_a_step(void)
         at = strstr(at, order[i]);
         CHECK(at);
     }
+    pal_plan_free(&plan);
     pal_arena_destroy(arena);
     free(scene);
     box_free(&box);
