@@ -126,9 +126,8 @@ void pal_hub_set_tier(pal_hub *hub, pal_client *client, int tier)
     if (tier == client->tier) return;
     room->tier_users[client->tier]--;
     client->tier = tier;
-    if (room->tier_users[tier]++ == 0) pal_stream_begin_tier(room->stream, tier);
-    /* everything of the new tier is news */
-    memset(client->sent_frame, 0, sizeof client->sent_frame);
+    room->tier_users[tier]++;
+    pal_stream_begin_tier(room->stream, tier);
     if (client->sent_cycle == room->stream->cycle) client->sent_cycle--;
 }
 
@@ -228,10 +227,10 @@ static void begin_cycle(pal_hub *hub, pal_client *c)
     c->out_begin = c->n_out = 0;
     for (int p = 0; p < s->n_part; p++) {
         const pal_stream_part *part = &s->part[p];
-        if (!part->frame[c->tier] || part->frame_cycle[c->tier] == c->sent_frame[p]) continue;
+        if (!part->frame[c->tier] || (int32_t)(part->frame_seq[c->tier] - c->sent_frame[p]) <= 0) continue;
         if (!add_patch(hub, c, p)) continue;
         c->out[c->n_out++] = pal_packet_hold(part->frame[c->tier]);
-        c->sent_frame[p] = part->frame_cycle[c->tier];
+        c->sent_frame[p] = part->frame_seq[c->tier];
         hub->count.n_frame++;
     }
     c->out[c->n_out++] = pal_packet_hold(s->tools);

@@ -27,7 +27,7 @@ typedef struct pal_client {
     pal_packet *out[2 * PAL_BODY_MAX + 1];
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
-    uint32_t sent_frame[PAL_BODY_MAX];  /* cycle of the frame of each part sent last */
+    uint32_t sent_frame[PAL_BODY_MAX];  /* number of the frame of each part sent last */
     bool patches;                       /* takes PATCH                                     */
     uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_places.change */
     uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */

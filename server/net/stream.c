@@ -190,8 +190,8 @@ static uint64_t time_us(const pal_frame *frame)
 }
 
 /* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest, unless other
- * vertices are shown now */
-static void encode_part(pal_stream *s, int p, int tier)
+ * vertices are shown now or it is wanted anew */
+static void encode_part(pal_stream *s, int p, int tier, bool anew)
 {
     pal_stream_part *part = &s->part[p];
     const pal_frame_part *from = &s->frame->part[p];
@@ -209,7 +209,7 @@ static void encode_part(pal_stream *s, int p, int tier)
     /* nobody looked, or nothing was shown anew since: a body asleep */
     if (!s->frame->watched) return;
     bool same = part->frame_output[tier] == from->n_output && part->frame_change[tier] == change;
-    if (part->frame[tier] && same) return;
+    if (part->frame[tier] && same && !anew) return;
     uint64_t begin = pal_clock_ns();
     int refusal = pal_frame_put(s->coder->encoder[p][tier], &given, s->coder->buffer, s->coder->cap, &result);
     s->count.n_encode++;
@@ -220,13 +220,13 @@ static void encode_part(pal_stream *s, int p, int tier)
         return;
     }
     part->frame_output[tier] = from->n_output;
-    if (!result.changed && part->frame[tier] && part->frame_change[tier] == change) return;
+    if (!result.changed && part->frame[tier] && part->frame_change[tier] == change && !anew) return;
     pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
     if (!packet) return;
     pal_packet_replace(&part->frame[tier], packet);
     part->frame_cycle[tier] = s->cycle;
     part->frame_change[tier] = change;
-    s->coder->seq[p]++;
+    part->frame_seq[tier] = ++s->coder->seq[p];
     s->count.n_frame_byte += result.n_byte;
 }
 
@@ -352,7 +352,7 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
         if (stream->part[p].places && part->n_slot == (int)stream->part[p].places->n_place)
             pal_places_take(stream->part[p].places, part->slot, part->revision);
         for (int t = 0; t < PAL_STREAM_TIER; t++)
-            if (used[t]) encode_part(stream, p, t);
+            if (used[t]) encode_part(stream, p, t, false);
     }
     put_tools(stream, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
@@ -423,7 +423,7 @@ bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_
 void pal_stream_begin_tier(pal_stream *stream, int tier)
 {
     if (!stream->frame) return;
-    for (int p = 0; p < stream->n_part; p++) encode_part(stream, p, tier);
+    for (int p = 0; p < stream->n_part; p++) encode_part(stream, p, tier, true);
 }
 
 void pal_stream_measure(pal_stream *stream, uint64_t now_ns)

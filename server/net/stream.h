@@ -22,6 +22,7 @@ typedef struct pal_stream_part {
     pal_wire_part_info info;
     pal_packet *asset;
     pal_packet *frame[PAL_STREAM_TIER];       /* newest, NULL before the first          */
+    uint32_t frame_seq[PAL_STREAM_TIER];      /* its number: grows per part, all tiers together */
     uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that made it                     */
     uint32_t frame_change[PAL_STREAM_TIER];   /* table of triangles that it belongs to, of pal_places.change */
     uint64_t frame_output[PAL_STREAM_TIER];   /* pal_frame_part.n_output that was encoded last */
@@ -81,7 +82,8 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
  * something new; *due_ns: when values that came too soon may be encoded, 0: none wait */
 bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT],
                        uint64_t *due_ns);
-/* a tier begins to be used: its newest frames are encoded from the newest positions (same cycle) */
+/* somebody comes to a tier: its frames are encoded anew from the newest positions (same cycle), under numbers that are
+ * higher than those of every tier, for a client's numbers grow (protocol/README.md, "FRAME") */
 void pal_stream_begin_tier(pal_stream *stream, int tier);
 double pal_stream_tier_error_m(const pal_stream *stream, int tier);
 double pal_stream_rate_hz(const pal_stream *stream); /* of cycles: the scene's steps, at most PAL_STREAM_RATE_HZ */

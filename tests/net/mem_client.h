@@ -132,13 +132,14 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
     } else if (head.kind == PAL_WIRE_PATCH) {
         mem_take_patch(c, p);
     } else if (head.kind == PAL_WIRE_FRAME) {
-        pal_frame_head frame;
+        pal_frame_head frame = {0};
         c->patched = false;
         if (!pal_frame_get_head(p->bytes, p->n_byte, &frame) && frame.epoch < c->epoch) {
             c->n_old++;
             return;
         }
         c->n_frame++;
+        if (frame.epoch == c->frame.epoch && frame.seq <= c->frame.seq) c->n_bad++;
         if (!c->decoder || pal_frame_get(c->decoder, p->bytes, p->n_byte, &c->frame, c->position_m)) c->n_bad++;
     } else if (head.kind == PAL_WIRE_TOOLS) {
         c->n_tools++;

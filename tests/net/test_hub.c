@@ -239,6 +239,35 @@ static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void
     end();
 }
 
+/* whatever tier a frame is of and however long its tissue has been at rest; mem_client counts those that do not grow */
+static void numbers_grow_through_every_change_of_tier(void)
+{
+    mem_client c, all;
+    begin(false, 0);
+    mem_join(&all, road, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&c, road, "c", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    UNTIL(c.n_frame > 5, &all, &c);
+    double fine = (double)c.frame.q_m;
+    apart_ns = 6 * FRAME_NS;
+    for (int i = 0; i < 1500 && (double)c.frame.q_m < 1.5 * fine; i++) turn(&all, i % 3 ? NULL : &c);
+    CHECK_NEAR((double)c.frame.q_m / fine, 2, 1e-5);
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"pause\"}");
+    running = false;
+    UNTIL(c.last[PAL_CONTROL_STATUS].status.paused, &all, &c);
+    int before = c.n_frame;
+    for (int i = 0; i < 20000 && (double)c.frame.q_m > 1.5 * fine; i++) turn(&all, &c);
+    CHECK_NEAR((double)c.frame.q_m / fine, 1, 1e-5); /* at rest too it gets the finer one */
+    CHECK_LE(c.n_frame - before, 4);                 /* one a change: perhaps a tier down, then two up */
+    turn(&all, &c);
+    REQUIRE(c.position_m && all.position_m);
+    CHECK(memcmp(c.position_m, all.position_m, c.asset->order->n_vertex * 3 * sizeof(float)) == 0);
+    CHECK_INT(c.n_bad, 0);
+    CHECK_INT(all.n_bad, 0);
+    mem_end(&c);
+    mem_end(&all);
+    end();
+}
+
 static void a_tool_has_one_holder(void)
 {
     mem_client a, b, c;
@@ -612,6 +641,7 @@ int main(void)
     RUN(stalled_client_costs_little_and_is_current_within_two_frames);
     RUN(without_acknowledgement_frames_stop_and_control_goes_on);
     RUN(slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up);
+    RUN(numbers_grow_through_every_change_of_tier);
     RUN(a_tool_has_one_holder);
     RUN(pose_of_the_holder_moves_the_tool_and_is_echoed);
     RUN(viewer_moves_no_tool_and_gives_no_command);
