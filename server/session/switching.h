@@ -1,8 +1,8 @@
 /* A live switch of method, resolution, step or tolerance of one body: another world is made beside the running one
  * (pal_switch_prepare, slow), and takes over between two steps with pal_session_follow and pal_switch_carry, without a
  * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
- * within 2 % of what it was (where both meshes are of one mass and held alike; else that, or as near as displacements
- * PAL_TRANSFER_SCALE times as long or as short come), the mismatch of forces let go over 10 steps (sim/transfer.h).
+ * within 2 % of what it was as far as displacements and velocities PAL_TRANSFER_SCALE and _RATE times as long or short
+ * can make it so (the report tells), the mismatch of forces let go over 10 steps (sim/transfer.h).
  * What tools hold they go on holding, lasting loads stay; brushes are over. Thread: one at a time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H

@@ -7,21 +7,21 @@
  * the least squares (numerics.md part 1 A), by conjugate gradients with a small pull to rest. Two solids of the same
  * control cells share their points to the bit; of two adaptive surfaces of one organ the new one refines where the old
  * one has, as far as it can.
- * Forces go the other way: those on old nodes are shared out to the new ones around them, so that no net force or
- * moment is lost; where the new mesh is the finer one they go as accelerations, so that they do not gather in few
- * nodes.
+ * Forces go the other way: those on old nodes are shared out to the new ones around them, so that no net force is lost;
+ * where the new mesh is the finer one by the masses of all new nodes that look to the old one, so that they do not
+ * gather in few nodes and unlike masses (springs of whole voxels, elements of cut ones) make them no larger.
  *
  * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
  * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),
  * until the elastic energy is what it was, or 40 times (200 where it is half as much again); what is left is made up
- * for by the length of the displacement from rest (of a body that nothing holds, from its best rigid place) and of the
- * velocity, by PAL_TRANSFER_SCALE at most: where the two bodies differ in mass or in how they are held (springs of
- * whole voxels and elements of cut ones) a point may have to go farther than that, and then the energy is off; the
- * report's scale stands at the bound. A body that rests under a load with the same elastic energy stands about half way
- * between where it rested before and where it will: a point moves by half of what the methods differ in, which is less
- * than the sum of their errors. The other half is let go as the difference of all forces goes out (ease.h). Momentum: a
- * body that nothing holds keeps momentum and spin of before; what they ask for of the kinetic energy they have (equal
- * masses: the same).
+ * for by the length of the displacement from rest (of a body that nothing holds, from its best rigid place), by
+ * PAL_TRANSFER_SCALE at most, and where that is not enough (the report's scale stands at its bound), or the mass is
+ * another one, by the velocity, by PAL_TRANSFER_RATE at most. A body without velocity whose displacement stands at its
+ * bound has another energy then: the report says so. A body that rests under a load with the same elastic energy stands
+ * about half way between where it rested before and where it will: a point moves by half of what the methods differ in,
+ * which is less than the sum of their errors. The other half is let go as the difference of all forces goes out
+ * (ease.h). Momentum: a body that nothing holds keeps momentum and spin of before; what they ask for of the kinetic
+ * energy they have (equal masses: the same).
  *
  * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
  * tool holds (pal_effect.hand). Contact begins anew where it is, brushes are over. Thread: one at a time. */
@@ -29,8 +29,9 @@
 #define PAL_SIM_TRANSFER_H
 #include "server/sim/world.h"
 
-/* most that a displacement or a velocity is lengthened, or shortened, for the sake of the energy */
+/* most that a displacement, and a velocity, is lengthened or shortened for the sake of the energy */
 #define PAL_TRANSFER_SCALE 1.5
+#define PAL_TRANSFER_RATE  4.0
 
 typedef struct pal_transfer pal_transfer;
 

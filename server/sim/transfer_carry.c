@@ -16,10 +16,13 @@ enum { N_SMOOTH = 40, N_SMOOTH_FAR = 200, N_SCALE = 8 };
 #define FAR        1.5 /* times the energy wanted: more rounds than usual */
 #define SAME       1e-4
 #define MOST_SCALE PAL_TRANSFER_SCALE
+#define MOST_RATE  PAL_TRANSFER_RATE
 #define INERTIA    0.8
 /* velocities stay as they are while the kinetic energy is off by less than this part of all */
 #define SPARE 0.01
 #define PULL  1e-6
+/* of an old node's mass: new nodes that look to it with less take as much less of its force */
+#define LEAST_SHARE 0.25
 
 /* ---- sums ---- */
 
@@ -229,8 +232,25 @@ static bool refines(const pal_world *w, int b)
 
 /* ---- forces ---- */
 
-/* forces at old nodes -> at new ones. As they are: no net force or moment is lost; as accelerations, where points carry
- * the nodes (forces between them are no forces on the body) or the new mesh is the finer one */
+/* t->share: how much of an old node's force goes to the new nodes that look to it, over their masses as they do; the
+ * remainder (of nodes that no new one, or next to none, looks to) in t->other goes by place */
+static void split_forces(const pal_transfer *t, const pal_body *from, const pal_body *to, double *old)
+{
+    memset(t->share, 0, sizeof *t->share * (size_t)from->n_node);
+    for (int i = 0; i < to->n_node; i++)
+        for (int32_t k = t->in.start[i]; k < t->in.start[i + 1]; k++)
+            t->share[t->in.point[k]] += t->in.weight[k] * to->node_mass_kg[i];
+    for (int i = 0; i < from->n_node; i++) {
+        double least = LEAST_SHARE * from->node_mass_kg[i], sum = t->share[i];
+        double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
+        pal_scale3(t->other + 3 * i, 1 - part, old + 3 * i);
+        pal_scale3(old + 3 * i, part > 0 ? part / sum : 0, old + 3 * i);
+    }
+}
+
+/* forces at old nodes -> at new ones, no net force is lost. To the new nodes around; where points carry the nodes
+ * (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that look to the
+ * old one by their masses, so that they do not gather in few: of equal meshes' masses that is as accelerations */
 static void carry_forces(const pal_transfer *t, const pal_body *from, const pal_body *to, double *old, double *out)
 {
     bool lumped = t->shell || (!from->embed && from->n_node >= to->n_node);
@@ -239,9 +259,10 @@ static void carry_forces(const pal_transfer *t, const pal_body *from, const pal_
         pal_point_rows_pull(&t->back, old, out);
         return;
     }
-    for (int i = 0; i < from->n_node; i++) pal_scale3(old + 3 * i, 1 / from->node_mass_kg[i], old + 3 * i);
+    split_forces(t, from, to, old);
     pal_point_rows_place(&t->in, old, out);
     for (int i = 0; i < to->n_node; i++) pal_scale3(out + 3 * i, to->node_mass_kg[i], out + 3 * i);
+    pal_point_rows_pull(&t->back, t->other, out);
 }
 
 /* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be */
@@ -359,9 +380,9 @@ static void find_reference(const pal_body *to, double *out)
     }
 }
 
-static double within(double s)
+static double within(double s, double most)
 {
-    return s > MOST_SCALE ? MOST_SCALE : s < 1 / MOST_SCALE ? 1 / MOST_SCALE : s;
+    return fmin(fmax(s, 1 / most), most);
 }
 
 /* the displacement longer or shorter until the elastic energy is as wanted; by how much */
@@ -378,7 +399,7 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
         if (last_J > 0 && s != last_s && now_J != last_J) power = log(now_J / last_J) / log(s / last_s);
         power = fmin(fmax(power, 1), 8);
         last_J = now_J, last_s = s;
-        s = within(s * pow(want_J / now_J, 1 / power));
+        s = within(s * pow(want_J / now_J, 1 / power), MOST_SCALE);
         for (int k = 0; k < to->n_active; k++) {
             size_t i = (size_t)pal_body_point(to, k);
             if (to->held[i]) continue;
@@ -412,7 +433,7 @@ static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
         memcpy(to->v, t->work[1], n_byte);
     }
     double s = 1;
-    if (want_J > rigid_J && all_J > rigid_J * (1 + 1e-9)) s = within(sqrt((want_J - rigid_J) / (all_J - rigid_J)));
+    if (all_J > rigid_J * (1 + 1e-9)) s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), MOST_RATE);
     for (int i = 0; i < 3 * to->n_dof; i++) to->v[i] = v[i] + s * (to->v[i] - v[i]);
     pal_body_place(to);
 }
@@ -524,8 +545,9 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     }
     out->scale = scale_displacement(t, next, elastic_before_J);
     if (is_free(to)) keep_momentum(from, to);
-    double now_J = pal_body_kinetic_J(to);
-    scale_velocity(t, to, fmin(fmax(now_J, kinetic_J - spare_J), kinetic_J + spare_J));
+    /* the velocity makes up for what the displacement could not */
+    double now_J = pal_body_kinetic_J(to), left_J = elastic_before_J + kinetic_J - elastic_J(next, t->body);
+    scale_velocity(t, to, fmin(fmax(now_J, left_J - spare_J), left_J + spare_J));
     memcpy(t->x, to->x, n_byte);
     memcpy(t->v, to->v, n_byte);
     pal_world_follow(next, before, t->body, t->x, t->v);

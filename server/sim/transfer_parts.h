@@ -16,6 +16,7 @@ struct pal_transfer {
     double *pull;         /* what shall pull on them, N                 [n_to][3]     */
     double *bound;        /* of stiffness; work                         [n_to]        */
     double *work[5];      /* of least squares                           [n_dof][3]    */
-    double *old;          /* work                                       [n_from][3]   */
+    double *old, *other;  /* work                                       [n_from][3]   */
+    double *share;        /* work                                       [n_from]      */
 };
 #endif

@@ -58,11 +58,6 @@ static const pal_frame *take_steps(pal_session *s, bool paused, uint64_t tick, i
     return f;
 }
 
-static bool at_bound(double scale)
-{
-    return fabs(scale - PAL_TRANSFER_SCALE) < 1e-9 || fabs(scale - 1 / PAL_TRANSFER_SCALE) < 1e-9;
-}
-
 static void a_session_changes_its_method_and_comes_back(bool paused)
 {
     const pal_setting list[] = {{.model = "fem", .element = "hex8_bbar", .size = 8},
@@ -79,10 +74,8 @@ static void a_session_changes_its_method_and_comes_back(bool paused)
         pal_session *next = change_to(s, &list[i], &change);
         REQUIRE(next);
         pal_switch_report_of(change, &r);
-        /* the springs' own voxels are full to their border: another mass, and held farther out. Lengthening the
-         * displacement cannot make up for that, and 200 rounds of smoothing do not reach it */
-        double off = fabs(r.energy_after_J / r.energy_before_J - 1);
-        if (i < 2) CHECK(off <= 0.02 || (!paused && at_bound(r.scale)));
+        /* the springs' own voxels are full to their border: another mass, and held farther out */
+        CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
         CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_SCALE * (1 + 1e-9));
         CHECK(r.energy_before_J > 0 && isfinite(r.energy_after_J));
         CHECK_LE(r.most_move_m, 0.005); /* of a ball of 100 mm that a tool presses */
@@ -109,15 +102,15 @@ static void a_running_session_changes_its_method_and_comes_back(void)
     a_session_changes_its_method_and_comes_back(false);
 }
 
-/* the same at known steps: there the energy is within 2 %, always */
+/* the same at known steps */
 static void step_by_step_the_energy_is_kept(void)
 {
     a_session_changes_its_method_and_comes_back(true);
 }
 
 /* One step after the tool has come, where the springs of whole voxels give most: elements of cut ones would have to lie
- * more than half as far again from rest. They go to the bound, and the report says so */
-static void what_the_bound_leaves_is_said(void)
+ * more than half as far again from rest. They go to the bound, and the velocity makes up for the remainder */
+static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
 {
     pal_session *s = begin(true);
     pal_switch *change = NULL;
@@ -130,7 +123,7 @@ static void what_the_bound_leaves_is_said(void)
     REQUIRE(next);
     pal_switch_report_of(change, &r);
     CHECK_NEAR(r.scale, PAL_TRANSFER_SCALE, 1e-9);
-    CHECK_NEAR(r.energy_after_J / r.energy_before_J, 0.969, 0.01);
+    CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
     pal_session_close(s);
     pal_session_close(next);
     pal_switch_free(change);
@@ -315,7 +308,7 @@ int main(void)
     scene.body[0].support[0].fraction = 0.2; /* so that every mesh is held by as much */
     RUN(a_running_session_changes_its_method_and_comes_back);
     RUN(step_by_step_the_energy_is_kept);
-    RUN(what_the_bound_leaves_is_said);
+    RUN(beyond_the_bound_of_displacements_the_velocity_makes_up);
     RUN(a_tool_is_held_on_however_long_it_takes);
     RUN(a_row_that_is_off_stays_off_through_a_method_without_it);
     RUN(what_cannot_be_made_is_refused_with_a_sentence);

@@ -58,6 +58,11 @@ static void check_pair(const beam *b, int i, int j, pal_world *before)
     double bound = fabs(b->rest_m[i] - b->right_m) + fabs(b->rest_m[j] - b->right_m);
     HARD_CASE("switch", model, "tip jumps by, over the bound of both methods' errors",
               fabs(to_u[2] - u[2]) / ((bound / fabs(b->right_m) + 0.01) * fabs(u[2])), 1, "");
+    HARD_CASE("switch", model, "farthest move of the surface, over the same bound",
+              r.most_move_m / ((bound / fabs(b->right_m) + 0.01) * pal_norm3(u)), 1, "");
+    if (table)
+        printf("      most %.2f of %.2f mm\n", 1e3 * r.most_move_m,
+               1e3 * (bound / fabs(b->right_m) + 0.01) * pal_norm3(u));
     CHECK_NEAR(to_v[2] / v[2], 1, 0.1);
     /* it goes on: finite, nothing frozen, no faster than that energy allows */
     step(next, step_s, 8);
