@@ -8,9 +8,13 @@
  * whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's own damping; what
  * would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed.
  * Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own
- * error is estimated from its last changes (Richardson); its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s);
+ * error is estimated from its last changes (Richardson); its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s)
+ * or a quarter (a half) of the scene's step where that is shorter;
  * adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of the coarse surface; or
  * samples that the caller has. Deterministic but for the milliseconds and seconds.
+ * Swept are the scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to
+ * 1/60 s, and 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until
+ * they have taken 50 ms together (1,200 steps at most).
  * Calibrated springs are fitted to the reference under all loads but the last, which judges them unseen; where there is
  * one load only, the point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor
  * picked. */
@@ -26,13 +30,14 @@ typedef struct pal_study_point {
     pal_priced_setting priced;  /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
     pal_err err;                /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
     char why[PAL_SETTING_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged by" */
-    int n_node, n_substep;
+    int n_node, n_substep; /* n_substep: of a step at rest; n_node: of a surface that adapts those in use at the end */
     double ms_p95;
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
     double predicted_ms, predicted_m; /* by the models of cost and error fitted to the OTHER points of its method, once
-                                         all are there; NaN: too few of them */
+                                         all are there, and to what is counted before it runs (pal_study_foresee_cost);
+                                         NaN: too few of them */
 } pal_study_point;
 
 typedef struct pal_study {
@@ -83,4 +88,13 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
  * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
  * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
 bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
+/* Cost foreseen for a setting that is made and has not run: of n_node nodes and n_substep sub-steps in a step of its
+ * own at rest (body.h, pal_world_substeps). Known for that: what the other points of its model took, leave_out (-1:
+ * none) being no part of them, with their knobs, nodes and sub-steps; of the setting its own knobs and these two
+ * counts; no time of it. A step of its own is a + n_substep n_node r (study_cost.c). Of a surface that adapts n_node is
+ * not looked at: how much of it is refined is not known before it runs, and taken as the share that the other levels
+ * refined. false: fewer than three points of the model, none with such an element, law or solver, or none that adapts
+ */
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, int n_substep,
+                            int leave_out, double *ms);
 #endif

@@ -338,6 +338,8 @@ void pal_study_predict(pal_study *study)
     for (int i = 0; i < study->n_point; i++) {
         pal_study_point *p = &study->point[i];
         p->predicted_ms = p->predicted_m = NAN;
-        if (measured(p)) pal_study_foresee(study, &p->priced.setting, i, &p->predicted_ms, &p->predicted_m);
+        if (!measured(p)) continue;
+        pal_study_foresee(study, &p->priced.setting, i, &p->predicted_ms, &p->predicted_m);
+        pal_study_foresee_cost(study, &p->priced.setting, p->n_node, p->n_substep, i, &p->predicted_ms);
     }
 }

@@ -10,13 +10,15 @@
 #include <string.h>
 
 enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, COUNTED = 12 };
-/* shorter steps than any that is swept in number, and of second order */
-static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, reference_tolerance = 1e-4, full_share = 0.95,
-                    least_order = 0.5;
+/* at most this, and at most this share of the scene's own: about as short as any that is swept, and of second order */
+static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_share = 0.25, quick_share = 0.5,
+                    reference_tolerance = 1e-4, full_share = 0.95, least_order = 0.5;
 
 static pal_setting reference_setting(const pal_study_job *job, int size)
 {
-    pal_setting s = {.size = size, .step_s = job->options->quick ? quick_step_s : whole_step_s};
+    bool quick = job->options->quick;
+    pal_setting s = {.size = size};
+    s.step_s = fmin(quick ? quick_step_s : whole_step_s, job->scene->step_s * (quick ? quick_share : whole_share));
     bool shell = job->shell;
     snprintf(s.model, PAL_NAME, "%s", shell ? "adaptive_springs" : "fem");
     snprintf(s.element, PAL_NAME, "%s", shell ? "refined" : "hex8_bbar");

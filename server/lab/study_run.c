@@ -9,6 +9,8 @@
 #include <string.h>
 
 enum { MOST_TIMES = 1200, WARM = 3, LEAST_TIMES = 30 };
+/* the way is gone again until its steps have taken so long together: a median of some microseconds is of nothing */
+static const double least_ms = 50;
 /* sub-steps times nodes of a way: what is slower is not followed, only timed */
 static const double most_work = 1.5e9, timed_s = 2;
 /* of the first load: put on at once it swings about as far as the whole one moves the body at rest */
@@ -77,7 +79,7 @@ static pal_err only_time(pal_study_world *w, double *ms, int most, int *n_ms, pa
     return PAL_ERR_OK;
 }
 
-/* frames lie between steps: linear from the one before to the one after */
+/* frames lie between steps: linear from the one before to the one after; way NULL: for the clock alone */
 static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int most, int *n_ms,
                       pal_note *note)
 {
@@ -86,15 +88,29 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
         pal_err err = timed_step(w, ms, most, n_ms, note);
         if (err == PAL_ERR_FROZEN) return pal_note_set(note, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
-        PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, note));
+        if (way) PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, note));
         time += step_s;
         for (; frame < job->n_way && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
             double share = fmin(fmax(1 - (time - (frame + 1) * PAL_STUDY_FRAME_S) / step_s, 0), 1);
-            for (int c = 0; c < 3; c++) way[frame][c] = (1 - share) * last[c] + share * now[c];
+            for (int c = 0; c < 3 && way; c++) way[frame][c] = (1 - share) * last[c] + share * now[c];
         }
-        pal_copy3(last, now);
+        if (way) pal_copy3(last, now);
     }
     return PAL_ERR_OK;
+}
+
+/* the same way from rest as often as it takes, so that short steps are timed as well as long ones */
+static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+{
+    pal_err err = PAL_ERR_OK;
+    for (;;) {
+        double sum = 0;
+        for (int i = 0; i < *n_ms; i++) sum += ms[i];
+        if (err || sum >= least_ms || *n_ms >= most) return err;
+        pal_world_reset(w->world);
+        err = pal_study_put(job, w, job->load[0], way_share, note);
+        if (!err) err = follow(job, w, NULL, ms, most, n_ms, note);
+    }
 }
 
 pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
@@ -111,11 +127,13 @@ pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*w
         if (!err) err = pal_note_set(note, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
     } else if (!err) {
         err = follow(job, &w, way, ms, most, n_ms, note);
+        if (facts) facts->n_node = pal_body_nodes(w.body);
         if (!err && ms) err = only_time(&w, ms, most, n_ms, note);
+        if (!err && ms) err = repeat(job, &w, ms, most, n_ms, note);
     }
     if (facts) {
-        facts->n_substep = pal_world_substeps(w.world);
-        facts->n_node = pal_body_nodes(w.body);
+        facts->n_substep = n_substep;
+        if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
     }
     pal_study_close(&w);

@@ -1,5 +1,5 @@
 /* Which settings a study sweeps: one knob at a time turned from a base, at several sizes, so that what each knob adds
- * is seen at each of them. */
+ * is seen at each of them. The base has the step of the scene. */
 #include "server/lab/study_parts.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include <string.h>
 
 enum { BASE_LEVELS = 3 };
-static const double base_step_s = 1.0 / 60, base_tolerance = 1e-2;
+static const double base_tolerance = 1e-2, frame_s = 1.0 / 60, haptic_s = 1.0 / 1000;
 /* the finest that is swept is this much coarser than the reference */
 static const double below_reference = 1.4;
 
@@ -69,19 +69,32 @@ int pal_study_sizes(const pal_study_job *job, int out[16])
 
 static pal_setting fem_base(const pal_study_job *job, int size)
 {
-    pal_setting s = {.size = size, .step_s = base_step_s, .tolerance = base_tolerance};
+    pal_setting s = {.size = size, .step_s = job->scene->step_s, .tolerance = base_tolerance};
     put(s.model, "fem"), put(s.element, "hex8_bbar"), put(s.law, job->law), put(s.solver, "implicit_euler");
     return s;
+}
+
+/* a quarter and a half of the scene's step, that of a haptic device where it is another one, and twice as long up to
+ * that of frames; returns how many */
+static int other_steps(double own_s, double out[4])
+{
+    int n = 0;
+    out[n++] = own_s / 4, out[n++] = own_s / 2;
+    if (own_s / 4 > 1.5 * haptic_s) out[n++] = haptic_s;
+    if (2 * own_s <= frame_s * (1 + 1e-9)) out[n++] = 2 * own_s;
+    return n;
 }
 
 /* solver, step and tolerance turned at one size: the rest is the base's */
 static void add_times(list *l, const pal_setting *base, bool whole)
 {
-    static const double step_s[] = {1.0 / 240, 1.0 / 120, 1.0 / 1000}, tolerance[] = {1e-1, 1e-4};
+    static const double tolerance[] = {1e-1, 1e-4};
+    double step_s[4];
+    int n_step = other_steps(base->step_s, step_s);
     pal_setting s = *base;
     put(s.solver, "sdirk2");
     add(l, &s, false);
-    for (int k = 0; k < (whole ? 3 : 1); k++) {
+    for (int k = 0; k < (whole ? n_step : 1); k++) {
         s = *base, s.step_s = step_s[k];
         add(l, &s, false);
     }
@@ -119,10 +132,10 @@ static void add_springs(list *l)
     bool quick = l->job->options->quick;
     for (int i = quick && n > 1 ? n - 2 : 0; i < n && i < (quick ? (n > 1 ? n - 1 : 1) : 4); i++)
         for (int calibrate = 0; calibrate < 2; calibrate++) {
-            pal_setting s = {.size = size[i], .step_s = base_step_s};
+            pal_setting s = {.size = size[i], .step_s = l->job->scene->step_s};
             put(s.model, "tet_springs"), put(s.solver, "verlet");
             add(l, &s, calibrate);
-            s.step_s = 1.0 / 240;
+            s.step_s /= 4;
             if (!quick) add(l, &s, calibrate);
         }
 }
@@ -132,7 +145,7 @@ static void add_shells(list *l)
     int finest = l->job->options->quick ? BASE_LEVELS - 1 : BASE_LEVELS;
     for (int levels = 1; levels <= finest && levels < l->job->reference; levels++)
         for (int refined = 0; refined < (levels > 1 ? 2 : 1); refined++) {
-            pal_setting s = {.size = levels, .step_s = base_step_s};
+            pal_setting s = {.size = levels, .step_s = l->job->scene->step_s};
             put(s.model, "adaptive_springs"), put(s.solver, "rk4"), put(s.element, refined ? "refined" : "");
             add(l, &s, false);
         }
@@ -144,7 +157,7 @@ static void add_solids(list *l)
     static const char *const solver[] = {"central_cg", "implicit_euler"};
     for (int i = 0; i < (l->job->options->quick ? 2 : 3); i++)
         for (int k = 0; k < 2; k++) {
-            pal_setting s = {.size = levels[i], .step_s = base_step_s};
+            pal_setting s = {.size = levels[i], .step_s = l->job->scene->step_s};
             put(s.model, "subdivision_fem"), put(s.solver, solver[k]);
             if (k == 1) s.tolerance = base_tolerance;
             add(l, &s, false);

@@ -3,6 +3,7 @@
 #include "server/lab/study.h"
 
 #include "server/base/vec3.h"
+#include "server/lab/study_parts.h"
 #include "server/mesh/stomach.h"
 #include "tests/check.h"
 #include "tests/sim/solid_scene.h"
@@ -125,6 +126,39 @@ static void cells_are_pressed(void)
     free(study);
 }
 
+/* of every method and size that is swept one setting has the scene's own step, and all others are named of it */
+static void the_step_of_the_scene_is_the_one_that_is_swept(void)
+{
+    static const double own_s[] = {1.0 / 30, 1.0 / 60, 1.0 / 120, 1.0 / 250, 1.0 / 1000};
+    pal_study_wish *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
+    REQUIRE(wish);
+    for (int full = 0; full < 2; full++) {
+        organ o;
+        organ_make(&o, full);
+        for (int k = 0; k < 10; k++) {
+            double own = own_s[k % 5];
+            pal_study_options options = {.quick = k < 5};
+            pal_study_job job = {.scene = o.scene, .options = &options, .law = "corotational", .shell = !full};
+            job.reference = full ? 64 : 4, job.slender = 1;
+            o.scene->step_s = own;
+            int n = pal_study_list(&job, wish), n_own = 0, n_other = 0;
+            for (int i = 0; i < n; i++) {
+                const double times = wish[i].setting.step_s / own;
+                bool known = times == 1 || times == 0.25 || times == 0.5 || times == 2;
+                n_own += times == 1, n_other += times != 1;
+                CHECK(known || wish[i].setting.step_s == 1e-3);
+                CHECK(times <= 1 || wish[i].setting.step_s < 1.0001 / 60);
+                for (int j = 0; j < i; j++)
+                    CHECK(wish[i].calibrate != wish[j].calibrate ||
+                          !pal_setting_same(&wish[i].setting, &wish[j].setting));
+            }
+            CHECK(n_own > 2 && (full ? n_other > 0 : n_other == 0) && n < PAL_STUDY_POINTS);
+        }
+        organ_free(&o);
+    }
+    free(wish);
+}
+
 static void check_refused(organ *o, const pal_study_options *options, const char *word)
 {
     o->note.text[0] = 0;
@@ -149,6 +183,7 @@ static void what_makes_no_sense_is_refused_in_a_sentence(void)
 
 int main(void)
 {
+    RUN(the_step_of_the_scene_is_the_one_that_is_swept);
     RUN(a_full_organ_is_pressed);
     RUN(a_hollow_organ_is_pressed);
     RUN(cells_are_pressed);

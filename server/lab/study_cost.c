@@ -1,0 +1,210 @@
+/* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
+ * it runs.
+ *
+ * A step of its own takes a + sub-steps nodes r: a is what a step takes whatever is solved (the skin above all), r what
+ * a node takes in a sub-step, whose logarithm is a sum of what each knob adds and of what grows with the nodes (the
+ * factor of an implicit solver, what no longer fits into caches). a and the sum are fitted to the others by least
+ * squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
+#include "server/lab/study_parts.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40 };
+/* weight of "no effect" for each knob; of "off by nothing" beside settings that are near */
+static const double ridge = 3e-2, trust = 0.1;
+/* so many knobs that stand otherwise are as far as e times the nodes */
+static const double knobs_per_e = 4, whole_nodes = 1000;
+
+typedef struct seen {
+    const pal_setting *setting;
+    double n_node, n_substep, ms; /* of a step of its own */
+    double f[FEATURES];
+} seen;
+
+typedef struct cost_law {
+    double a, w[FEATURES], misfit;
+} cost_law;
+
+static void features(const pal_setting *s, double n_node, double f[FEATURES])
+{
+    static const char *const word[] = {"hex8",        "tet4",   "tet10",      "refined",       "linear",
+                                       "neo_hookean", "sdirk2", "central_cg", "implicit_euler"};
+    double n = log(n_node / whole_nodes), step = log(fmax(s->step_s, 1e-4) * 60);
+    double tolerance = s->tolerance > 0 ? log(s->tolerance / 1e-2) : 0;
+    memset(f, 0, FEATURES * sizeof *f);
+    f[0] = 1, f[1] = n, f[2] = 0.3 * n * n, f[3] = step, f[4] = tolerance, f[5] = s->k_distance_J > 0;
+    for (int k = 0; k < 9; k++)
+        f[6 + k] =
+            pal_study_is(s->element, word[k]) || pal_study_is(s->law, word[k]) || pal_study_is(s->solver, word[k]);
+    f[15] = 0.3 * step * n, f[16] = 0.3 * tolerance * n;
+    /* quadratic elements, exact tangents and the second stage grow otherwise with the nodes */
+    f[17] = 0.5 * f[8] * n, f[18] = 0.5 * f[11] * n, f[19] = 0.5 * f[12] * n;
+}
+
+static double sum_of(const double w[FEATURES], const double f[FEATURES])
+{
+    double sum = 0;
+    for (int r = 0; r < FEATURES; r++) sum += w[r] * f[r];
+    return sum;
+}
+
+/* (F'F + ridge) w = F'y by elimination; the constant is not held back */
+static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
+{
+    for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : ridge;
+    for (int i = 0; i < FEATURES; i++)
+        for (int r = i + 1; r < FEATURES; r++) {
+            double share = A[r][i] / A[i][i];
+            for (int c = i; c <= FEATURES && share != 0; c++) A[r][c] -= share * A[i][c];
+        }
+    for (int i = FEATURES - 1; i >= 0; i--) {
+        double sum = A[i][FEATURES];
+        for (int c = i + 1; c < FEATURES; c++) sum -= A[i][c] * w[c];
+        w[i] = sum / A[i][i];
+    }
+}
+
+static double node_ms(const seen *p, double a)
+{
+    return (p->ms - a) / (p->n_substep * p->n_node);
+}
+
+/* the best sum for an a below all costs */
+static cost_law fit(const seen *p, int n, double a)
+{
+    double A[FEATURES][FEATURES + 1] = {{0}};
+    cost_law law = {.a = a};
+    for (int i = 0; i < n; i++) {
+        double y = log(node_ms(&p[i], a));
+        for (int r = 0; r < FEATURES; r++) {
+            for (int c = 0; c < FEATURES; c++) A[r][c] += p[i].f[r] * p[i].f[c];
+            A[r][FEATURES] += p[i].f[r] * y;
+        }
+    }
+    solve(A, law.w);
+    for (int i = 0; i < n; i++) {
+        double off = log((a + p[i].n_substep * p[i].n_node * exp(sum_of(law.w, p[i].f))) / p[i].ms);
+        law.misfit += off * off;
+    }
+    for (int r = 1; r < FEATURES; r++) law.misfit += ridge * law.w[r] * law.w[r];
+    return law;
+}
+
+/* a between nothing and what the cheapest step took: the best of a grid, then by golden section around it */
+static cost_law best_fit(const seen *p, int n)
+{
+    const double g = 0.6180339887498949;
+    double most = INFINITY;
+    for (int i = 0; i < n; i++) most = fmin(most, p[i].ms);
+    most *= 0.999;
+    cost_law best = fit(p, n, 0);
+    for (int k = 1; k <= GRID; k++) {
+        cost_law next = fit(p, n, most * k / GRID);
+        if (next.misfit < best.misfit) best = next;
+    }
+    double low = fmax(best.a - most / GRID, 0), high = fmin(best.a + most / GRID, most);
+    for (int k = 0; k < GOLDEN; k++) {
+        double p_at = high - g * (high - low), q_at = low + g * (high - low);
+        cost_law at = fit(p, n, p_at), other = fit(p, n, q_at);
+        if (at.misfit < other.misfit)
+            high = q_at;
+        else
+            low = p_at;
+        if (at.misfit < best.misfit) best = at;
+        if (other.misfit < best.misfit) best = other;
+    }
+    return best;
+}
+
+/* ---- counts ---- */
+
+static bool adapts(const pal_setting *s)
+{
+    return pal_study_is(s->model, "adaptive_springs") && !pal_study_is(s->element, "refined") && s->size > 1;
+}
+
+static bool counts(const pal_study *study, int i, int leave_out, const pal_setting *s)
+{
+    const pal_study_point *p = &study->point[i];
+    return i != leave_out && !p->err && p->priced.ms > 0 && isfinite(p->priced.ms) && p->n_node > 0 &&
+           p->n_substep > 0 && p->priced.setting.step_s > 0 && pal_study_is(p->priced.setting.model, s->model);
+}
+
+/* nodes of a body that adapts, wholly refined: as counted of that setting, else four times as many with each level */
+static double refined_nodes(const pal_study *study, int leave_out, const pal_setting *s, double coarse)
+{
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_setting *q = &study->point[i].priced.setting;
+        if (counts(study, i, leave_out, s) && pal_study_is(q->element, "refined") && q->size == s->size)
+            return study->point[i].n_node;
+    }
+    return coarse * exp2(2 * (s->size - 1));
+}
+
+/* how many of its nodes will be in use is seen of other levels: the same share of what refining could add; NaN: there
+ * are none */
+static double nodes_in_use(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    double coarse = NAN, share = 0;
+    int n = 0;
+    for (int i = 0; i < study->n_point; i++)
+        if (counts(study, i, leave_out, s) && study->point[i].priced.setting.size == 1) coarse = study->point[i].n_node;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *p = &study->point[i];
+        if (!counts(study, i, leave_out, s) || !adapts(&p->priced.setting)) continue;
+        double full = refined_nodes(study, leave_out, &p->priced.setting, coarse);
+        share += (p->n_node - coarse) / (full - coarse);
+        n++;
+    }
+    return n > 0 ? coarse + share / n * (refined_nodes(study, leave_out, s, coarse) - coarse) : (double)NAN;
+}
+
+/* ---- foreseen ---- */
+
+static double distance(const seen *p, const pal_setting *s, double n_node)
+{
+    const pal_setting *q = p->setting;
+    int knobs = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
+                !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
+                ((q->k_distance_J > 0) != (s->k_distance_J > 0));
+    return knobs + knobs_per_e * fabs(log(p->n_node / n_node));
+}
+
+static bool has_words(const seen *p, int n, const pal_setting *s)
+{
+    bool element = false, law = false, solver = false;
+    for (int i = 0; i < n; i++) {
+        element |= pal_study_is(p[i].setting->element, s->element), law |= pal_study_is(p[i].setting->law, s->law);
+        solver |= pal_study_is(p[i].setting->solver, s->solver);
+    }
+    return element && law && solver;
+}
+
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, int n_substep, int leave_out,
+                            double *ms)
+{
+    seen p[PAL_STUDY_POINTS];
+    int n = 0;
+    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
+    if (!(nodes > 0) || n_substep < 1 || !(s->step_s > 0) || !(study->step_s > 0)) return false;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *q = &study->point[i];
+        if (!counts(study, i, leave_out, s)) continue;
+        p[n] = (seen){.setting = &q->priced.setting, .n_node = q->n_node, .n_substep = q->n_substep};
+        p[n].ms = q->priced.ms * q->priced.setting.step_s / study->step_s;
+        features(p[n].setting, p[n].n_node, p[n].f);
+        n++;
+    }
+    if (n < LEAST || !has_words(p, n, s)) return false;
+    cost_law law = best_fit(p, n);
+    for (int i = 0; i < n; i++) {
+        double near = exp2(-2 * distance(&p[i], s, nodes));
+        off += near * (log(node_ms(&p[i], law.a)) - sum_of(law.w, p[i].f));
+        weight += near;
+    }
+    double f[FEATURES];
+    features(s, nodes, f);
+    *ms = (law.a + n_substep * nodes * exp(sum_of(law.w, f) + off / weight)) * study->step_s / s->step_s;
+    return true;
+}
