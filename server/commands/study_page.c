@@ -33,6 +33,12 @@ bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
     return is_measured(p) && 1e-3 * p->priced.ms <= study->step_s;
 }
 
+/* as the command has written its loads (study_input.c) */
+static bool is_quick(const pal_study_file *file)
+{
+    return strstr(file->loads, ", quick") != NULL;
+}
+
 /* ---- table ---- */
 
 /* a cell of the table; "-" when the number is not known */
@@ -54,6 +60,10 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     if (s->reference_m > 0.25 * s->most_m)
         fprintf(to, "Nearly as much as it moves: is the body held by too little (palpate prepare --hold 20), or was it "
                     "--quick?\n");
+    if (is_quick(file))
+        fprintf(to,
+                "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
+                "used run it without --quick.\n");
     fprintf(to, "%1s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "ms", "p95", "live", "rest RMS", "most mm",
             "RMS %", "most %", "way mm", "nodes", "steps", "setting");
     pal_study_order(s, order);
@@ -296,6 +306,7 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     snprintf(text, sizeof text, "%.3g mm; the most that moves %.4g mm, the body %.4g mm across", 1e3 * s->reference_m,
              1e3 * s->most_m, 1e3 * s->size_m);
     put_fact(to, "its own error", text);
+    if (is_quick(file)) put_fact(to, "quick", "a coarse reference: errors below its own are of chance");
     put_fact(to, "loads", file->loads);
     snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_all, file->whole ? "" : ", broken off");
     put_fact(to, "settings", text);

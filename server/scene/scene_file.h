@@ -15,8 +15,10 @@
  *                                                          "units": "mm", "resolution": 24, "label": 2,
  *                                                          "triangles": 50000, "largest": true, prepared at load)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
- *     "regions": [                                         other materials in parts of the body (models fem and
- * subdivision_fem), at most 32; what a region does not give is the body's; later ones win
+ *     "regions": [                                         other materials in parts of the body, at most 32; what a
+ *                                                          region does not give is the body's; later ones win. Springs
+ *                                                          take them where their constants are derived (spring_law.h),
+ *                                                          adaptive surfaces E and density
  *       {"box": {"low_m": [..], "high_m": [..]}, "young_Pa": 50000, "poisson": 0.3, "density_kg_m3": 1100},
  *       {"label": {"volume": "liver.nii.gz", "is": 2}, "young_Pa": 50000},    where that scan's voxels have the label;
  *                                                          the scan lies in the frame of the surface's file

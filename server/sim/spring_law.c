@@ -82,12 +82,14 @@ static void set_known(known *k, const int32_t *node, int n)
     }
 }
 
-/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) to its sides with n_corner corners */
-static void add_volumes(const pal_tets *tets, const float *fill, const known *table, size_t n_item, int n_corner,
+/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) times share [n_tet] to its sides with n_corner
+ * corners */
+static void add_volumes(const pal_body *body, const double *share, const known *table, size_t n_item, int n_corner,
                         double *out)
 {
+    const pal_tets *tets = body->tets;
     for (int t = 0; t < tets->n_tet; t++) {
-        double volume = tet_volume(tets, t) * (fill ? (double)fill[t] : 1);
+        double volume = tet_volume(tets, t) * (body->fill ? (double)body->fill[t] : 1) * (share ? share[t] : 1);
         for (unsigned set = 1; set < 16; set++) {
             if (__builtin_popcount(set) != n_corner) continue;
             int32_t node[4];
@@ -113,21 +115,41 @@ static double mean_square_edge(const double *x, const int32_t *node, int n)
     return 2 * sum / (n * (n - 1));
 }
 
-pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const int32_t *item, int n_item,
-                           int n_corner, double *out)
+static void clear(double *out, int n)
 {
-    for (int i = 0; i < n_item; i++) out[i] = 1;
-    if (!spring->by_volume) return PAL_ERR_OK;
+    for (int i = 0; i < n; i++) out[i] = 0;
+}
+
+/* volumes around springs by their share -> out, over all of it where weights are equal */
+static pal_err sum_volumes(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
+                           int n_item, int n_corner, double *out)
+{
     known *table = calloc((size_t)n_item + 1, sizeof *table);
     if (!table) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_item; i++) {
         set_known(&table[i], item + n_corner * i, n_corner);
         table[i].item = i;
-        out[i] = 0;
     }
     qsort(table, (size_t)n_item, sizeof *table, compare_known);
-    add_volumes(body->tets, body->fill, table, (size_t)n_item, n_corner, out);
-    free(table);
+    clear(out, n_item);
+    add_volumes(body, share, table, (size_t)n_item, n_corner, out);
+    double *all = spring->by_volume ? NULL : calloc((size_t)n_item + 1, sizeof *all);
+    if (all) {
+        add_volumes(body, NULL, table, (size_t)n_item, n_corner, all);
+        for (int i = 0; i < n_item; i++) out[i] = all[i] > 0 ? out[i] / all[i] : 0;
+    }
+    bool made = spring->by_volume || all;
+    free(table), free(all);
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
+                           int n_item, int n_corner, double *out)
+{
+    for (int i = 0; i < n_item; i++) out[i] = 1;
+    if (!spring->by_volume && !share) return PAL_ERR_OK;
+    PAL_TRY(sum_volumes(spring, body, share, item, n_item, n_corner, out));
+    if (!spring->by_volume) return PAL_ERR_OK;
     double h = body->h_m;
     for (int i = 0; i < n_item; i++) {
         double l2 = n_corner == 4 ? h * h : mean_square_edge(body->x_rest, item + n_corner * i, n_corner);

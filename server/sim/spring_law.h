@@ -12,6 +12,10 @@
  * modulus; f_v the rest. A body without area springs takes f_a = 0: the same moduli from two rows. A Poisson ratio
  * below 0.26 is simulated as 0.26.
  *
+ * Regions of other materials (def.h): every tetrahedron counts in V_i by factor E of its own material over those of the
+ * body, at its centre; with equal weights the mean of that over the spring's tetrahedra stands. That is for constants
+ * that are derived; those that are given stand for all materials, as they do when the material is edited.
+ *
  * Constants on a grid (paper B 3.5): k_i is the weight times the mean over the spring's corners of the grid's value
  * there. Thread: [load], pal_spring_material [sim]. */
 #ifndef PAL_SIM_SPRING_LAW_H
@@ -37,9 +41,10 @@ void pal_spring_factors(double poisson, bool without_area, double factor[3]);
  * in proportion), weights ("equal" | "volume"; absent: equal when the constants are given), without_area (false); no
  * other key is allowed. REFUSED: k_J beside a grid that gives the same */
 pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out);
-/* the weights q_i of springs between the corners item [n_item][n_corner] -> out [n_item]; MEMORY */
-pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const int32_t *item, int n_item,
-                           int n_corner, double *out);
+/* the weights q_i of springs between the corners item [n_item][n_corner] -> out [n_item]; share [n_tet]: times what
+ * each tetrahedron counts, NULL: all are of one material; MEMORY */
+pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
+                           int n_item, int n_corner, double *out);
 /* weights times the constants of the springs on the grid (nothing without one); c_Js is made to go with them */
 void pal_spring_on_grid(pal_spring *spring, const pal_spring_grid *grid, const pal_body *body, const int32_t *item,
                         int n_item, int n_corner, double *weight);

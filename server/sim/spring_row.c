@@ -1,6 +1,9 @@
 /* Making a row of springs: constraints -> weights -> strips -> lanes. */
 #include "server/sim/spring_row.h"
 
+#include "server/base/vec3.h"
+
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,12 +12,75 @@ static void corners_at(const double *x, const int32_t *node, int n, const double
     for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * node[c < n ? c : 0];
 }
 
+/* ---- regions ---- */
+
+/* weights of the body's material as it is; those of regions keep what they give */
+static void weigh(pal_spring_row *row, const pal_material *material)
+{
+    double factor[3], young_Pa = material->young_Pa;
+    pal_spring_factors(material->poisson, row->spring.without_area, factor);
+    const double f = factor[row->spring.kind], over[4] = {1, 1 / young_Pa, 1 / f, 1 / (young_Pa * f)};
+    for (int i = 0; i < row->strips.n_lane; i++) {
+        row->q[i] = 0;
+        for (int k = 0; k < 4; k++) row->q[i] += over[k] * row->part[k][i];
+    }
+}
+
+/* what each tetrahedron counts, by what its region gives: nothing, E, Poisson's ratio, both [4][n_tet]; false: all are
+ * of the body's material */
+static bool shares(const pal_spring_row *row, const pal_build *build, double *share)
+{
+    const pal_tets *tets = build->body->tets;
+    bool any = false;
+    for (int t = 0; t < tets->n_tet; t++) {
+        double centre[3] = {0}, factor[3];
+        pal_material at, base = build->def->material;
+        base.young_Pa = base.poisson = NAN;
+        for (int c = 0; c < 4; c++) pal_axpy3(centre, 0.25, tets->x + 3 * (size_t)tets->tet[4 * t + c]);
+        pal_material_over(build->def, &base, centre, &at);
+        bool young = !isnan(at.young_Pa), poisson = !isnan(at.poisson);
+        if (poisson) pal_spring_factors(at.poisson, row->spring.without_area, factor);
+        share[(young + 2 * poisson) * tets->n_tet + t] =
+            (young ? at.young_Pa : 1) * (poisson ? factor[row->spring.kind] : 1);
+        any = any || young || poisson;
+    }
+    return any;
+}
+
+/* weight [n_item]: room */
+static pal_err take_regions(pal_spring_row *row, const pal_build *build, double *weight)
+{
+    const pal_body *body = build->body;
+    size_t n_tet = (size_t)body->tets->n_tet, n_lane = (size_t)row->strips.n_lane;
+    if (build->def->n_region == 0 || row->spring.given) return PAL_ERR_OK;
+    double *share = calloc(4 * n_tet, sizeof *share);
+    pal_err err = share ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (!err && shares(row, build, share)) {
+        row->whole = PAL_NEW(build->arena, double, n_lane);
+        if (row->whole) memcpy(row->whole, row->q, n_lane * sizeof *row->q);
+        for (int k = 0; k < 4 && !err; k++) {
+            row->part[k] = PAL_NEW(build->arena, double, n_lane);
+            if (!row->part[k] || !row->whole)
+                err = PAL_ERR_MEMORY;
+            else
+                err = pal_spring_weights(&row->spring, body, share + (size_t)k * n_tet, row->item, row->n_item,
+                                         row->n_corner, weight);
+            for (int i = 0; i < row->n_item && !err; i++) row->part[k][row->strips.place[i]] = weight[i];
+        }
+        if (!err) weigh(row, &build->def->material);
+    }
+    free(share);
+    return err;
+}
+
+/* ---- making ---- */
+
 static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
 {
     const pal_body *body = build->body;
     pal_arena *arena = build->arena;
     PAL_TRY(pal_strips_make(body->slots, row->item, row->n_item, row->n_corner, arena, &row->strips));
-    PAL_TRY(pal_spring_weights(&row->spring, body, row->item, row->n_item, row->n_corner, weight));
+    PAL_TRY(pal_spring_weights(&row->spring, body, NULL, row->item, row->n_item, row->n_corner, weight));
     pal_spring_on_grid(&row->spring, &build->def->spring_grid, body, row->item, row->n_item, row->n_corner, weight);
     row->w = PAL_NEW(arena, double, row->strips.n_lane);
     row->q = PAL_NEW(arena, double, row->strips.n_lane);
@@ -25,7 +91,7 @@ static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
         row->w[row->strips.place[i]] = 1 / pal_spring_measure(row->spring.kind, x);
         row->q[row->strips.place[i]] = weight[i];
     }
-    return PAL_ERR_OK;
+    return take_regions(row, build, weight);
 }
 
 pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build)
@@ -64,6 +130,8 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note)
 {
     (void)note;
-    pal_spring_material(&((pal_spring_row *)self)->spring, body, material);
+    pal_spring_row *row = self;
+    pal_spring_material(&row->spring, body, material);
+    if (row->whole) weigh(row, material);
     return PAL_ERR_OK;
 }

@@ -22,6 +22,9 @@ typedef struct pal_spring_row {
     int32_t *item; /* nodes                      [n_item][n_corner] */
     pal_strips strips;
     double *w, *q; /* by lane; 0: no constraint  [strips.n_lane]    */
+    /* with regions of other materials q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E and
+     * factor, and what it would be without them; NULL: there are none [strips.n_lane] */
+    double *part[4], *whole;
 } pal_spring_row;
 
 /* REFUSED: the body is not made of tetrahedra */
@@ -30,6 +33,7 @@ pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build);
  * least; its corners reordered), with w = 1 / measure */
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
                             double least, pal_spring_row *out);
+/* a live edit: k_J, and with regions q too */
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note);
 
 PAL_INLINE void pal_spring_corners(const pal_spring_row *row, const double *x, int i, const double *to[PAL_CORNERS])

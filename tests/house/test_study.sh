@@ -129,6 +129,8 @@ run study "$beam" --quick --out o
 check "exit code $code" code_is 0
 check "it does not say what it had" has out "$all of $all measured before"
 check "no front" has out "^\*"
+check "does not say that its reference is coarse" has out "^Quick: a coarse reference"
+check "the page does not say so" has o/study.html "a coarse reference"
 check "the study changed" cmp -s o/study.json whole.json
 rows=$(grep -c -E '^[* ] +[0-9]' out)
 bad_rows=$(grep -c "^not measured: " out)

@@ -13,9 +13,19 @@
 
 typedef struct edge_distance {
     pal_spring_row row; /* first: see pal_spring_row_material */
+    int n_dof;
     double *node_bound; /* sum of 2 q / l0^2 over the edges of each node            [n_dof] */
     double *node_J;     /* constants at the nodes, of a grid; NULL: all are row.k_J [n_dof] */
 } edge_distance;
+
+static void sum_bounds(edge_distance *e)
+{
+    for (int i = 0; i < e->n_dof; i++) e->node_bound[i] = 0;
+    for (int i = 0; i < 2 * e->row.n_item; i++) {
+        int lane = e->row.strips.place[i / 2];
+        e->node_bound[e->row.item[i]] += 2 * e->row.q[lane] * e->row.w[lane] * e->row.w[lane];
+    }
+}
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
@@ -29,12 +39,10 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         pal_spring_row_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge, 1e-9 * build->body->size_m, &e->row);
     free(edge);
     PAL_TRY(err);
+    e->n_dof = build->body->n_dof;
     e->node_bound = PAL_NEW(build->arena, double, build->body->n_dof);
     if (!e->node_bound) return PAL_ERR_MEMORY;
-    for (int i = 0; i < 2 * e->row.n_item; i++) {
-        int lane = e->row.strips.place[i / 2];
-        e->node_bound[e->row.item[i]] += 2 * e->row.q[lane] * e->row.w[lane] * e->row.w[lane];
-    }
+    sum_bounds(e);
     if (e->row.spring.on_grid) {
         e->node_J = PAL_NEW(build->arena, double, build->body->n_dof);
         if (!e->node_J) return PAL_ERR_MEMORY;
@@ -102,12 +110,36 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
     for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += e->row.spring.c_Js * e->node_bound[i];
 }
 
+/* with regions the weights are others by now */
+static pal_err edit(void *self, const pal_body *body, const pal_material *material, pal_note *note)
+{
+    edge_distance *e = self;
+    PAL_TRY(pal_spring_row_material(self, body, material, note));
+    if (e->row.whole) sum_bounds(e);
+    return PAL_ERR_OK;
+}
+
+/* the constants of regions at the nodes: the means over their springs */
+static void measure_regions(const pal_spring_row *row, double *sum, double *volume_m3)
+{
+    for (int i = 0; i < 2 * row->n_item; i++) {
+        int lane = row->strips.place[i / 2], node = row->item[i];
+        if (!(row->whole[lane] > 0)) continue;
+        sum[node] += row->spring.k_J * row->q[lane] / row->whole[lane];
+        volume_m3[node] += 1;
+    }
+}
+
 /* the constant as the scene gives it, before the springs' weights: those differ from edge to edge of a lattice, and a
  * uniform body would look chequered */
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     const edge_distance *e = self;
     if (field != PAL_FIELD_STIFFNESS_J) return;
+    if (e->row.whole) {
+        measure_regions(&e->row, sum, volume_m3);
+        return;
+    }
     for (int i = 0; i < body->n_dof; i++) {
         sum[i] += e->node_J ? e->node_J[i] : e->row.spring.k_J;
         volume_m3[i] += 1;
@@ -122,6 +154,6 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .energy = energy,
                                              .stiffness = stiffness,
                                              .damping = damping,
-                                             .material = pal_spring_row_material,
+                                             .material = edit,
                                              .measure = measure,
                                              .fields = 1u << PAL_FIELD_STIFFNESS_J};

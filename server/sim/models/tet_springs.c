@@ -7,6 +7,9 @@
  * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
  * shares, weights by volume and masses count only what is inside, as model fem has it).
  *
+ * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own
+ * (spring_law.h); constants that are given stand for all of them.
+ *
  * Constants that vary over the body stand on the body's spring_grid (paper B 3.5) in place of their keys; with a grid
  * there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived constants of
  * edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous` exists when the
@@ -20,15 +23,18 @@
 
 static const float least_fill = 0.02F;
 
-/* quarter of each tetrahedron's mass to its corners; fill [n_tet] may be NULL */
-static void lump_mass(const pal_tets *tets, const float *fill, double density_kg_m3, double *mass_kg)
+/* quarter of each tetrahedron's mass to its corners, of the material at its centre; fill [n_tet] may be NULL */
+static void lump_mass(const pal_body_def *def, const pal_tets *tets, const float *fill, double *mass_kg)
 {
     for (int t = 0; t < tets->n_tet; t++) {
         const int32_t *c = tets->tet + 4 * t;
-        double e[3][3], n[3];
+        double e[3][3], n[3], centre[3] = {0};
+        pal_material at;
+        for (int k = 0; k < 4; k++) pal_axpy3(centre, 0.25, tets->x + 3 * c[k]);
+        pal_material_at(def, centre, &at);
         for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
         pal_cross3(n, e[1], e[2]);
-        double quarter = density_kg_m3 * pal_dot3(e[0], n) / 24 * (fill ? (double)fill[t] : 1);
+        double quarter = at.density_kg_m3 * pal_dot3(e[0], n) / 24 * (fill ? (double)fill[t] : 1);
         for (int k = 0; k < 4; k++) mass_kg[c[k]] += quarter;
     }
 }
@@ -107,7 +113,6 @@ static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
 static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
-    const pal_material *material = &build->def->material;
     pal_body *body = build->body;
     PAL_TRY(pal_spring_grid_check(build->def, build->note));
     PAL_TRY(list(item, build, out));
@@ -117,7 +122,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
     memcpy(body->x_rest, mesh->tets.x, 3 * sizeof(double) * (size_t)body->n_node);
     memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_node);
-    lump_mass(&mesh->tets, body->fill, material->density_kg_m3, body->mass_kg);
+    lump_mass(build->def, &mesh->tets, body->fill, body->mass_kg);
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
             return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name, i,
