@@ -70,7 +70,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     pal_hub_say(hub, c, hub->control);
 }
 
-/* ---- the estimate ---- */
+/* ---- where it is in the study ---- */
 
 /* does a setting of a study say what holds now? Words and numbers that it leaves open fit anything; better: how many
  * it does say. -1: it says something else */
@@ -107,6 +107,41 @@ static double point_of(const pal_hub_room *room, int body, const pal_setting *no
     }
     return best < 0 ? NAN : (double)best;
 }
+
+/* ---- errors as they are shown ---- */
+
+static double error_of(const pal_hub_room *room, double point)
+{
+    return isnan(point) ? NAN : room->setting[(int)point].error_m;
+}
+
+static bool near(double a, double b)
+{
+    return fabs(a - b) <= 1e-6 * fabs(a);
+}
+
+/* a neighbour's setting is the present one with another number: nothing in it is open */
+static bool is_neighbour(const pal_setting *of, const pal_setting *to)
+{
+    return likeness(of, to) >= 0 && of->size == to->size && near(of->step_s, to->step_s) &&
+           near(of->tolerance, to->tolerance);
+}
+
+void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
+                          double *then_m)
+{
+    pal_estimate e;
+    pal_setting now;
+    bool looked = pal_session_estimate(room->session, body, &e);
+    pal_setting_of(pal_session_scene(room->session), body, &now);
+    *now_m = looked && isfinite(e.error_m) ? e.error_m : error_of(room, point_of(room, body, &now));
+    *then_m = NAN;
+    for (int i = 0; looked && point < 0 && i < e.n_neighbour; i++)
+        if (is_neighbour(&e.neighbour[i].setting, to)) *then_m = e.neighbour[i].error_m;
+    if (!isfinite(*then_m)) *then_m = error_of(room, point < 0 ? point_of(room, body, to) : (double)point);
+}
+
+/* ---- the estimate ---- */
 
 static double known(double value)
 {

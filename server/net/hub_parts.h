@@ -129,6 +129,10 @@ void pal_hub_tell_estimates(pal_hub_room *room); /* what the session does not kn
 void pal_hub_estimates_due(pal_client *client);  /* a tick */
 bool pal_hub_wants_estimate(const pal_client *client);
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
+/* the errors that clients are shown of the setting that a body has (its estimate's, else its study's) and of the one
+ * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown */
+void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
+                          double *then_m);
 /* hub_plan.c */
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);

@@ -29,22 +29,21 @@ static int find_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
     return -1;
 }
 
-/* a point of the room's study; false: complained */
-static bool read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_setting *to)
+/* a point of the room's study; -1: complained */
+static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order)
 {
     const pal_hub_room *room = c->room;
     double index = pal_hub_arg(order, "index")->value;
     if (!room->setting || body != room->setting_body) {
         pal_hub_complain(hub, c, "refused", "point: there is no study of %s here",
                          pal_session_scene(room->session)->body[body].name);
-        return false;
+        return -1;
     }
     if (!(index >= 0 && index < room->n_setting && index == floor(index))) {
         pal_hub_complain(hub, c, "args", "point: index %g, wanted 0 to %d", index, room->n_setting - 1);
-        return false;
+        return -1;
     }
-    *to = room->setting[(int)index].setting;
-    return true;
+    return (int)index;
 }
 
 /* the present setting with other numbers; false: complained */
@@ -73,11 +72,13 @@ static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_orde
 bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_work *to, int *body)
 {
     const pal_scene *scene = pal_session_scene(c->room->session);
+    bool by_point = !strcmp(order->verb, "point");
     *body = to->body = find_body(hub, c, order);
     if (*body < 0) return false;
-    bool good = !strcmp(order->verb, "point") ? read_point(hub, c, *body, order, &to->setting)
-                                              : read_knob(hub, c, *body, order, &to->setting);
-    if (!good) return false;
+    int point = by_point ? read_point(hub, c, *body, order) : -1;
+    if (by_point ? point < 0 : !read_knob(hub, c, *body, order, &to->setting)) return false;
+    if (by_point) to->setting = c->room->setting[point].setting;
+    pal_hub_shown_errors(c->room, *body, point, &to->setting, &to->now_m, &to->then_m);
     to->was = hub->works->place[c->room - hub->room][*body].base;
     if (to->was) return true;
     /* its first switch: what it can come back to is what it is now */
@@ -86,6 +87,30 @@ bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_order *orde
     to->was = to->base;
     if (!to->base) pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, pal_err_text(PAL_ERR_MEMORY));
     return to->base != NULL;
+}
+
+/* what jumped, against what was promised */
+static void put_jump(const pal_hub *hub, const pal_work *work, double change, pal_wire_answer *a)
+{
+    const pal_switch_report *r = &work->report;
+    double bound_m = work->now_m + work->then_m;
+    bool far = r->most_move_m > bound_m + hub->error_m;
+    size_t n = strlen(a->text), room = sizeof a->text - n;
+    if (isnan(bound_m))
+        snprintf(a->text + n, room, "moved %.3g mm (no bound: no error is shown of both settings)",
+                 1e3 * r->most_move_m);
+    else
+        snprintf(a->text + n, room, "moved %.3g mm, %s the bound of %.3g mm", 1e3 * r->most_move_m,
+                 far ? "beyond" : "within", 1e3 * bound_m);
+    pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
+    pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
+    pal_hub_answer_arg(a, "energy_percent", change);
+    pal_hub_answer_arg(a, "most_move_m", r->most_move_m);
+    pal_hub_answer_arg(a, "body_move_m", r->body_move_m);
+    if (isnan(bound_m)) return;
+    pal_hub_answer_arg(a, "error_before_m", work->now_m);
+    pal_hub_answer_arg(a, "error_after_m", work->then_m);
+    pal_hub_answer_arg(a, "bound_m", bound_m);
 }
 
 void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
@@ -100,12 +125,9 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns);
     pal_setting_of(pal_session_scene(c->room->session), work->body, &now);
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
-    snprintf(a->text, sizeof a->text, "%s: %s; energy %+.2f %%, moved %.3g mm, made in %.0f ms", verb,
-             pal_setting_text(&now, text), change, 1e3 * r->most_move_m, made_ms);
-    pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
-    pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
-    pal_hub_answer_arg(a, "energy_percent", change);
-    pal_hub_answer_arg(a, "most_move_m", r->most_move_m);
+    snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms; energy %+.2f %%%s, ", verb,
+             pal_setting_text(&now, text), made_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
+    put_jump(hub, work, change, a);
     pal_hub_answer_arg(a, "made_ms", made_ms);
     pal_hub_say(hub, c, hub->control);
 }

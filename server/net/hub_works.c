@@ -106,16 +106,13 @@ static void keep_works(pal_hub_place *at, pal_work *work, pal_waste *waste)
     work->turn = NULL;
 }
 
-/* what came out takes the place of what runs; false: it goes on as it was, note says why */
+/* what came out takes the place of what stands; false: that goes on as it was, note says why */
 static bool take_over(pal_hub *hub, pal_hub_works *s, pal_work *work)
 {
     pal_hub_room *room = s->now.room;
-    bool switches = work->kind == PAL_WORK_SWITCH;
     pal_waste waste = {.stream = room->stream, .session = room->session};
-    work->err = pal_session_follow(work->next, room->session, switches ? pal_switch_carry : pal_sculpt_carry,
-                                   switches ? (void *)work->change : (void *)work->turn, &work->note);
+    work->err = pal_session_go_on(work->next, room->session, &work->note);
     if (work->err) return false;
-    if (switches) pal_switch_report_of(work->change, &work->report);
     pal_stream_follow(work->stream, room->stream);
     room->stream = work->stream, room->session = work->next;
     work->next = NULL, work->stream = NULL;

@@ -33,6 +33,12 @@ static void make(pal_work *w)
         w->err = pal_session_open_after(w->session, scene, &w->note, &w->next);
     }
     if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->note, &w->stream);
+    if (!w->err && w->change) {
+        pal_session_carry_over(w->next, w->session, pal_switch_carry, w->change);
+        pal_switch_report_of(w->change, &w->report);
+    } else if (!w->err) {
+        pal_session_carry_over(w->next, w->session, pal_sculpt_carry, w->turn);
+    }
     w->made_ns = pal_clock_ns();
 }
 

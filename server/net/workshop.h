@@ -1,6 +1,7 @@
 /* One thread beside the loop that makes what a command of sculpting, or one for another setting, leads to: scene, world
- * and stream, slow and with memory, while the session runs on; and that frees what has been replaced. One piece of work
- * at a time: the next one is given when the last has been taken. Thread: [net] unless said otherwise. */
+ * and stream, slow and with memory, while the session runs on; that stops the session then and carries its state over,
+ * while other sessions and the loop go on; and that frees what has been replaced. One piece of work at a time: the next
+ * one is given when the last has been taken. Thread: [net] unless said otherwise. */
 #ifndef PAL_NET_WORKSHOP_H
 #define PAL_NET_WORKSHOP_H
 #include "server/net/stream.h"
@@ -12,11 +13,11 @@ typedef struct pal_workshop pal_workshop;
 typedef enum pal_work_kind { PAL_WORK_SCULPT, PAL_WORK_SWITCH } pal_work_kind;
 
 /* what is to be made, and what has been. Borrowed until it is taken: sculptor, session and was, which nobody changes or
- * closes meanwhile */
+ * closes meanwhile. When it is taken without err the session stands, and its state is in next: pal_session_go_on */
 typedef struct pal_work {
     pal_work_kind kind;
-    const pal_session *session; /* that runs now */
-    pal_scene *scene;           /* its scene with live materials; heap, goes with the work */
+    pal_session *session; /* that runs now */
+    pal_scene *scene;     /* its scene with live materials; heap, goes with the work */
     /* SCULPT */
     const pal_sculptor *sculptor;
     pal_sculpt command;
@@ -27,6 +28,7 @@ typedef struct pal_work {
     const pal_body_def *was; /* the body before its first switch               */
     pal_body_def *base;      /* the same where this is its first: heap, or NULL */
     double error_m;
+    double now_m, then_m; /* SWITCH: errors shown of the setting that it has and of that wanted; NaN: none */
     uint64_t asked_ns, made_ns;
     /* made; when err is not 0 nothing is, and note says why */
     pal_err err;
@@ -35,7 +37,7 @@ typedef struct pal_work {
     pal_switch *change;    /* SWITCH */
     pal_session *next;
     pal_stream *stream;
-    pal_switch_report report; /* filled in by who lets it take over */
+    pal_switch_report report; /* SWITCH */
 } pal_work;
 
 /* what has been replaced; each may be NULL */

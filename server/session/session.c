@@ -68,6 +68,7 @@ struct pal_session {
     pal_frame *frame[3];
     pal_trio frames;
     _Atomic bool stop;
+    _Atomic bool replaced; /* another one is about to go on where it stands */
     _Atomic uint64_t beat_ns, n_refused;
     _Atomic int n_watch; /* who looks at frames; only_watched alone asks */
     pthread_mutex_t note_lock;
@@ -78,10 +79,11 @@ struct pal_session {
     /* the simulation thread's own */
     pal_input_log *log;
     bool paused, watched;
-    int single;       /* steps asked for while paused        */
-    uint64_t step;    /* taken since open: resets do not count */
-    uint64_t n_late;  /* began late                          */
-    uint64_t work_ns; /* processor time of the last step     */
+    int single;          /* steps asked for while paused        */
+    uint64_t step;       /* taken since open: resets do not count */
+    uint64_t n_late;     /* began late                          */
+    uint64_t work_ns;    /* processor time of the last step     */
+    uint64_t carried_ns; /* of one that follows: when the other one stopped */
     uint64_t end_ns;
     uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* who looks at a field */
     mark marks[N_MARK + 2];                         /* a ring, oldest at first              */
@@ -501,61 +503,84 @@ void pal_session_close(pal_session *s)
     release(s);
 }
 
-/* Tools as they are held, and poses that had not been taken yet. Nobody could send one while neither thread ran, for
- * away_ns: that time counts for no lease */
-static void hand_tools(pal_session *to, pal_session *from, uint64_t away_ns)
+static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t most_ns)
 {
+    return ns + by_ns < most_ns ? ns + by_ns : most_ns;
+}
+
+/* Tools as they are held, and poses that had not been taken yet. Nobody could take one while neither thread ran, for
+ * away_ns: that time counts for no lease */
+static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
+{
+    uint64_t away_ns = now_ns - to->carried_ns;
     for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
         tool_place *a = &to->tool[t], *b = &from->tool[t];
         const pose_slot *slot = pal_trio_take(&b->trio);
         if (slot) {
             pose_slot *kept = pal_trio_slot(&a->trio);
             *kept = *slot;
-            kept->arrived_ns += away_ns;
+            kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
             pal_trio_publish(&a->trio);
         }
-        b->arrived_ns += away_ns;
+        b->arrived_ns = later(b->arrived_ns, away_ns, now_ns);
         a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
     }
 }
 
-/* what the thread of `from` knew and that of `to` goes on with, but tools */
+/* what the thread of `from` knew and that of `to` goes on with, before the carry */
 static void hand_over(pal_session *to, pal_session *from)
 {
     to->paused = from->paused, to->single = from->single;
     to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
-    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
-                          memory_order_relaxed);
-    atomic_store_explicit(&to->n_watch, atomic_load_explicit(&from->n_watch, memory_order_relaxed),
-                          memory_order_relaxed);
     pal_rows_off_hand(&to->off, &from->off, from->row, from->n_row, from->world, to->world, to->scene);
     memcpy(to->n_look, from->n_look, sizeof to->n_look);
-    pal_watch_hand_over(&to->watch, &from->watch);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
     for (int b = 0; b < to->scene->n_body; b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++)
             if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
-    /* orders that nobody has taken yet */
+}
+
+/* what others may have changed meanwhile, and orders that nobody has taken yet */
+static void hand_orders(pal_session *to, pal_session *from)
+{
+    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
+                          memory_order_relaxed);
+    atomic_store_explicit(&to->n_watch, atomic_load_explicit(&from->n_watch, memory_order_relaxed),
+                          memory_order_relaxed);
+    pal_watch_hand_over(&to->watch, &from->watch);
     pal_command command;
     for (int k = 0; k < N_COMMAND && pal_ring_get(from->command, &command); k++)
         (void)pal_ring_put(to->command, &command);
 }
 
-pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
+void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_carry *carry, void *user)
 {
-    uint64_t began_ns = pal_clock_ns();
+    next->carried_ns = pal_clock_ns();
+    atomic_store_explicit(&before->replaced, true, memory_order_relaxed);
     stop(before);
     hand_over(next, before);
     carry(user, next->world, before->world);
-    hand_tools(next, before, pal_clock_ns() - began_ns);
+}
+
+pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note)
+{
+    hand_orders(next, before);
+    hand_tools(next, before, pal_clock_ns());
     pal_err err = start(next, note);
     if (!err && before->log)
         pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
                 before->options.record_path, (unsigned long long)before->step);
     if (!err) return PAL_ERR_OK;
     atomic_store_explicit(&before->stop, false, memory_order_release);
+    atomic_store_explicit(&before->replaced, false, memory_order_relaxed);
     (void)start(before, NULL);
     return err;
+}
+
+pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
+{
+    pal_session_carry_over(next, before, carry, user);
+    return pal_session_go_on(next, before, note);
 }
 
 /* ---- any thread ---- */
@@ -654,7 +679,7 @@ void pal_session_watch(pal_session *s, bool looks)
 bool pal_session_alive(const pal_session *s)
 {
     uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = pal_clock_ns();
-    return now < beat || now - beat < SECOND_NS;
+    return now < beat || now - beat < SECOND_NS || atomic_load_explicit(&s->replaced, memory_order_relaxed);
 }
 
 void pal_session_material(pal_session *s, int body, pal_material *out)

@@ -63,13 +63,17 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
 /* opens a session for another scene with the options of a running one, with hold and without a record. [any] while no
  * other thread closes `before` */
 pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out);
-/* Lets `next`, opened with hold, go on where `before` is: stops the thread of before between two steps, hands its
- * world's state over (carry; what it does not do is at rest), and pause, poses, counts and looked-at fields, and starts
- * the thread of next. The time in between counts for no lease, and rows that were switched off stay off, for good. A
- * tool's holder goes on sending poses, to next. before keeps its last frame and can only be
- * closed; a record ends there. INTERNAL: the thread could not be started, then before has gone on. Not while another
- * thread uses either. [net] */
+/* Lets `next`, opened with hold, go on where `before` is, in two halves. carry_over stops the thread of before between
+ * two steps, hands what was looked at and switched off over, and its world's state (carry; what it does not do is at
+ * rest): as slow as carry is, and at most one step. go_on hands poses, orders and counts over and starts the thread of
+ * next: short. The time in between counts for no lease, and rows that were switched off stay off, for good. A tool's
+ * holder goes on sending poses and orders to before until go_on, to next from then on; before keeps its last frame and
+ * can only be closed after go_on; a record ends there. INTERNAL: the thread could not be started, then before has gone
+ * on. carry_over: [any], while others use before as they do, and nobody uses next; go_on: [net]; follow: both, where
+ * there is time */
 typedef void pal_session_carry(void *user, pal_world *next, const pal_world *before);
+void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_carry *carry, void *user);
+pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note);
 pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user,
                            pal_note *note);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */

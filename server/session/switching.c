@@ -53,9 +53,17 @@ const pal_scene *pal_switch_scene(const pal_switch *change)
     return &change->set->scene;
 }
 
+static _Thread_local uint64_t n_carried;
+
+uint64_t pal_switch_carried_here(void)
+{
+    return n_carried;
+}
+
 void pal_switch_carry(void *change, pal_world *next, const pal_world *before)
 {
     pal_switch *s = change;
+    n_carried++;
     pal_transfer_carry(s->transfer, next, before, &s->report);
 }
 
@@ -65,6 +73,7 @@ void pal_switch_report_of(const pal_switch *change, pal_switch_report *out)
     *out = (pal_switch_report){.energy_before_J = r->energy_before_J,
                                .energy_after_J = r->energy_after_J,
                                .most_move_m = r->most_move_m,
+                               .body_move_m = r->body_move_m,
                                .scale = r->scale};
 }
 

@@ -17,7 +17,7 @@ typedef struct pal_switch pal_switch;
 /* what the carry saw, for people and tests */
 typedef struct pal_switch_report {
     double energy_before_J, energy_after_J; /* of the whole world: kinetic and elastic */
-    double most_move_m;                     /* of a shown vertex, between the frame before and the one after */
+    double most_move_m, body_move_m;        /* of a shown vertex and of a point of the body (sim/transfer.h) */
     double scale; /* of displacements, for the sake of the energy; 1: none, PAL_TRANSFER_SCALE or
                    * 1 over it: at its bound, the energy is off by more */
 } pal_switch_report;
@@ -33,6 +33,7 @@ pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int
 const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */
 /* pal_session_carry with user a pal_switch */
 void pal_switch_carry(void *change, pal_world *next, const pal_world *before);
+uint64_t pal_switch_carried_here(void); /* carries that the calling thread has made, for tests [any] */
 void pal_switch_report_of(const pal_switch *change, pal_switch_report *out); /* after the carry */
 void pal_switch_free(pal_switch *change); /* NULL is fine; not while a world is made from its scene */
 #endif

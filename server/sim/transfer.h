@@ -39,9 +39,13 @@ typedef struct pal_transfer_report {
     /* kinetic energy and that of elastic rows, of the whole world; loads and gravity are not in it */
     double energy_before_J, energy_after_J;
     double interpolated_J; /* as interpolation alone would have it */
-    double most_move_m;    /* of a shown vertex */
-    int n_smooth;          /* rounds of smoothing that it took */
-    double scale;          /* of the displacement, 1: as interpolated and smoothed */
+    /* of a shown vertex (where another surface is shown, as the next), and of a point of the body: a node of before
+     * that lies within the new elements. Skins hang on the nodes of their mesh, so that a vertex may move where no
+     * point does
+     */
+    double most_move_m, body_move_m;
+    int n_smooth; /* rounds of smoothing that it took */
+    double scale; /* of the displacement, 1: as interpolated and smoothed */
 } pal_transfer_report;
 
 /* What the carry needs, found beforehand: where every node of the body in scene `to` lies in that in `from` and the

@@ -485,24 +485,39 @@ static void hand_over(const pal_transfer *t, pal_world *next, const pal_world *b
     }
 }
 
-/* farthest that a shown vertex is from where it was; where other vertices are shown, an old node */
-static double most_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
+/* farthest that a shown vertex is from where it was; NaN: other vertices are shown */
+static double shown_move(const pal_body *from, const pal_body *to)
+{
+    double most = 0;
+    if (from->n_shown != to->n_shown) return NAN;
+    for (int i = 0; i < from->n_shown; i++) {
+        double move[3];
+        for (int c = 0; c < 3; c++) move[c] = (double)to->shown[3 * i + c] - (double)from->shown[3 * i + c];
+        most = fmax(most, pal_norm3(move));
+    }
+    return most;
+}
+
+/* does a point lie within the element whose nodes have these weights? Quadratic shape functions are as low as -1/8 */
+static bool is_inside(const pal_point_rows *rows, int i)
+{
+    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
+        if (rows->weight[k] < -0.13) return false;
+    return true;
+}
+
+/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+ */
+static double body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     double most = 0;
     int n_common = from->n_node < to->n_node ? from->n_node : to->n_node;
-    if (!t->shell && from->n_shown == to->n_shown) {
-        for (int i = 0; i < from->n_shown; i++) {
-            double move[3];
-            for (int c = 0; c < 3; c++) move[c] = (double)to->shown[3 * i + c] - (double)from->shown[3 * i + c];
-            most = fmax(most, pal_norm3(move));
-        }
-        return most;
-    }
     for (int i = 0; i < n_common && t->shell; i++)
         if (pal_shell_uses(from->shell, i) && pal_shell_uses(to->shell, i))
             most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
     for (int i = 0; i < from->n_node && !t->shell; i++) {
         double move[3] = {0, 0, 0};
+        if (!is_inside(&t->back, i)) continue;
         for (int32_t k = t->back.start[i]; k < t->back.start[i + 1]; k++) {
             const size_t j = 3 * (size_t)t->back.point[k];
             for (size_t c = 0; c < 3; c++) move[c] += t->back.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
@@ -554,5 +569,7 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     if (t->back.n_row > 0) ease(t, next);
     hand_over(t, next, before);
     out->energy_after_J = world_J(next);
-    out->most_move_m = most_move(t, from, to);
+    out->body_move_m = body_move(t, from, to);
+    double shown_m = t->shell ? NAN : shown_move(from, to);
+    out->most_move_m = isnan(shown_m) ? out->body_move_m : shown_m;
 }

@@ -1,0 +1,194 @@
+/* What a switch promises, over the wire: a ball under its weight that a client presses goes from point to point of its
+ * study and along its knobs, the energy within 2 %, no shown vertex farther than the errors that were shown of both
+ * settings allow, and the answer says so. The carry is made beside the loop, not by it. */
+#include "server/session/switching.h"
+#include "tests/net/order_room.h"
+#include "tests/session/small_scene.h"
+
+static const double press_m[3] = {0, 0, 0.055};
+enum { POINTS = 3, STEPS = 100, FINE = 11 };
+static pal_scene scene;
+static pal_prepared mesh;
+static pal_priced_setting point[POINTS];
+
+/* ---- a study of the ball as it is pressed ---- */
+
+/* shown places at rest under the press, heap [n][3] */
+static float *find_rest(const pal_setting *s, int *n)
+{
+    pal_note note = {""};
+    pal_set_scene *set = NULL;
+    pal_world *w = NULL;
+    pal_pose p = {.quat = {1, 0, 0, 0}};
+    memcpy(p.position_m, press_m, sizeof press_m);
+    if (s && pal_setting_make(&scene, 0, s, &note, &set)) CHECK_FAIL("%s", note.text);
+    if (pal_world_create(set ? &set->scene : &scene, &note, &w)) CHECK_FAIL("%s", note.text);
+    pal_world_pose(w, 0, &p);
+    for (int k = 0; k < STEPS; k++) CHECK(!pal_world_step(w, scene.step_s));
+    const pal_body *b = pal_world_body(w, 0);
+    float *x = malloc(3 * sizeof *x * (size_t)b->n_shown);
+    if (!x) abort();
+    memcpy(x, b->shown, 3 * sizeof *x * (size_t)b->n_shown);
+    *n = b->n_shown;
+    pal_world_destroy(w);
+    pal_set_scene_free(set);
+    return x;
+}
+
+static double farthest(const float *a, const float *b, int n)
+{
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double far = 0;
+        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
+        most = fmax(most, sqrt(far));
+    }
+    return most;
+}
+
+static void make_study(void)
+{
+    const pal_setting right = {.model = "fem", .element = "hex8_bbar", .size = FINE};
+    int n, n_right;
+    REQUIRE(small_scene(&scene, &mesh, 8));
+    scene.body[0].material.damping_1_s = 10;
+    scene.body[0].material.young_Pa = 5e4;
+    scene.body[0].support[0].fraction = 0.2;
+    order_point(&point[0], "tet_springs", "", 0);
+    order_point(&point[1], "fem", "hex8_bbar", 6);
+    order_point(&point[2], "fem", "tet4", 8);
+    point[0].setting.k_area_J = -1;
+    float *best = find_rest(&right, &n_right);
+    for (int i = 0; i < POINTS; i++) {
+        float *x = find_rest(i ? &point[i].setting : NULL, &n);
+        REQUIRE(n == n_right);
+        point[i].error_m = farthest(x, best, n);
+        free(x);
+    }
+    free(best);
+}
+
+/* ---- over the wire ---- */
+
+static uint32_t seq;
+
+/* n more steps */
+static void wait_steps(mem_client *c, int n, bool pressed)
+{
+    int until = c->n_tools + n;
+    for (int i = 0; i < 40000 && c->n_tools < until; i++) {
+        if (pressed && i % 8 == 0) mem_pose(c, 0, ++seq, press_m);
+        turn(c, NULL);
+    }
+    CHECK(c->n_tools >= until);
+}
+
+static void check_jump(const mem_client *c)
+{
+    const char *text = c->last[PAL_CONTROL_ANSWER].answer.text;
+    double bound_m = told(c, "bound_m");
+    CHECK_NEAR(bound_m, told(c, "error_before_m") + told(c, "error_after_m"), 1e-12);
+    CHECK_LE(fabs(told(c, "energy_percent")), 2);
+    CHECK(told(c, "energy_before_J") > 1e-4);
+    CHECK(told(c, "most_move_m") > 0 && told(c, "body_move_m") > 0);
+    CHECK(strstr(text, told(c, "most_move_m") <= bound_m ? "within the bound" : "beyond the bound") != NULL);
+    CHECK(!strstr(text, "beyond 2 %"));
+}
+
+static void every_pair_keeps_the_errors_shown(void)
+{
+    static const int way[] = {1, 2, 0, 2, 1, 0};
+    mem_client c;
+    char args[32];
+    order_begin(&scene, point, POINTS);
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    wait_steps(&c, 60, true);
+    for (int k = 0, at = 0; k < 6; at = way[k++]) {
+        snprintf(args, sizeof args, "\"index\":%d", way[k]);
+        CHECK(order(&c, "point", args));
+        check_jump(&c);
+        CHECK_LE(told(&c, "most_move_m"), told(&c, "bound_m"));
+        CHECK_NEAR(told(&c, "error_before_m"), point[at].error_m, 1e-9);
+        CHECK_NEAR(told(&c, "error_after_m"), point[way[k]].error_m, 1e-9);
+        until_frame(&c);
+        wait_steps(&c, 20, true);
+    }
+    /* the loop, which is this thread, has carried none of them */
+    CHECK_INT((int)pal_switch_carried_here(), 0);
+    mem_end(&c);
+    end();
+}
+
+static const pal_wire_neighbour *next_size(const pal_wire_estimate *e)
+{
+    for (uint32_t i = 0; i < e->n_neighbour; i++)
+        if (e->neighbour[i].size > 0 && isfinite(e->neighbour[i].error_m)) return &e->neighbour[i];
+    return NULL;
+}
+
+/* while somebody looks the bound is that of the estimate and of the neighbour on the knob. At rest under its weight a
+ * point of the body goes by a part of it; its skin, which hangs on other nodes then, by about all of it */
+static void a_knob_keeps_the_errors_foreseen(bool pressed)
+{
+    mem_client c;
+    char args[64];
+    order_begin(&scene, point, POINTS);
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    wait_steps(&c, 5, pressed);
+    CHECK(order(&c, "point", "\"index\":1"));
+    until_frame(&c);
+    wait_steps(&c, 60, pressed);
+    send(&c, "estimate", "\"on\":1");
+    const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
+    for (int i = 0; i < 400 && !(e->tick > 0 && next_size(e)); i++) wait_steps(&c, 2, pressed);
+    const pal_wire_neighbour *next = next_size(e);
+    REQUIRE(next);
+    double now_m = e->error_m, then_m = next->error_m;
+    snprintf(args, sizeof args, "\"size\":%u", next->size);
+    CHECK(order(&c, "knob", args));
+    check_jump(&c);
+    if (!pressed) CHECK_LE(told(&c, "body_move_m"), told(&c, "bound_m"));
+    printf("  %s: moved %.3f mm, a point of the body %.3f mm, bound %.3f mm\n",
+           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "most_move_m"), 1e3 * told(&c, "body_move_m"),
+           1e3 * told(&c, "bound_m"));
+    CHECK_NEAR(told(&c, "error_before_m"), now_m, 0.2 * now_m);
+    CHECK_NEAR(told(&c, "error_after_m"), then_m, 0.2 * then_m);
+    mem_end(&c);
+    end();
+}
+
+static void a_knob_at_rest_keeps_the_errors_foreseen(void)
+{
+    a_knob_keeps_the_errors_foreseen(false);
+}
+
+/* right under the ball of a tool one vertex may go farther than an estimate of the whole body says: then it is told */
+static void a_knob_under_a_press_tells_what_it_keeps(void)
+{
+    a_knob_keeps_the_errors_foreseen(true);
+}
+
+/* no study, and nobody looks: what it moved is told, a bound is not made up */
+static void without_errors_shown_there_is_no_bound(void)
+{
+    mem_client c;
+    order_begin(&scene, NULL, 0);
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    wait_steps(&c, 20, true);
+    CHECK(order(&c, "knob", "\"step_ms\":4"));
+    CHECK(isnan(told(&c, "bound_m")) && told(&c, "most_move_m") >= 0);
+    CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
+    mem_end(&c);
+    end();
+}
+
+int main(void)
+{
+    make_study();
+    RUN(every_pair_keeps_the_errors_shown);
+    RUN(a_knob_at_rest_keeps_the_errors_foreseen);
+    RUN(a_knob_under_a_press_tells_what_it_keeps);
+    RUN(without_errors_shown_there_is_no_bound);
+    pal_prepared_free(&mesh);
+    return check_report();
+}
