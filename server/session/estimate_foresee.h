@@ -6,12 +6,17 @@
  * None for calibrated springs, whose constants are of one size.
  * step (implicit solvers): half and twice; each of them takes as long, the part of time goes with step^solver order.
  * tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was
- * measured to cost. */
+ * measured to cost.
+ * What a switch would refuse is not offered: pal_switch_check, and more sub-steps in a step than the scene allows (of
+ * explicit solvers as many more as elements are smaller; in a longer step as many more as it is longer). */
 #ifndef PAL_SESSION_ESTIMATE_FORESEE_H
 #define PAL_SESSION_ESTIMATE_FORESEE_H
 #include "server/session/estimate.h"
 
 typedef struct pal_foresight {
+    const pal_scene *scene; /* of the body, as it is; NULL: all is taken */
+    int body;
+    int n_substep;       /* of a step now, all bodies; 0: not known */
     pal_setting setting; /* as it is */
     double growth;       /* of a step's time with the nodes; NaN: not known, no neighbours in size */
     double order;        /* of the elements */

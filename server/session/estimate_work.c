@@ -231,6 +231,7 @@ static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body,
 {
     PAL_TRY(make_scene(w, scene, body, note));
     pal_setting_of(scene, body, &w->foresight.setting);
+    w->foresight.scene = w->scene, w->foresight.body = 0;
     PAL_TRY(make_live(w, note));
     if (pal_world_body(w->live, 0)->shell)
         return pal_note_set(
@@ -550,6 +551,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
     if (!stopped(w)) find_rests(w, out);
     sum_up(w, out);
     if (!stopped(w)) price_size(w);
+    w->foresight.n_substep = w->state.n_substep;
     pal_estimate_foresee(&w->foresight, out);
     return !stopped(w);
 }

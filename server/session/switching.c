@@ -10,6 +10,15 @@ struct pal_switch {
     pal_transfer_report report;
 };
 
+pal_err pal_switch_check(const pal_scene *scene, int body, const pal_setting *to, pal_note *note)
+{
+    PAL_TRY(pal_setting_check(scene, body, to, note));
+    double n_node = pal_setting_nodes(scene, body, to);
+    if (n_node <= PAL_SWITCH_NODES) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
+                        to->size, n_node, PAL_SWITCH_NODES);
+}
+
 static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
                        pal_note *note, pal_switch *s)
 {
@@ -21,10 +30,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
         s->from.body[body] = *base;
         s->from.body[body].material = scene->body[body].material;
     }
-    double n_node = pal_setting_nodes(&s->from, body, to);
-    if (n_node > PAL_SWITCH_NODES)
-        return pal_note_set(note, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
-                            to->size, n_node, PAL_SWITCH_NODES);
+    PAL_TRY(pal_switch_check(&s->from, body, to, note));
     PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
     pal_setting_of(scene, body, &now);
     pal_setting_of(&s->set->scene, body, &next);

@@ -441,13 +441,11 @@ static pal_err change(const pal_scene *from, const pal_setting *now, const pal_s
     return pal_scene_check(&set->scene, note);
 }
 
-pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to, pal_note *note, pal_set_scene **out)
+pal_err pal_setting_check(const pal_scene *from, int body, const pal_setting *to, pal_note *note)
 {
-    *out = NULL;
     if (body < 0 || body >= from->n_body)
         return pal_note_set(note, PAL_ERR_REFUSED, "body %d: the scene has %d", body, from->n_body);
     const pal_body_def *def = &from->body[body];
-    pal_setting now;
     PAL_TRY(pal_setting_fits(def, to->model, note));
     PAL_TRY(check_words(to, note));
     PAL_TRY(check_numbers(to, note));
@@ -455,6 +453,14 @@ pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to,
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "body \"%s\" is painted (%d strokes), and model \"%s\" cannot be painted", def->name,
                             def->n_stroke, to->model);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to, pal_note *note, pal_set_scene **out)
+{
+    pal_setting now;
+    *out = NULL;
+    PAL_TRY(pal_setting_check(from, body, to, note));
     pal_set_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
     set->scene = *from;

@@ -52,6 +52,9 @@ typedef struct pal_set_scene {
 /* What a support of the kind `lowest` holds now as a box, so that another mesh holds the same part of the body; false:
  * it is of another kind, or up is along no axis */
 bool pal_setting_box(const pal_scene *scene, int body, int support, pal_support *out);
+/* What pal_setting_make refuses before it makes anything: a body that does not take it, an unknown word, a size or
+ * number out of range. [any] */
+pal_err pal_setting_check(const pal_scene *from, int body, const pal_setting *to, pal_note *note);
 /* Makes it: keeps material, supports, regions, effects, tools and the keys of model and solver that a setting does not
  * speak of; prepares voxels anew from the body's shown surface when the size differs, or when finite elements find no
  * measured fill. Cut voxels count by their filled share, those less than a quarter full are dropped unless more than
