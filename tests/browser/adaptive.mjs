@@ -40,11 +40,8 @@ const middlePixel = (page) => page.evaluate(() => {
     }
   return null;
 });
-/** pictures are drawn when something changes: waits for the one that shows it */
-const drawn = async (page) => {
-  const { stage } = await until(() => page.evaluate(() => ({ stage: !window.palpate.stage.dirty && window.palpate.stage.ready() })), (s) => s.stage);
-  return stage;
-};
+/** pictures are drawn when something changes: waits for the one that shows it; while frames come it is never the last */
+const drawn = (page) => until(() => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()), (last) => last, 3000);
 
 let server;
 const browsers = [];

@@ -155,7 +155,7 @@ static void a_tool_is_held_on_however_long_it_takes(void)
     const pal_setting to = {.model = "fem", .element = "hex8_bbar", .size = 8};
     const pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
     bool starved = true;
-    for (int round = 0; round < 10 && starved; round++) {
+    for (int round = 0; round < CHECK_REPEATS(10, 2) && starved; round++) {
         pal_session *s = NULL, *next = NULL;
         pal_switch *change = NULL;
         pal_note note = {""};

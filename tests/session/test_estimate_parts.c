@@ -1,0 +1,280 @@
+/* What estimates say, on the thread that asks: the parts of the error, neighbours on the knobs, what is not known. The
+ * thread that makes them beside a session: test_estimate. */
+#include "server/session/estimate_foresee.h"
+#include "server/session/estimate_work.h"
+#include "server/sim/world.h"
+#include "tests/check.h"
+#include "tests/session/clay.h"
+#include "tests/session/estimate_scene.h"
+
+/* pushed from the side by all nodes of its upper half for a while, then as it is after some free steps */
+static pal_world *swinging(const pal_scene *at, int n_free)
+{
+    pal_world *w = NULL;
+    if (pal_world_create(at, NULL, &w)) abort();
+    const pal_body *body = pal_world_look(w, 0);
+    for (int push = 1; push >= 0; push--) {
+        for (int i = 0; i < body->n_node; i++)
+            if (body->node_rest[3 * i + 2] > 0) CHECK(!pal_world_load(w, 0, i, (double[3]){push * 1e-4, 0, 0}));
+        for (int k = 0; k < (push ? 10 : n_free); k++) CHECK(!pal_world_step(w, at->step_s));
+    }
+    return w;
+}
+
+static bool estimate_of(const pal_scene *at, const pal_world *w, pal_estimate *out)
+{
+    pal_estimate_work *work = NULL;
+    pal_note note = {""};
+    bool good = !pal_estimate_work_open(at, 0, NULL, &note, &work);
+    if (!good) printf("  %s\n", note.text);
+    if (good) {
+        pal_estimate_state *state = pal_estimate_work_state(work);
+        for (int i = 0; i < 5; i++) state->ms[state->n_ms++] = (float)(1 + i);
+        good = pal_estimate_copy(state, w, 0) && pal_estimate_work_run(work, out);
+    }
+    pal_estimate_work_close(work);
+    return good;
+}
+
+/* six steps from where w is, and the same by steps of a 16th with next to nothing left by the solver */
+static double true_time_error(const pal_scene *at, const pal_world *w)
+{
+    pal_scene *exact = malloc(sizeof *exact);
+    pal_world *a[2] = {NULL, NULL};
+    const pal_body *from = pal_world_look(w, 0);
+    double most = 0;
+    if (!exact) abort();
+    *exact = *at;
+    pal_item_put_number(&exact->body[0].solver, "tolerance", 1e-10, NULL);
+    pal_item_put_number(&exact->body[0].solver, "iterations", 300, NULL);
+    for (int k = 0; k < 2; k++) {
+        CHECK(!pal_world_create(exact, NULL, &a[k]));
+        pal_body *body = pal_world_body(a[k], 0);
+        memcpy(body->x, from->x, 24 * (size_t)body->n_dof);
+        memcpy(body->v, from->v, 24 * (size_t)body->n_dof);
+        pal_world_moved(a[k], 0);
+        for (int i = 0; i < (k ? 6 * 16 : 6); i++) CHECK(!pal_world_step(a[k], at->step_s / (k ? 16 : 1)));
+    }
+    const double *x = pal_world_look(a[0], 0)->x, *y = pal_world_look(a[1], 0)->x;
+    for (int i = 0; i < from->n_dof; i++)
+        most = fmax(most, sqrt(pow(x[3 * i] - y[3 * i], 2) + pow(x[3 * i + 1] - y[3 * i + 1], 2) +
+                               pow(x[3 * i + 2] - y[3 * i + 2], 2)));
+    for (int k = 0; k < 2; k++) pal_world_destroy(a[k]);
+    free(exact);
+    return most;
+}
+
+static void the_part_of_time_is_what_shorter_steps_change(void)
+{
+    static const char *const solvers[] = {"implicit_euler", "sdirk2"};
+    for (int k = 0; k < 2; k++) {
+        pal_scene *fem = fem_scene();
+        pal_item_init(&fem->body[0].solver, "solver", solvers[k]);
+        pal_world *w = swinging(fem, 2);
+        pal_estimate e;
+        REQUIRE(estimate_of(fem, w, &e));
+        double true_m = true_time_error(fem, w);
+        printf("  %s: true %.3g mm, estimate %.3g mm: %.2f\n", solvers[k], 1e3 * true_m, 1e3 * e.time_m,
+               e.time_m / true_m);
+        CHECK(e.time_m >= 0.5 * true_m && e.time_m <= 2 * true_m);
+        CHECK(e.algebraic_m > 0 && e.algebraic_m < 0.1 * e.most_m);
+        pal_world_destroy(w);
+        free(fem);
+    }
+}
+
+static void a_looser_solver_leaves_more(void)
+{
+    double left[2];
+    for (int k = 0; k < 2; k++) {
+        pal_scene *fem = fem_scene();
+        pal_estimate e;
+        pal_item_put_number(&fem->body[0].solver, "tolerance", k ? 1e-5 : 0.1, NULL);
+        pal_world *w = swinging(fem, 2);
+        REQUIRE(estimate_of(fem, w, &e));
+        left[k] = e.algebraic_m;
+        pal_world_destroy(w);
+        free(fem);
+    }
+    printf("  left %.3g %.3g mm\n", 1e3 * left[0], 1e3 * left[1]);
+    CHECK(left[1] > 0 && left[1] < 0.1 * left[0]);
+}
+
+static void every_part_is_known_of_finite_elements_and_of_springs(void)
+{
+    /* springs have 1.5 s of processor time to come to rest in, which is too little under sanitizers */
+    for (int k = 0; k < CHECK_REPEATS(2, 1); k++) {
+        pal_scene *at = fem_scene();
+        if (k) *at = scene, at->body[0].n_effect = 0;
+        pal_world *w = swinging(at, 0);
+        pal_estimate e;
+        REQUIRE(estimate_of(at, w, &e));
+        printf("  %s: largest way %.3g mm; discretisation %.3g, algebraic %.3g, time %.3g, model %.3g mm, zz %.3g %%, "
+               "%s\n",
+               at->body[0].model.name, 1e3 * e.most_m, 1e3 * e.discretisation_m, 1e3 * e.algebraic_m, 1e3 * e.time_m,
+               1e3 * e.model_m, e.zz_percent, e.note);
+        CHECK_NEAR(e.error_m, e.discretisation_m + e.algebraic_m + e.time_m + e.model_m, 1e-15);
+        CHECK(k == 0 || e.model_m < 0.5 * e.most_m + 2 * e.discretisation_m);
+        CHECK(e.discretisation_m > 0 && e.model_m > 0 && e.zz_percent > 0 && e.zz_percent < 100);
+        CHECK(k ? e.algebraic_m == 0 : e.algebraic_m > 0);
+        CHECK(!e.locking);
+        CHECK_NEAR(e.ms, 3, 0);
+        CHECK_TEXT(e.note, "");
+        CHECK_INT(e.n_neighbour, k ? 2 : 6);
+        CHECK_INT(e.neighbour[0].setting.size, 4);
+        CHECK_INT(e.neighbour[1].setting.size, 16);
+        CHECK(e.neighbour[0].ms < e.ms && e.neighbour[1].ms > e.ms);
+        CHECK(e.neighbour[0].error_m > e.error_m && e.neighbour[1].error_m < e.error_m);
+        pal_world_destroy(w);
+        free(at);
+    }
+}
+
+static void neighbours_follow_the_models_of_cost_and_error(void)
+{
+    pal_foresight from = {.setting = {.model = "fem", .size = 20, .step_s = 0.01},
+                          .growth = 1.5,
+                          .order = 2,
+                          .implicit = true,
+                          .solver_order = 1,
+                          .tolerance = 0.01,
+                          .decade = 1.25};
+    pal_estimate e = {
+        .ms = 2, .discretisation_m = 0.8, .time_m = 0.4, .algebraic_m = 0.1, .model_m = NAN, .error_m = 1.3};
+    const double ms[6] = {2 / pow(8, 1.5), 2 * pow(8, 1.5), 1, 4, 1.6, 2.5},
+                 error[6] = {1.3 + 2.4, 1.3 - 0.6, 1.7, 1.1, 2.2, 1.21};
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 6);
+    for (int i = 0; i < 6; i++) {
+        CHECK_NEAR(e.neighbour[i].ms, ms[i], 1e-12);
+        CHECK_NEAR(e.neighbour[i].error_m, error[i], 1e-12);
+    }
+    CHECK_INT(e.neighbour[0].setting.size, 10);
+    CHECK_NEAR(e.neighbour[3].setting.step_s, 0.005, 1e-15);
+    CHECK_NEAR(e.neighbour[4].setting.tolerance, 0.1, 1e-15);
+    /* what is not known is not foreseen */
+    e.discretisation_m = NAN, from.growth = NAN, from.decade = NAN;
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 2);
+    CHECK_INT(e.neighbour[0].setting.size, 20);
+    /* what a choice costs is known without the error that it changes */
+    e.error_m = NAN;
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 2);
+    CHECK_NEAR(e.neighbour[1].ms, 4, 1e-12);
+    CHECK(isnan(e.neighbour[0].error_m) && isnan(e.neighbour[1].error_m));
+}
+
+/* constants of springs go with the cube of their edge */
+static void calibrated_springs_have_no_neighbour_in_size(void)
+{
+    pal_foresight from = {.setting = {.model = "tet_springs", .size = 20, .step_s = 0.01}, .growth = 1.5, .order = 1.5};
+    pal_estimate e = {.ms = 2, .discretisation_m = 0.8, .model_m = 0.1, .error_m = 0.9};
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 2);
+    from.setting.k_distance_J = 1e-3;
+    pal_estimate_foresee(&from, &e);
+    CHECK_INT(e.n_neighbour, 0);
+}
+
+/* of control cells time and algebraic part alone are known: their sum is not the error */
+static void small_parts_alone_are_no_error(void)
+{
+    clay_scene clay;
+    pal_estimate e;
+    clay_make(&clay, 2, 0.1);
+    pal_item_init(&clay.scene.body[0].solver, "solver", "implicit_euler");
+    pal_world *w = swinging(&clay.scene, 2);
+    REQUIRE(estimate_of(&clay.scene, w, &e));
+    CHECK(e.time_m > 0 && e.algebraic_m >= 0 && isnan(e.discretisation_m) && isnan(e.model_m));
+    CHECK(isnan(e.error_m));
+    CHECK(e.n_neighbour >= 2 && isnan(e.neighbour[0].error_m));
+    CHECK_NEAR(e.neighbour[0].ms, e.ms / 2, 1e-12);
+    pal_world_destroy(w);
+    clay_free(&clay);
+}
+
+static void elements_that_lock_say_so(void)
+{
+    static const char *const element[] = {"tet4", "hex8", "hex8_bbar"};
+    for (int k = 0; k < 3; k++) {
+        pal_scene *fem = fem_scene();
+        pal_estimate e;
+        pal_item_put_text(&fem->body[0].model, "element", element[k], NULL);
+        fem->body[0].material.poisson = 0.499;
+        pal_world *w = swinging(fem, 0);
+        REQUIRE(estimate_of(fem, w, &e));
+        CHECK(e.locking == (k < 2));
+        pal_world_destroy(w);
+        free(fem);
+    }
+}
+
+static bool estimate_again(pal_estimate_work *work, const pal_world *w, pal_estimate *out)
+{
+    return pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, out);
+}
+
+/* at rest while gravity is off, not so when it is on */
+static void rows_switched_off_are_off_for_the_estimate(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_estimate_work *work = NULL;
+    pal_world *w = NULL;
+    pal_estimate e, fresh;
+    pal_item_init(&fem->body[0].effect[0], "effect", "gravity");
+    pal_item_put_number(&fem->body[0].effect[0], "acceleration_m_s2", 0.2, NULL);
+    fem->body[0].n_effect = 1;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
+    for (int round = 0; round < 2; round++) {
+        CHECK(!pal_world_switch_row(w, fem, 0, "gravity", false, NULL));
+        REQUIRE(estimate_again(work, w, &e));
+        REQUIRE(estimate_of(fem, w, &fresh));
+        CHECK_LE(fresh.error_m, 1e-12);
+        CHECK_LE(e.error_m, round ? 1e-9 : 1e-12);
+        CHECK(!pal_world_switch_row(w, fem, 0, "gravity", true, NULL));
+        REQUIRE(estimate_again(work, w, &e));
+        REQUIRE(estimate_of(fem, w, &fresh));
+        printf("  on: %.6g, made for it %.6g mm; algebraic %.3g, %.3g mm\n", 1e3 * e.discretisation_m,
+               1e3 * fresh.discretisation_m, 1e3 * e.algebraic_m, 1e3 * fresh.algebraic_m);
+        CHECK(fresh.discretisation_m > 1e-7);
+        CHECK_NEAR(e.discretisation_m, fresh.discretisation_m, 1e-3 * fresh.discretisation_m);
+        CHECK_NEAR(e.algebraic_m, fresh.algebraic_m, 1e-3 * fresh.algebraic_m + 1e-12);
+    }
+    pal_estimate_work_close(work);
+    pal_world_destroy(w);
+    free(fem);
+}
+
+static void a_body_at_rest_has_no_error(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_world *w = NULL;
+    pal_estimate e;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    fem->body[0].n_effect = 0;
+    REQUIRE(estimate_of(fem, w, &e));
+    printf("  at rest: discretisation %.3g, time %.3g, algebraic %.3g, model %.3g m, %s\n", e.discretisation_m,
+           e.time_m, e.algebraic_m, e.model_m, e.note);
+    CHECK_LE(e.error_m, 1e-12);
+    CHECK_LE(e.most_m, 0);
+    pal_world_destroy(w);
+    free(fem);
+}
+
+int main(void)
+{
+    if (!estimate_scene(8)) return 1;
+    RUN(the_part_of_time_is_what_shorter_steps_change);
+    RUN(a_looser_solver_leaves_more);
+    RUN(every_part_is_known_of_finite_elements_and_of_springs);
+    RUN(neighbours_follow_the_models_of_cost_and_error);
+    RUN(calibrated_springs_have_no_neighbour_in_size);
+    RUN(small_parts_alone_are_no_error);
+    RUN(elements_that_lock_say_so);
+    RUN(rows_switched_off_are_off_for_the_estimate);
+    RUN(a_body_at_rest_has_no_error);
+    pal_prepared_free(&mesh);
+    return check_report();
+}
