@@ -13,7 +13,7 @@ int command_bench(int argc, char **argv)
     const pal_flag_table table = {
         .usage =
             "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | guards | calibrate [FOLDER] | protocol | "
-            "sleep | latency [flags]",
+            "sleep | estimate | latency [flags]",
         .about = "Measures this machine, medians of several runs:\n"
                  "  mesh      preparation of tetrahedra at several resolutions (of a "
                  "procedural organ without SURFACE)\n"
@@ -26,6 +26,7 @@ int command_bench(int argc, char **argv)
                  "  guards    what being on guard costs while nothing goes wrong, as a share of a step\n"
                  "  protocol  encoding and decoding of frames\n"
                  "  sleep     bodies at rest: awake, watched by nobody, asleep\n"
+                 "  estimate  what is foreseen of a live setting's neighbours against what they take and leave\n"
                  "  latency   from a pose put into a session to the frame that shows it\n",
         .flag = flag,
         .n_flag = sizeof flag / sizeof flag[0],
@@ -55,6 +56,7 @@ int command_bench(int argc, char **argv)
     if (!strcmp(word[0], "guards")) return bench_guards(common.json);
     if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
     if (!strcmp(word[0], "sleep")) return bench_sleep(common.json);
+    if (!strcmp(word[0], "estimate")) return bench_estimate(common.json);
     if (!strcmp(word[0], "latency")) return bench_latency(common.json);
     fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);
     return 2;

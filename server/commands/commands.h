@@ -30,6 +30,7 @@ int bench_springs(bool json);
 int bench_protocol(bool json);
 int bench_latency(bool json);
 int bench_sleep(bool json);
+int bench_estimate(bool json);
 int bench_fem(bool json);
 int bench_solids(bool json);
 int bench_guards(bool json);

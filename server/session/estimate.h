@@ -41,6 +41,9 @@ typedef struct pal_estimate {
     /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
     int n_neighbour;
     pal_priced_setting neighbour[PAL_ESTIMATE_NEIGHBOURS];
+    /* nodes that each is thought to have (within 25 %, pal_setting_nodes; as many as now where the mesh stays), and
+     * sub-steps in a step of its own at rest [n_neighbour] */
+    int neighbour_nodes[PAL_ESTIMATE_NEIGHBOURS], neighbour_substeps[PAL_ESTIMATE_NEIGHBOURS];
     char note[160];
 } pal_estimate;
 

@@ -2,8 +2,9 @@
  * foreseen to cost and to leave. Private to estimate_*.c. Thread: any.
  *
  * ms is what a step of the scene takes, as it is now (setting.h: a shorter step is priced by two of them).
- * size: half and twice; time goes with n^growth, n being 8 times the nodes, the part of discretisation with h^order.
- * None for calibrated springs, whose constants are of one size.
+ * size: half and twice. `fixed` of a step's time is of what does not go with the mesh (what is shown, contact, guards)
+ * and stays; the rest goes with the sub-steps and with what one of them takes (estimate_price.h). The part of
+ * discretisation goes with h^order. None for calibrated springs, whose constants are of one size.
  * step (implicit solvers): half and twice; each of them takes as long, the part of time goes with step^solver order.
  * tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was
  * measured to cost.
@@ -16,14 +17,18 @@
 typedef struct pal_foresight {
     const pal_scene *scene; /* of the body, as it is; NULL: all is taken */
     int body;
-    int n_substep;       /* of a step now, all bodies; 0: not known */
-    pal_setting setting; /* as it is */
-    double growth;       /* of a step's time with the nodes; NaN: not known, no neighbours in size */
-    double order;        /* of the elements */
-    bool implicit;       /* the knobs step and tolerance mean something */
-    int solver_order;    /* in time */
-    double tolerance;    /* of the solver as it is */
-    double decade;       /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
+    int n_substep;             /* of a step now, all bodies; 0: not known */
+    pal_setting setting;       /* as it is */
+    int n_node, rest_substeps; /* as it is; of a step at rest, of the body alone */
+    double fixed;              /* share of a step's time that stays */
+    /* half and twice the size, over what is now: nodes as they are thought to be, sub-steps, time of a sub-step; NaN:
+     * not known, no neighbour in size */
+    double nodes[2], substeps[2], work[2];
+    double order;     /* of the elements */
+    bool implicit;    /* the knobs step and tolerance mean something */
+    int solver_order; /* in time */
+    double tolerance; /* of the solver as it is */
+    double decade;    /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
 } pal_foresight;
 
 /* fills neighbour from ms and the parts that out has; those whose ms or change of

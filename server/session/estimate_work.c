@@ -1,6 +1,6 @@
 /* The parts of the error of one body: its own scene, the steps ahead (time and algebraic parts), the rests (the other
  * parts). */
-#include "server/session/estimate_foresee.h"
+#include "server/session/estimate_price.h"
 #include "server/session/estimate_rest.h"
 
 #include "server/base/clock.h"
@@ -12,8 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_AHEAD = 12, MOST_SETTLE = 600, TIMED = 7 };
-static const double least_growth = 0.8, most_growth = 2.2;
+enum { MOST_AHEAD = 12, MOST_SETTLE = 600 };
 static const double ahead_s = 0.1, ahead_ms = 400, tight = 1e-9;
 /* springs are at rest when they move by less of the largest displacement */
 static const double still = 2e-3, most_ratio = 0.8, settle_s = 1.5;
@@ -125,7 +124,8 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
     pal_foresight *f = &w->foresight;
     f->implicit = implicit;
     f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
-    f->growth = f->decade = NAN;
+    f->work[0] = f->work[1] = f->decade = NAN;
+    f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
     f->order = order;
     f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : usual_tolerance;
     if (!implicit && !cg) return PAL_ERR_OK;
@@ -301,6 +301,22 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
     return PAL_ERR_OK;
 }
 
+/* what is shown, contact and guards took in the last step */
+static double fixed_ms(const pal_world *world, int body)
+{
+    const char *of = pal_world_look(world, body)->name;
+    double sum_ns = 0;
+    for (int i = 0; i < pal_world_rows(world); i++) {
+        const pal_row *row = pal_world_effect(world, i);
+        pal_row_info info;
+        pal_world_row(world, i, &info);
+        if (info.body != of) continue;
+        if (row->effect->stage != PAL_STAGE_FORCE && row->effect->stage != PAL_STAGE_SOLVE)
+            sum_ns += (double)row->spent_ns;
+    }
+    return 1e-6 * sum_ns;
+}
+
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
 {
     const pal_body *from = pal_world_look(world, body);
@@ -313,6 +329,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->tick = pal_world_tick(world);
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
+    state->fixed_ms = fixed_ms(world, body);
     pal_world_material_now(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;
@@ -392,24 +409,7 @@ static void look_ahead(pal_estimate_work *w, pal_estimate *out)
     out->time_m = most_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->foresight.solver_order));
 }
 
-/* a few steps of a world from rest under the loads it has; what one took, the median, ms; NaN: they went wrong */
-static double time_steps(pal_world *world, double step_s)
-{
-    pal_body *body = pal_world_body(world, 0);
-    float ms[TIMED];
-    memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_dof);
-    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    pal_world_moved(world, 0);
-    for (int k = 0; k < TIMED; k++) {
-        uint64_t began = pal_clock_thread_ns();
-        if (pal_world_step(world, step_s)) return NAN;
-        ms[k] = 1e-6f * (float)(pal_clock_thread_ns() - began);
-    }
-    qsort(ms, TIMED, sizeof *ms, rising);
-    return (double)ms[TIMED / 2];
-}
-
-/* growth: the body's own method on the coarse mesh and on this one, under the same loads, once */
+/* the body's own method on the coarse mesh and on this one, under the same loads, once */
 static void price_size(pal_estimate_work *w)
 {
     pal_world *small = NULL;
@@ -427,10 +427,7 @@ static void price_size(pal_estimate_work *w)
         body->load_cap_N = INFINITY;
         for (int i = 0; i < body->n_node && body->n_node == loaded->n_node; i++)
             (void)pal_world_load(small, 0, i, loaded->outer + 3 * (size_t)i);
-        double coarse = time_steps(small, scene->step_s), fine = time_steps(w->live, scene->step_s);
-        double times = (double)w->state.n_node / body->n_node;
-        if (coarse > 0 && fine > 0 && times > 1)
-            w->foresight.growth = fmin(fmax(log(fine / coarse) / log(times), least_growth), most_growth);
+        pal_estimate_price(w->scene, w->live, small, &w->foresight);
     }
     pal_world_destroy(small);
     free(scene);
@@ -552,6 +549,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
     sum_up(w, out);
     if (!stopped(w)) price_size(w);
     w->foresight.n_substep = w->state.n_substep;
+    w->foresight.fixed = out->ms > 0 ? fmin(w->state.fixed_ms / out->ms, 1) : 0;
     pal_estimate_foresee(&w->foresight, out);
     return !stopped(w);
 }

@@ -13,9 +13,10 @@ typedef struct pal_estimate_state {
     uint64_t tick;
     double time_s;
     int n_dof, n_node;
-    double *x, *v; /* m, m/s [n_dof][3] */
-    double *load;  /* lasting and contact loads, N [n_node][3] */
-    int n_substep; /* of the step */
+    double *x, *v;   /* m, m/s [n_dof][3] */
+    double *load;    /* lasting and contact loads, N [n_node][3] */
+    int n_substep;   /* of the step */
+    double fixed_ms; /* of it in rows that are neither forces nor solver: what is shown, contact, guards */
     pal_material material;
     /* FORCE rows of the body: names from open on, and which of them are not switched off */
     const char *row[PAL_ESTIMATE_ROWS];

@@ -2,6 +2,7 @@
  * thread that makes them beside a session: test_estimate. */
 #include "server/session/estimate_foresee.h"
 #include "server/session/estimate_work.h"
+#include "server/session/switching.h"
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/session/clay.h"
@@ -133,7 +134,12 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
 static void neighbours_follow_the_models_of_cost_and_error(void)
 {
     pal_foresight from = {.setting = {.model = "fem", .size = 20, .step_s = 0.01},
-                          .growth = 1.5,
+                          .n_node = 1000,
+                          .rest_substeps = 3,
+                          .fixed = 0.25,
+                          .nodes = {0.2, 6},
+                          .substeps = {2.0 / 3, 2},
+                          .work = {0.1, 9},
                           .order = 2,
                           .implicit = true,
                           .solver_order = 1,
@@ -141,7 +147,7 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
                           .decade = 1.25};
     pal_estimate e = {
         .ms = 2, .discretisation_m = 0.8, .time_m = 0.4, .algebraic_m = 0.1, .model_m = NAN, .error_m = 1.3};
-    const double ms[6] = {2 / pow(8, 1.5), 2 * pow(8, 1.5), 1, 4, 1.6, 2.5},
+    const double ms[6] = {2 * (0.25 + 0.75 * 0.2 / 3), 2 * (0.25 + 0.75 * 18), 1, 4, 1.6, 2.5},
                  error[6] = {1.3 + 2.4, 1.3 - 0.6, 1.7, 1.1, 2.2, 1.21};
     pal_estimate_foresee(&from, &e);
     CHECK_INT(e.n_neighbour, 6);
@@ -149,11 +155,16 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
         CHECK_NEAR(e.neighbour[i].ms, ms[i], 1e-12);
         CHECK_NEAR(e.neighbour[i].error_m, error[i], 1e-12);
     }
+    const int nodes[6] = {200, 6000, 1000, 1000, 1000, 1000}, substeps[6] = {2, 6, 3, 3, 3, 3};
+    for (int i = 0; i < 6; i++) {
+        CHECK_INT(e.neighbour_nodes[i], nodes[i]);
+        CHECK_INT(e.neighbour_substeps[i], substeps[i]);
+    }
     CHECK_INT(e.neighbour[0].setting.size, 10);
     CHECK_NEAR(e.neighbour[3].setting.step_s, 0.005, 1e-15);
     CHECK_NEAR(e.neighbour[4].setting.tolerance, 0.1, 1e-15);
     /* what is not known is not foreseen */
-    e.discretisation_m = NAN, from.growth = NAN, from.decade = NAN;
+    e.discretisation_m = NAN, from.work[0] = from.work[1] = NAN, from.decade = NAN;
     pal_estimate_foresee(&from, &e);
     CHECK_INT(e.n_neighbour, 2);
     CHECK_INT(e.neighbour[0].setting.size, 20);
@@ -165,10 +176,58 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
     CHECK(isnan(e.neighbour[0].error_m) && isnan(e.neighbour[1].error_m));
 }
 
+/* what is foreseen of a neighbour's counts is what the switch to it makes: the same rows, as many sub-steps, nodes as
+ * pal_setting_nodes promises them */
+static void neighbours_are_what_a_switch_makes(void)
+{
+    for (int k = 0; k < 2; k++) {
+        pal_scene *from = fem_scene();
+        pal_set_scene *set = NULL;
+        pal_setting own;
+        if (k == 1) *from = scene, from->body[0].n_effect = 0;
+        /* in voxels as a switch makes them, so that they stay where the size does */
+        pal_setting_of(from, 0, &own);
+        own.size = 9;
+        REQUIRE(!pal_setting_make(from, 0, &own, NULL, &set));
+        const pal_scene *at = &set->scene;
+        pal_world *w = swinging(at, 0);
+        pal_estimate e;
+        REQUIRE(estimate_of(at, w, &e));
+        CHECK_INT(e.n_neighbour, k ? 2 : 6);
+        for (int i = 0; i < e.n_neighbour; i++) {
+            const pal_setting *to = &e.neighbour[i].setting;
+            pal_switch *change = NULL;
+            pal_world *next = NULL;
+            pal_note note = {""};
+            pal_err err = pal_switch_prepare(at, NULL, 0, to, &note, &change);
+            if (!err) err = pal_world_create(pal_switch_scene(change), &note, &next);
+            if (err) CHECK_FAIL("%s", note.text);
+            double nodes = pal_world_look(next, 0)->n_node;
+            printf("  %s %d voxels, %g ms: nodes %d foreseen, %g made, sub-steps %d, %d\n", to->model, to->size,
+                   1e3 * to->step_s, e.neighbour_nodes[i], nodes, e.neighbour_substeps[i], pal_world_substeps(next));
+            bool size = to->size != 9;
+            CHECK(size ? fabs(e.neighbour_nodes[i] - nodes) <= 0.25 * nodes : e.neighbour_nodes[i] == nodes);
+            CHECK_INT(e.neighbour_substeps[i], pal_world_substeps(next));
+            CHECK_INT(pal_world_rows(next), pal_world_rows(w));
+            for (int r = 0; r < pal_world_rows(w) && r < pal_world_rows(next); r++)
+                CHECK(pal_world_effect(next, r)->effect == pal_world_effect(w, r)->effect);
+            pal_world_destroy(next);
+            pal_switch_free(change);
+        }
+        pal_world_destroy(w);
+        pal_set_scene_free(set);
+        free(from);
+    }
+}
+
 /* constants of springs go with the cube of their edge */
 static void calibrated_springs_have_no_neighbour_in_size(void)
 {
-    pal_foresight from = {.setting = {.model = "tet_springs", .size = 20, .step_s = 0.01}, .growth = 1.5, .order = 1.5};
+    pal_foresight from = {.setting = {.model = "tet_springs", .size = 20, .step_s = 0.01},
+                          .nodes = {0.2, 6},
+                          .substeps = {1, 1},
+                          .work = {0.2, 7},
+                          .order = 1.5};
     pal_estimate e = {.ms = 2, .discretisation_m = 0.8, .model_m = 0.1, .error_m = 0.9};
     pal_estimate_foresee(&from, &e);
     CHECK_INT(e.n_neighbour, 2);
@@ -270,6 +329,7 @@ int main(void)
     RUN(a_looser_solver_leaves_more);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);
+    RUN(neighbours_are_what_a_switch_makes);
     RUN(calibrated_springs_have_no_neighbour_in_size);
     RUN(small_parts_alone_are_no_error);
     RUN(elements_that_lock_say_so);

@@ -13,7 +13,9 @@ static pal_prepared mesh;
 static pal_foresight foresight(int size, bool implicit)
 {
     pal_foresight f = {.scene = &scene,
-                       .growth = 1.2,
+                       .nodes = {0.125, 8},
+                       .substeps = {1, 1},
+                       .work = {0.08, 12},
                        .order = 1.5,
                        .implicit = implicit,
                        .solver_order = 1,
