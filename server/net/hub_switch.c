@@ -128,6 +128,11 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms; energy %+.2f %%%s, ", verb,
              pal_setting_text(&now, text), made_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
     put_jump(hub, work, change, a);
+    if (hub->works->n_brush_over > 0) {
+        size_t n = strlen(a->text);
+        snprintf(a->text + n, sizeof a->text - n, "; brushes that ended: %d", hub->works->n_brush_over);
+    }
+    pal_hub_answer_arg(a, "brushes_over", hub->works->n_brush_over);
     pal_hub_answer_arg(a, "made_ms", made_ms);
     pal_hub_say(hub, c, hub->control);
 }

@@ -106,6 +106,25 @@ static void keep_works(pal_hub_place *at, pal_work *work, pal_waste *waste)
     work->turn = NULL;
 }
 
+/* Rows of brushes went with the session of before. A pressure begins anew in another setting, where it can be; handles,
+ * which pull from where they began, and brushes on cells that were edited are over. How many */
+static int begin_brushes(pal_hub_hand *hand, pal_hub_room *room, pal_work_kind kind)
+{
+    int n_over = 0;
+    for (int t = 0; t < PAL_TOOL_MAX; t++) {
+        pal_hub_hand *h = &hand[t];
+        const pal_member_entry *m =
+            h->brush.kind == PAL_BRUSH_NONE ? NULL : pal_members_find(&room->members, h->member);
+        pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = t, .brush = h->brush};
+        bool acts = m && m->tool == t, stays = acts && kind == PAL_WORK_SWITCH && h->brush.kind == PAL_BRUSH_INFLATE &&
+                                               room->stream->part[h->body].info.sculpts;
+        if (stays && pal_session_command(room->session, &command) == PAL_ERR_OK) continue;
+        n_over += acts;
+        *h = (pal_hub_hand){.member = 0};
+    }
+    return n_over;
+}
+
 /* what came out takes the place of what stands; false: that goes on as it was, note says why */
 static bool take_over(pal_hub *hub, pal_hub_works *s, pal_work *work)
 {
@@ -117,7 +136,7 @@ static bool take_over(pal_hub *hub, pal_hub_works *s, pal_work *work)
     room->stream = work->stream, room->session = work->next;
     work->next = NULL, work->stream = NULL;
     keep_works(&s->place[room - hub->room][s->body], work, &waste);
-    memset(s->hand[room - hub->room], 0, sizeof *s->hand); /* brushes are over */
+    s->n_brush_over = begin_brushes(s->hand[room - hub->room], room, work->kind);
     keep_assets(room, waste.stream);
     hub->session[room - hub->room] = NULL;
     room->own = true;

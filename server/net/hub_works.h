@@ -37,6 +37,7 @@ struct pal_hub_works {
     int n;
     pal_hub_waiting now;                  /* under way */
     int body;                             /* of now    */
+    int n_brush_over;                     /* brushes that ended when it took over */
     pal_hub_place (*place)[PAL_BODY_MAX]; /* [n_room] */
     pal_hub_hand (*hand)[PAL_TOOL_MAX];   /* [n_room] */
 };

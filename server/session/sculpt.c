@@ -295,6 +295,7 @@ void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
         memcpy(turn->next_v, turn->v, n_byte);
     }
     pal_world_follow(next, before, turn->body, turn->next_x, turn->next_v);
+    pal_world_loads_by_place(next, turn->body, before);
 }
 
 void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)

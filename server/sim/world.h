@@ -108,6 +108,9 @@ void pal_world_watch(pal_world *world, bool watched);
  * in their place (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are
  * over. Both stand still. Heap memory when a material has changed. [sim] */
 void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
+/* after it, of the edited body: each lasting load goes to the node that is nearest at rest to the one that bore it;
+ * their sum stays. Without memory it bears none. [sim] */
+void pal_world_loads_by_place(pal_world *world, int body, const pal_world *before);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
 /* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.

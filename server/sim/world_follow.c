@@ -14,6 +14,38 @@ static void copy_loads(pal_world *w, pal_body *to, const pal_body *from)
     if (to->outer) memcpy(to->outer, from->outer, n * sizeof *to->outer);
 }
 
+/* the node nearest to a place at rest, scene frame */
+static int nearest_node(const pal_body *body, const double at_m[3])
+{
+    double x[3], least = INFINITY;
+    int best = 0;
+    pal_sub3(x, at_m, body->offset_m);
+    for (int i = 0; i < body->n_node; i++) {
+        double far = pal_dist3(body->node_rest + 3 * (size_t)i, x);
+        if (far < least) least = far, best = i;
+    }
+    return best;
+}
+
+void pal_world_loads_by_place(pal_world *w, int b, const pal_world *before)
+{
+    const pal_body *from = &before->plan.body[b];
+    pal_body *to = &w->plan.body[b];
+    size_t n = 3 * (size_t)to->n_node;
+    if (!from->outer || n == 0) return;
+    if (!to->outer) to->outer = PAL_NEW(w->arena, double, n);
+    if (!to->outer) return;
+    memset(to->outer, 0, n * sizeof *to->outer);
+    for (int i = 0; i < from->n_node; i++) {
+        const double *force = from->outer + 3 * (size_t)i;
+        double at[3];
+        if (pal_dot3(force, force) == 0) continue;
+        pal_add3(at, from->node_rest + 3 * (size_t)i, from->offset_m);
+        double *sum = to->outer + 3 * (size_t)nearest_node(to, at);
+        pal_add3(sum, sum, force);
+    }
+}
+
 static bool same_shell(const pal_body *a, const pal_body *b)
 {
     return a->shell && b->shell && a->n_dof == b->n_dof && a->shell->levels.n_level == b->shell->levels.n_level &&

@@ -93,6 +93,44 @@ static void tools_stay_with_who_holds_them(void)
     end();
 }
 
+static double highest(const mem_client *c)
+{
+    double most = -1;
+    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) most = fmax(most, (double)c->position_m[3 * i + 2]);
+    return most;
+}
+
+static void wait_frames(mem_client *c, int n)
+{
+    for (int i = 0, until = c->n_frame + n; i < 20000 && c->n_frame < until; i++) turn(c, NULL);
+}
+
+/* a pressure goes on at another number of levels; where nothing can be sculpted it ends, and the answer says so */
+static void a_pressure_goes_on(void)
+{
+    mem_client c;
+    uint32_t seq = 0;
+    const double away[3] = {0, 0, 0.2};
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_pose(&c, 0, ++seq, away);
+    double rest = highest(&c);
+    CHECK(order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":2000"));
+    wait_frames(&c, 60);
+    double lifted = highest(&c) - rest;
+    CHECK(lifted > 0.001);
+    CHECK(order(&c, "point", "\"index\":2"));
+    CHECK_INT((int)told(&c, "brushes_over"), 0);
+    until_frame(&c);
+    wait_frames(&c, 60);
+    CHECK_NEAR(highest(&c) - rest, lifted, 0.5 * lifted);
+    CHECK(order(&c, "point", "\"index\":1"));
+    CHECK_INT((int)told(&c, "brushes_over"), 1);
+    CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "brushes that ended: 1") != NULL);
+    mem_end(&c);
+    end();
+}
+
 static void what_cannot_be_is_refused_with_a_sentence(void)
 {
     static const struct {
@@ -149,6 +187,7 @@ int main(void)
     setting(2, "subdivision_fem", "", 2);
     RUN(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
+    RUN(a_pressure_goes_on);
     RUN(what_cannot_be_is_refused_with_a_sentence);
     RUN(a_server_that_ends_in_the_middle_ends);
     clay_free(&clay);

@@ -124,6 +124,47 @@ static void a_body_goes_on_where_it_was_with_a_cell_more(void)
     studio_close(&s);
 }
 
+/* lasting loads stay where they were, whatever the numbers of nodes are now: by an edit and by its undo */
+static void lasting_loads_stay_by_place(void)
+{
+    const double force[2][3] = {{0.1, 0, -0.2}, {0, 0.3, 0}};
+    studio s;
+    REQUIRE(studio_open(&s));
+    const pal_body *body = pal_world_body(s.world, 0);
+    int at[2] = {0, body->n_node - 1};
+    double place[2][3];
+    for (int k = 0; k < 2; k++) {
+        for (int c = 0; c < 3; c++) place[k][c] = body->node_rest[3 * at[k] + c];
+        REQUIRE(!pal_world_load(s.world, 0, at[k], force[k]));
+    }
+    int n_before = body->n_node;
+    for (int turn = 0; turn < 2; turn++) {
+        if (turn == 0)
+            REQUIRE(!edit(&s, (pal_cells_command){PAL_CELLS_EXTRUDE, .face = top_face(pal_sculptor_cells(s.sculptor)),
+                                                  .distance_m = 0.03, .scale = 1}));
+        else
+            REQUIRE(!turn_back(&s, PAL_SCULPT_UNDO));
+        body = pal_world_body(s.world, 0);
+        REQUIRE(body->outer != NULL);
+        if (turn == 0) CHECK(body->n_node > n_before);
+        double sum[3] = {0};
+        int n_loaded = 0;
+        for (int i = 0; i < body->n_node; i++) {
+            const double *f = body->outer + 3 * i;
+            for (int c = 0; c < 3; c++) sum[c] += f[c];
+            if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
+            int k = f[1] != 0;
+            double far = 0;
+            for (int c = 0; c < 3; c++) far = fmax(far, fabs(body->node_rest[3 * i + c] - place[k][c]));
+            CHECK_LE(far, 0.01); /* of 0.1 m */
+            n_loaded++;
+        }
+        CHECK_INT(n_loaded, 2);
+        for (int c = 0; c < 3; c++) CHECK_NEAR(sum[c], force[0][c] + force[1][c], 1e-15);
+    }
+    studio_close(&s);
+}
+
 static void a_material_set_while_an_edit_is_made_is_kept(void)
 {
     studio s;
@@ -356,6 +397,7 @@ int main(void)
 {
     clay_make(&clay, 2, 0.1);
     RUN(a_body_goes_on_where_it_was_with_a_cell_more);
+    RUN(lasting_loads_stay_by_place);
     RUN(a_material_set_while_an_edit_is_made_is_kept);
     RUN(undo_and_redo_bring_back_every_bit);
     RUN(a_shape_that_is_kept_rests_where_it_is);

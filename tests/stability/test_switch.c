@@ -221,6 +221,42 @@ static void tools_hold_on(void)
     }
 }
 
+/* a tool that drags the tip of finite elements sideways by friction goes on dragging: friction begins anew, and tissue
+ * that is still sheared pulls at once on the tool that holds it */
+static void friction_holds_on(void)
+{
+    const int pair[2][2] = {{0, 1}, {1, 0}};
+    for (int n = 0; n < 2; n++) {
+        beam b;
+        begin(&b, false, true, 20);
+        pal_item_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
+        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1);
+        pal_transfer_report r;
+        step(w, 1.0 / 60, 60);
+        double z = WIDTH + 0.015 + tip_z(w);
+        for (int k = 0; k < 80; k++) {
+            double down = k < 40 ? 0.0002 * k : 0.008, side = k < 40 ? 0 : 0.0001 * (k - 40);
+            pal_pose p = at(0.19, 0.025 + side, z - down, 0);
+            pal_world_pose(w, 0, &p);
+            step(w, 1.0 / 60, 1);
+        }
+        const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0];
+        CHECK(fabs(before->mean_force_N[1]) > 0.05);
+        pal_transfer_carry(x, next, w, &r);
+        step(w, 1.0 / 60, 6), step(next, 1.0 / 60, 6);
+        const double *was = before->mean_force_N, *is = after->mean_force_N;
+        if (table)
+            printf("  friction: %.3f, beside %.3f N; not switched %.3f, beside %.3f N\n", is[2], is[1], was[2], was[1]);
+        CHECK_NEAR(is[1], was[1], 0.1 * fabs(was[1]));
+        CHECK_NEAR(is[2], was[2], 0.1 * fabs(was[2]));
+        pal_transfer_free(x);
+        pal_world_destroy(w), pal_world_destroy(next);
+        end(&b);
+    }
+}
+
 /* lasting loads: their sum and what they turn by stay, and so does where the body rests */
 static void lasting_loads_stay(void)
 {
@@ -327,6 +363,7 @@ int main(int argc, char **argv)
     RUN(the_same_switch_gives_the_same_hash);
     RUN(there_and_back_fifty_times);
     RUN(tools_hold_on);
+    RUN(friction_holds_on);
     RUN(lasting_loads_stay);
     RUN(surfaces_go_between_levels);
     RUN(what_does_not_fit_is_refused);
