@@ -82,6 +82,22 @@ try {
   }
   await until(() => ada.evaluate(() => !window.palpate.stage.dirty), (still) => still, 3000);
   await ada.screenshot({ path: join(pictures, "accuracy_switched.png") });
+
+  // the knobs: every kind of button is pressed once, and goes where it says
+  const pressed = new Set();
+  for (let press = 0; press < 3; press++) {
+    const left = (s) => s.estimate?.neighbours?.find((n) => !pressed.has(n.knob));
+    const before = await until(() => shown(ada), (s) => left(s) && !s.busy, 15000), near = left(before);
+    if (!near) break;
+    pressed.add(near.knob);
+    const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.knob }).first(), title = await button.getAttribute("title");
+    await button.click();
+    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.tick > 0);
+    check(`the button of the knob ${near.knob} goes to its neighbour`, after.setting !== before.setting && title.startsWith(`${after.setting},`), `${before.setting} -> ${after.setting}; ${title}`);
+    check("it says what jumped, and against which bound", /^Switched: energy [+−][\d.]+ %, moved .* allowed, made in/.test(after.said), after.said);
+  }
+  check("there were knobs to press", pressed.size >= 2, [...pressed].join());
+  await ada.locator("#cost-panel").screenshot({ path: join(pictures, "accuracy_panel.png") });
   await ada.keyboard.press("4");
   check("the panel closes", !(await shown(ada)).visible);
 

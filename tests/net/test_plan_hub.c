@@ -1,5 +1,6 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
 #include "server/net/server.h"
+#include "server/session/estimate.h"
 #include "tests/net/mem_client.h"
 #include "tests/net/small_scene.h"
 
@@ -172,12 +173,63 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     end();
 }
 
+/* a counter of /metrics */
+static double counter(const char *name)
+{
+    pal_reply reply = {0};
+    pal_mem_get(road, "/metrics", &reply);
+    if (!reply.body) return NAN;
+    char line[128];
+    snprintf(line, sizeof line, "\n%s ", name);
+    const char *text = (const char *)reply.body->bytes, *at = strstr(text, line);
+    double value = at ? atof(at + strlen(line)) : NAN;
+    pal_packet_drop(reply.body);
+    return value;
+}
+
+/* at rest, with somebody who looks on: no row runs, nothing is encoded and nothing estimated; a touch wakes it */
+static void a_body_asleep_is_neither_stepped_nor_encoded(void)
+{
+    static mem_client ada;
+    pal_item gravity = organ.scene.body[0].effect[0];
+    pal_item_init(&organ.scene.body[0].effect[0], "effects[0]", "sleep");
+    begin(false);
+    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
+    UNTIL(s->n_state == 1 && s->state[0].asleep && ada.n_frame > 0, &ada, NULL);
+    UNTIL(s->n_row > 3, &ada, NULL);
+    double row_ms[PAL_WIRE_ROW_MAX];
+    memcpy(row_ms, s->row_ms, sizeof row_ms);
+    double n_encode = counter("palpate_encodes_total");
+    uint64_t tick = s->tick, made = pal_estimator_made();
+    int n_frame = ada.n_frame, n_tools = ada.n_tools;
+    UNTIL(s->tick > tick + 80 && ada.n_tools > n_tools + 60, &ada, NULL);
+    /* means of the last steps, each of which weighs a fifth: what took nothing for 60 steps is a millionth by now */
+    for (uint32_t r = 0; r < s->n_row; r++) CHECK_LE(s->row_ms[r], 1e-3 * row_ms[r]);
+    CHECK(s->state[0].asleep);
+    CHECK_INT((int)counter("palpate_encodes_total"), (int)n_encode);
+    CHECK_INT(ada.n_frame, n_frame);
+    CHECK(pal_estimator_threads() == 0 && pal_estimator_made() == made);
+    /* a tool comes through its middle */
+    const pal_surface *surface = &organ.mesh.surface;
+    double at[3] = {surface->x[0], surface->x[1], surface->x[2]};
+    for (uint32_t seq = 1; ada.n_frame == n_frame && seq < 4000; seq++) {
+        mem_pose(&ada, 0, seq, at);
+        turn(&ada, NULL);
+    }
+    CHECK(ada.n_frame > n_frame && counter("palpate_encodes_total") > n_encode);
+    mem_end(&ada);
+    end();
+    organ.scene.body[0].effect[0] = gravity;
+}
+
 int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
     RUN(rows_say_whose_they_are_and_what_called_for_them);
     RUN(an_instructor_switches_a_row_off_and_on_and_all_hear_of_it);
     RUN(others_do_not_and_bad_orders_are_refused);
+    RUN(a_body_asleep_is_neither_stepped_nor_encoded);
     RUN(everybody_resets_what_was_stopped_and_a_viewer_nothing_else);
     pal_prepared_free(&organ.mesh);
     return check_report();

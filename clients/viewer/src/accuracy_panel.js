@@ -1,7 +1,7 @@
 // The panel of accuracy: the study's points, where the body stands and of what its error is made, its neighbours on each
 // knob, and a slider along the front. It asks for estimates while it is open, one body at a time. One switch is under way
 // at a time.
-import { frontOf, knobOrder, layOut, milliseconds, millimetres, neighbourWords, partsOf, placeOn, switchWords } from "./accuracy_plot.js";
+import { LEAST_SAID_M, frontOf, knobOrder, layOut, milliseconds, millimetres, neighbourWords, partsOf, placeOn, switchWords } from "./accuracy_plot.js";
 
 /** @typedef {import("./accuracy_plot.js").Estimate} Estimate */
 /** @typedef {import("./accuracy_plot.js").Point} Point */
@@ -177,8 +177,9 @@ export class AccuracyPanel {
     for (const near of plot.neighbours) out.push(this.shape("path", { d: `M${near.x} ${near.y - 5}l5 5l-5 5l-5 -5z`, class: "neighbour" }, `${near.of.label}, foreseen: ${milliseconds(near.of.ms)}, ${millimetres(near.of.error_m)}`));
     if (plot.live && plot.live.y !== null) {
       out.push(this.shape("circle", { cx: plot.live.x, cy: plot.live.y, r: 9, class: "live-ring" }), this.shape("circle", { cx: plot.live.x, cy: plot.live.y, r: 4.5, class: "live" }, "now"));
-      const left = plot.live.x > right - 40;
-      out.push(this.shape("text", { x: plot.live.x + (left ? -13 : 13), y: plot.live.y + 4, class: "now", "text-anchor": left ? "end" : "start" }, "now"));
+      // neighbours in step and tolerance stand beside it, those in resolution above and below
+      const above = plot.live.y > top + 24, x = Math.min(Math.max(plot.live.x, BOX.left + 14), right - 14);
+      out.push(this.shape("text", { x, y: plot.live.y + (above ? -13 : 22), class: "now", "text-anchor": "middle" }, "now"));
     } else if (plot.live) {
       out.push(this.shape("line", { x1: plot.live.x, x2: plot.live.x, y1: top, y2: bottom, class: "live-line" }), this.shape("text", { x: plot.live.x + 4, y: top + 9, class: "now" }, "now"));
     }
@@ -220,7 +221,7 @@ export class AccuracyPanel {
       item.append(p.title, Object.assign(this.page.createElement("span"), { textContent: millimetres(p.value) }));
       return item;
     }));
-    const notes = waits ? [] : [e.note ?? "", e.locking ? "It locks: the true error is larger." : "", typeof e.zz_percent === "number" ? `In energy ${e.zz_percent.toPrecision(2)} %.` : ""];
+    const notes = waits ? [] : [e.note ?? "", e.locking ? "It locks: the true error is larger." : "", typeof e.zz_percent === "number" && e.error_m !== undefined && e.error_m >= LEAST_SAID_M ? `In energy ${e.zz_percent.toPrecision(2)} %.` : ""];
     this.at("note").textContent = notes.filter(Boolean).join(" ");
   }
 

@@ -12,6 +12,8 @@
 
 /** errors below this are drawn here: a body at rest errs by rounding, which is nobody's scale */
 export const LEAST_M = 1e-8;
+/** lengths below this are said to be less than it */
+export const LEAST_SAID_M = 1e-6;
 
 /** colours of methods in the order in which they come; told apart on dark ground with any colour vision */
 export const METHOD_COLOURS = Object.freeze(["#5cb8ff", "#ffb45c", "#62d39a", "#e08bd8", "#f2e36b", "#b0bec8"]);
@@ -81,7 +83,7 @@ export function short(v) {
 }
 
 /** @param {number | undefined} m */
-export const millimetres = (m) => (m === undefined ? "not known" : m !== 0 && m < 1e-6 ? "< 0.001 mm" : `${short(1e3 * m)} mm`);
+export const millimetres = (m) => (m === undefined ? "not known" : m !== 0 && m < LEAST_SAID_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`);
 /** @param {number | undefined} ms */
 export const milliseconds = (ms) => (ms === undefined ? "not known" : `${short(ms)} ms`);
 
@@ -169,8 +171,9 @@ export function knobOrder(body, to) {
 
 /** the errors shown of both settings bound what a switch may move @param {Record<string, number>} args */
 function boundWords({ most_move_m, bound_m }) {
-  if (typeof bound_m !== "number") return " (no error shown to hold it against)";
-  return most_move_m <= bound_m + LEAST_M ? ` of ${millimetres(bound_m)} allowed` : `, more than the ${millimetres(bound_m)} allowed`;
+  if (typeof bound_m !== "number") return "";
+  // what rounds to nothing in these words is no jump
+  return most_move_m <= Math.max(bound_m, LEAST_SAID_M) ? ` of ${millimetres(bound_m)} allowed` : `, more than the ${millimetres(bound_m)} allowed`;
 }
 
 /** what a switch did @param {{text: string, args?: Record<string, number>}} answer */

@@ -100,6 +100,9 @@ test("a knob is turned by its numbers alone, a method by none", () => {
 
 test("a switch is told by what it did", () => {
   assert.equal(switchWords({ text: "x", args: { energy_percent: -0.31, most_move_m: 4e-5, made_ms: 812 } }), "Switched: energy −0.31 %, moved 0.04 mm, made in 812 ms.");
+  assert.equal(switchWords({ text: "x", args: { most_move_m: 4e-5, bound_m: 1.2e-3 } }), "Switched: moved 0.04 mm of 1.2 mm allowed.");
+  assert.equal(switchWords({ text: "x", args: { most_move_m: 4e-3, bound_m: 1.2e-3 } }), "Switched: moved 4 mm, more than the 1.2 mm allowed.");
+  assert.equal(switchWords({ text: "x", args: { most_move_m: 2e-8, bound_m: 1e-9 } }), "Switched: moved < 0.001 mm of < 0.001 mm allowed.", "at rest");
   assert.equal(switchWords({ text: "fem, 16 voxels" }), "fem, 16 voxels");
 });
 
