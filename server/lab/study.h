@@ -30,7 +30,7 @@ typedef struct pal_study_point {
     pal_priced_setting priced;  /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
     pal_err err;                /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
     char why[PAL_SETTING_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged by" */
-    int n_node, n_substep; /* n_substep: of a step at rest; n_node: of a surface that adapts those in use at the end */
+    int n_node, n_substep;      /* of a step at rest; both of a surface that adapts: as they are at the end */
     double ms_p95;
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
@@ -91,10 +91,10 @@ bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int l
 /* Cost foreseen for a setting that is made and has not run: of n_node nodes and n_substep sub-steps in a step of its
  * own at rest (body.h, pal_world_substeps). Known for that: what the other points of its model took, leave_out (-1:
  * none) being no part of them, with their knobs, nodes and sub-steps; of the setting its own knobs and these two
- * counts; no time of it. A step of its own is a + n_substep n_node r (study_cost.c). Of a surface that adapts n_node is
- * not looked at: how much of it is refined is not known before it runs, and taken as the share that the other levels
- * refined. false: fewer than three points of the model, none with such an element, law or solver, or none that adapts
- */
+ * counts; no time of it. A step of its own is a + n_substep n_node r (study_cost.c). Of a surface that adapts
+ * neither count is looked at, as how much of it is refined is not known before it runs: the share is that of what the
+ * other levels refined, sub-steps are those of its finest level. false: fewer than three points of the model, none with
+ * such an element, law or solver, or none that adapts */
 bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, int n_substep,
                             int leave_out, double *ms);
 #endif

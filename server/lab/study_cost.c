@@ -142,6 +142,23 @@ static double refined_nodes(const pal_study *study, int leave_out, const pal_set
     return coarse * exp2(2 * (s->size - 1));
 }
 
+/* sub-steps on its finest level, which one refined face is enough for: counted where it is wholly refined, else twice
+ * as many with each level */
+static double finest_substeps(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    double coarse = NAN;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *p = &study->point[i];
+        const pal_setting *q = &p->priced.setting;
+        if (!counts(study, i, leave_out, s)) continue;
+        /* of steps of their own */
+        double n = p->n_substep * s->step_s / q->step_s;
+        if (pal_study_is(q->element, "refined") && q->size == s->size) return n;
+        if (q->size == 1) coarse = n * exp2(s->size - 1);
+    }
+    return coarse;
+}
+
 /* how many of its nodes will be in use is seen of other levels: the same share of what refining could add; NaN: there
  * are none */
 static double nodes_in_use(const pal_study *study, int leave_out, const pal_setting *s)
@@ -187,7 +204,8 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     seen p[PAL_STUDY_POINTS];
     int n = 0;
     double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
-    if (!(nodes > 0) || n_substep < 1 || !(s->step_s > 0) || !(study->step_s > 0)) return false;
+    double substeps = adapts(s) ? finest_substeps(study, leave_out, s) : n_substep;
+    if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];
         if (!counts(study, i, leave_out, s)) continue;
@@ -205,6 +223,6 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     }
     double f[FEATURES];
     features(s, nodes, f);
-    *ms = (law.a + n_substep * nodes * exp(sum_of(law.w, f) + off / weight)) * study->step_s / s->step_s;
+    *ms = (law.a + substeps * nodes * exp(sum_of(law.w, f) + off / weight)) * study->step_s / s->step_s;
     return true;
 }

@@ -132,7 +132,8 @@ pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*w
         if (!err && ms) err = repeat(job, &w, ms, most, n_ms, note);
     }
     if (facts) {
-        facts->n_substep = n_substep;
+        /* what adapts takes the sub-steps of the finest level that it came to use */
+        facts->n_substep = w.body->shell ? pal_world_substeps(w.world) : n_substep;
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
     }

@@ -14,8 +14,8 @@ typedef struct record {
 
 static const record records[] = {
     {"tests/data/studies/beam.json", 68, 60, 0.95},
-    {"tests/data/studies/liver.json", 64, 57, 0.95},
-    {"tests/data/studies/stomach.json", 5, 5, 0}, /* errors: too few for a law */
+    {"tests/data/studies/liver.json", 68, 62, 0.95},
+    {"tests/data/studies/stomach.json", 5, 4, 0}, /* errors: too few for a law */
 };
 
 static pal_study_file *read_record(const record *r)
@@ -40,6 +40,8 @@ static void cost_and_error_are_foreseen_from_the_other_settings(void)
             n++;
             if (!pal_study_foresee(s, &p->priced.setting, i, &ms, &error_m)) continue;
             CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_substep, i, &ms));
+            /* as it stands in the record */
+            CHECK_NEAR(p->predicted_ms, ms, 1e-6 * ms);
             cost += ms <= 1.3 * p->priced.ms && ms >= p->priced.ms / 1.3;
             error += error_m <= 2 * p->priced.error_m && error_m >= 0.5 * p->priced.error_m;
         }

@@ -168,7 +168,8 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
         for (int told = 100; told < 5000; told += 2000) {
             bool adapts = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node, p->n_substep, i, &ms));
+            CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node,
+                                         adapts ? told / 100 : p->n_substep, i, &ms));
             CHECK_NEAR(ms / p->priced.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
