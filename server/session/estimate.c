@@ -193,7 +193,7 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
 {
     const pal_body *body = pal_world_look(world, e->body);
     note_frozen(e, world, body->frozen);
-    if (!isnan(step_ms)) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
+    if (!isnan(step_ms) && !body->asleep) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
     if (!body->asleep) e->slept = false;
     if (e->slept) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;

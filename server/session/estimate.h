@@ -2,16 +2,19 @@
  *
  * An estimator has a thread and worlds of its own. The simulation hands it a copy of its state and of the loads that it
  * bears, at most 4 times a second and only while the estimator is free; then it solves, beside the running session:
- *   discretisation  the rest under those loads on this mesh and on its voxels merged by eights: the largest distance at
+ *   borne           loads under which the body would rest where it is: what acts less what accelerates it and what drag
+ *                   takes (d'Alembert), so that what swings free errs as well; at rest they are what acts
+ *   discretisation  the rest under `borne` on this mesh and on its voxels merged by eights: the largest distance at
  *                   nodes that both have, over 2^1.5 - 1 (Richardson; for any true order from 1 to 2 that is off by a
  *                   factor of 0.55 to 1.64). Springs: of finite elements on their voxels
  *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh; about
  *                   twice too large for tetrahedra of ten nodes
  *   model           the largest distance between the rest by the neo-Hookean law and by the body's own; of springs:
- *                   between where they come to rest and where finite elements (hex8_bbar, corotational) do
+ *                   between where they are and where finite elements (hex8_bbar, corotational) come to rest
  *   time            what the steps of the next tenth of a second (12 at most) are off, the loads staying as they are:
  *                   those steps against twice as many of half the length, over 1 - 2^-order of the solver
  *   algebraic       the same steps against those of a solver that leaves next to nothing
+ * None of them is there (0) while nothing has moved by more than 1e-9 of the body's size.
  * error_m is their sum, which is above the truth where parts have opposite signs, and below it where elements lock or
  * a small part is not known. There is none where the discretisation is not known, or of springs the model.
  * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where nothing locks. Rows that
@@ -36,7 +39,7 @@ typedef struct pal_estimate {
     double discretisation_m, algebraic_m, time_m, model_m;
     double zz_percent; /* energy norm of the error over that of the solution    */
     bool locking;      /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
-    double ms;         /* of a live step, median of the last second              */
+    double ms;         /* of a live step, median of the last second awake; never awake: of steps beside it */
     double own_ms;     /* processor time that this estimate took                 */
     /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
     int n_neighbour;

@@ -305,7 +305,7 @@ static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const dou
         if (from || own->held[i]) pal_copy3(own->x + 3 * i, from && !own->held[i] ? from + 3 * i : state->x + 3 * i);
     memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
     pal_world_moved(r->world, 0);
-    return put_loads(r, state->load);
+    return put_loads(r, state->borne);
 }
 
 static bool nothing_acts(const pal_rest *r, double young_Pa)

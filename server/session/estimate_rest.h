@@ -28,8 +28,8 @@ pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *
 pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                          pal_note *note, pal_rest *out);
 void pal_rest_free(pal_rest *rest); /* a zeroed one is fine */
-/* the rest under the state's loads -> x, known; false: no rest was found or *stop. from: places of the running body's
- * nodes to begin at; NULL, and in another mesh: where it was last */
+/* the rest under what the state bears -> x, known; false: no rest was found or *stop. from: places of the running
+ * body's nodes to begin at; NULL, and in another mesh: where it was last */
 bool pal_rest_find(pal_rest *rest, const pal_estimate_state *state, const pal_body *body, const double *from,
                    const _Atomic bool *stop);
 #endif

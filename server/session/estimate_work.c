@@ -12,10 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_AHEAD = 12, MOST_SETTLE = 600 };
+enum { MOST_AHEAD = 12, TIMED = 7 };
 static const double ahead_s = 0.1, ahead_ms = 400, tight = 1e-9;
-/* springs are at rest when they move by less of the largest displacement */
-static const double still = 2e-3, most_ratio = 0.8, settle_s = 1.5;
+/* a body moved by less of its size has no error but rounding */
+static const double unmoved = 1e-9;
 static const double usual_tolerance = 1e-2; /* of implicit solvers */
 /* of displacements at nodes: 1.2 to 2.1 is observed (numerics.md). Taken for anything from 1 to 2 it is off by a factor
  * of 0.55 to 1.64; what three meshes tell was farther off, as the coarsest is four times as coarse as a live one */
@@ -36,7 +36,8 @@ struct pal_estimate_work {
     bool springs, locks;
     pal_rest fine, coarse, model; /* world NULL: there is none */
     pal_foresight foresight;
-    bool priced; /* what more nodes cost has been measured, or cannot be */
+    bool priced;     /* what more nodes cost has been measured, or cannot be */
+    double awake_ms; /* of a step of a body that was never seen awake; 0: not measured yet */
     char note[160];
 };
 
@@ -217,6 +218,7 @@ static pal_err take_state(pal_estimate_work *w)
     *s = (pal_estimate_state){.n_dof = body->n_dof, .n_node = body->n_node};
     s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
     s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
     for (int i = 0; i < pal_world_rows(w->live); i++) {
         const pal_effect *effect = pal_world_effect(w->live, i)->effect;
@@ -224,7 +226,7 @@ static pal_err take_state(pal_estimate_work *w)
         s->row[s->n_row] = effect->name;
         s->row_on[s->n_row++] = true;
     }
-    return s->x && s->v && s->load && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return s->x && s->v && s->load && s->borne && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body, pal_note *note)
@@ -267,7 +269,7 @@ void pal_estimate_work_close(pal_estimate_work *w)
     pal_rest_free(&w->fine), pal_rest_free(&w->coarse), pal_rest_free(&w->model);
     pal_hexes_free(&w->voxels.hexes);
     free(w->scene), free(w->exact_scene);
-    free(w->state.x), free(w->state.v), free(w->state.load);
+    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.borne);
     free(w->first), free(w->second);
     free(w);
 }
@@ -329,7 +331,8 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->tick = pal_world_tick(world);
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
-    state->fixed_ms = fixed_ms(world, body);
+    state->asleep = from->asleep;
+    if (!from->asleep) state->fixed_ms = fixed_ms(world, body);
     pal_world_material_now(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;
@@ -413,7 +416,7 @@ static void look_ahead(pal_estimate_work *w, pal_estimate *out)
 static void price_size(pal_estimate_work *w)
 {
     pal_world *small = NULL;
-    if (w->priced || !w->coarse.known) return;
+    if (w->priced || !w->coarse.world) return;
     w->priced = true;
     pal_scene *scene = malloc(sizeof *scene);
     if (!scene) return;
@@ -425,7 +428,7 @@ static void price_size(pal_estimate_work *w)
         pal_body *body = pal_world_body(small, 0);
         (void)pal_estimate_rows(&w->state, small, scene, true);
         body->load_cap_N = INFINITY;
-        for (int i = 0; i < body->n_node && body->n_node == loaded->n_node; i++)
+        for (int i = 0; loaded->outer && i < body->n_node && body->n_node == loaded->n_node; i++)
             (void)pal_world_load(small, 0, i, loaded->outer + 3 * (size_t)i);
         pal_estimate_price(w->scene, w->live, small, &w->foresight);
     }
@@ -435,11 +438,35 @@ static void price_size(pal_estimate_work *w)
 
 /* ---- the rests ---- */
 
+static void tell(pal_estimate *out, const char *text)
+{
+    size_t n = strlen(out->note);
+    snprintf(out->note + n, sizeof out->note - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+/* The loads under which the body would rest where it is now: those that act less what is left over, which accelerates
+ * it and is taken by drag (d'Alembert). At rest they are those that act. Supports bear what is left over at theirs */
+static bool find_borne(pal_estimate_work *w)
+{
+    pal_estimate_state *s = &w->state;
+    pal_body *body = pal_world_body(w->live, 0);
+    if (set_state(w, w->live)) return false;
+    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    if (pal_world_pull(w->live, 0)) return false;
+    memcpy(s->borne, s->load, 3 * sizeof(double) * (size_t)s->n_node);
+    for (int i = 0; i < s->n_node; i++)
+        if (!body->held[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
+    return true;
+}
+
 static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
     pal_zz zz;
     if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->zz_percent = zz.percent;
-    if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) return;
+    if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) {
+        if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
+        return;
+    }
     double most = 0;
     for (int k = 0; k < w->coarse.n_common; k++) {
         size_t i = 3 * (size_t)w->coarse.common[k];
@@ -448,67 +475,37 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
     out->discretisation_m = most / (exp2(order) - 1);
 }
 
-/* goes on by what is left of a way whose pieces shrink by `ratio` */
-static void jump(pal_world *world, const double *from, double ratio)
-{
-    pal_body *body = pal_world_body(world, 0);
-    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += ratio / (1 - ratio) * (body->x[i] - from[i]);
-    pal_world_moved(world, 0);
-}
-
-/* where springs come to rest from the state: they are stopped whenever they begin to slow down, every other time put
- * where the stops seem to lead, until a stop is where the last one was -> first; false: not in the time there is */
-static bool settle_springs(pal_estimate_work *w)
-{
-    pal_body *body = pal_world_body(w->live, 0);
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
-    double energy_J = 0, last_m = 0, began_s = 1e-9 * (double)pal_clock_thread_ns();
-    if (set_state(w, w->live)) return false;
-    memset(body->v, 0, n_byte);
-    memcpy(w->first, body->x, n_byte);
-    for (int k = 0; k < MOST_SETTLE && 1e-9 * (double)pal_clock_thread_ns() - began_s < settle_s; k++) {
-        if (stopped(w) || pal_world_step(w->live, w->scene->step_s)) return false;
-        double now_J = pal_body_kinetic_J(body);
-        bool slows = now_J < energy_J;
-        energy_J = slows ? 0 : now_J;
-        if (!slows) continue;
-        double way = most_between(w->first, body->x, body->n_dof);
-        bool still_there = way <= still * most_between(body->x, body->x_rest, body->n_dof);
-        memset(body->v, 0, n_byte);
-        bool leads = !still_there && way < most_ratio * last_m;
-        if (leads) jump(w->live, w->first, way / last_m);
-        last_m = leads ? 0 : way;
-        memcpy(w->first, body->x, n_byte);
-        if (still_there) return true;
-    }
-    return false;
-}
-
 static void compare_models(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
     int n = w->state.n_node;
-    if (w->springs) {
-        if (settle_springs(w))
-            out->model_m = most_between(w->first, w->fine.x, n);
-        else
-            snprintf(out->note, sizeof out->note, "model: the springs came to no rest under these loads");
-        return;
-    }
-    if (!w->model.world)
+    if (w->springs) /* where they are is where they rest under what they bear */
+        out->model_m = most_between(w->state.x, w->fine.x, n);
+    else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
     else if (pal_rest_find(&w->model, &w->state, body, w->fine.x, w->stop))
         out->model_m = most_between(w->model.x, w->fine.x, n);
+}
+
+static bool has_moved(const pal_estimate_work *w, const pal_estimate *out)
+{
+    return out->most_m > unmoved * pal_world_look(w->live, 0)->size_m;
 }
 
 static void find_rests(pal_estimate_work *w, pal_estimate *out)
 {
     const pal_body *body = pal_world_body(w->live, 0);
     if (!w->fine.world) return;
-    if (!pal_rest_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
-        snprintf(out->note, sizeof out->note, "no rest was found under these loads");
+    out->locking = w->locks;
+    if (!has_moved(w, out)) {
+        if (w->coarse.world) out->discretisation_m = 0;
+        out->model_m = out->zz_percent = 0;
         return;
     }
-    out->locking = w->locks;
+    if (!find_borne(w) || !pal_rest_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
+        out->locking = false;
+        tell(out, "no rest was found under these loads");
+        return;
+    }
     discretise(w, body, out);
     if (!stopped(w)) compare_models(w, body, out);
 }
@@ -532,6 +529,24 @@ static void sum_up(const pal_estimate_work *w, pal_estimate *out)
                          : (double)NAN;
 }
 
+/* asleep a step costs next to nothing: what counts is what it takes to be awake */
+static void price_sleep(pal_estimate_work *w, pal_estimate *out)
+{
+    if (!w->state.asleep) return;
+    if (isnan(out->ms) && !w->awake_ms) (void)go_ahead(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
+    if (isnan(out->ms)) out->ms = w->awake_ms;
+    tell(out, "asleep: ms are those of a step awake");
+}
+
+/* the steps ahead of a body that stands where it was made leave rounding alone */
+static void drop_rounding(const pal_estimate_work *w, pal_estimate *out)
+{
+    double least_m = unmoved * pal_world_look(w->live, 0)->size_m;
+    if (has_moved(w, out)) return;
+    if (out->time_m < least_m) out->time_m = 0;
+    if (out->algebraic_m < least_m) out->algebraic_m = 0;
+}
+
 bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
 {
     *out = (pal_estimate){.tick = w->state.tick,
@@ -544,7 +559,9 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
                           .zz_percent = NAN,
                           .ms = median_ms(&w->state)};
     memcpy(out->note, w->note, sizeof out->note);
+    price_sleep(w, out);
     look_ahead(w, out);
+    drop_rounding(w, out);
     if (!stopped(w)) find_rests(w, out);
     sum_up(w, out);
     if (!stopped(w)) price_size(w);

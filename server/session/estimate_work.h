@@ -13,16 +13,19 @@ typedef struct pal_estimate_state {
     uint64_t tick;
     double time_s;
     int n_dof, n_node;
-    double *x, *v;   /* m, m/s [n_dof][3] */
-    double *load;    /* lasting and contact loads, N [n_node][3] */
+    double *x, *v; /* m, m/s [n_dof][3] */
+    double *load;  /* lasting and contact loads, N [n_node][3] */
+    double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
+    bool asleep;
     int n_substep;   /* of the step */
-    double fixed_ms; /* of it in rows that are neither forces nor solver: what is shown, contact, guards */
+    double fixed_ms; /* of the last one awake, in rows that are neither forces nor solver: what is shown, contact,
+                        guards */
     pal_material material;
     /* FORCE rows of the body: names from open on, and which of them are not switched off */
     const char *row[PAL_ESTIMATE_ROWS];
     bool row_on[PAL_ESTIMATE_ROWS];
     int n_row;
-    float ms[PAL_ESTIMATE_STEPS]; /* of the last steps, any order */
+    float ms[PAL_ESTIMATE_STEPS]; /* of the last steps awake, any order */
     int n_ms;
 } pal_estimate_state;
 

@@ -136,6 +136,9 @@ size_t pal_world_bytes(const pal_world *world);    /* memory of the world's aren
 int pal_world_bodies(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
 const pal_body *pal_world_look(const pal_world *world, int body); /* the same to read */
+/* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact; what a row failed with [sim]
+ */
+pal_err pal_world_pull(pal_world *world, int body);
 void pal_world_moved(pal_world *world, int body); /* after its x was set from outside: limits are taken anew */
 const pal_row *pal_world_effect(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);

@@ -34,9 +34,6 @@ struct pal_world {
     pal_ease_rows eases;
 };
 
-/* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact: for those who look between
- * steps */
-pal_err pal_world_pull(pal_world *world, int body);
 /* OUTPUT rows of all bodies, so that what is shown is where they are */
 void pal_world_show_all(pal_world *world);
 

@@ -218,7 +218,8 @@ static double stress_off(const solved *coarse, const solved *fine)
 
 /* ---- rows ---- */
 
-static bool estimate(const subject *s, pal_estimate *out)
+/* of the body where it rests under the loads */
+static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
 {
     solved at;
     pal_estimate_work *work = NULL;
@@ -228,6 +229,7 @@ static bool estimate(const subject *s, pal_estimate *out)
     if (good) {
         pal_estimate_state *state = pal_estimate_work_state(work);
         good = pal_estimate_copy(state, at.world, 0);
+        memcpy(state->x, rest->body->x, 3 * sizeof *state->x * (size_t)state->n_dof);
         memcpy(state->load, at.load, 3 * sizeof *at.load * (size_t)at.body->n_node);
         good = good && pal_estimate_work_run(work, out);
     }
@@ -254,7 +256,7 @@ static void compare(const subject *s, const pal_samples *samples)
     const row *r = s->row;
     pal_estimate e;
     solved own = {.world = NULL}, finer = {.world = NULL};
-    bool good = estimate(s, &e) && solve(s, r->resolution, &own);
+    bool good = solve(s, r->resolution, &own) && estimate(s, &own, &e);
     if (good && r->finer > 0) good = solve(s, r->finer * r->resolution, &finer);
     CHECK(good);
     if (good) {

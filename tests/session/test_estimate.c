@@ -198,6 +198,7 @@ static void a_sleeping_body_is_looked_at_once(void)
     REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
     CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
     uint64_t tick = pal_estimator_read(e, &estimate) ? estimate.tick : 0;
+    CHECK(strstr(estimate.note, "asleep") && estimate.error_m == 0 && estimate.ms != 1);
     CHECK_INT((long long)look_for(e, w, 1, 600000000), 0);
     CHECK(pal_estimator_read(e, &estimate) && estimate.tick == tick);
     /* a load wakes it */

@@ -274,7 +274,17 @@ static bool estimate_again(pal_estimate_work *work, const pal_world *w, pal_esti
     return pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, out);
 }
 
-/* at rest while gravity is off, not so when it is on */
+/* puts the body at rest, or where gravity has it after some steps */
+static void fall(pal_world *w, const pal_scene *at, int n_step)
+{
+    pal_body *body = pal_world_body(w, 0);
+    memcpy(body->x, body->x_rest, 24 * (size_t)body->n_dof);
+    memset(body->v, 0, 24 * (size_t)body->n_dof);
+    pal_world_moved(w, 0);
+    for (int i = 0; i < n_step; i++) CHECK(!pal_world_step(w, at->step_s));
+}
+
+/* stays at rest while gravity is off, falls when it is on */
 static void rows_switched_off_are_off_for_the_estimate(void)
 {
     pal_scene *fem = fem_scene();
@@ -288,11 +298,13 @@ static void rows_switched_off_are_off_for_the_estimate(void)
     REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
     for (int round = 0; round < 2; round++) {
         CHECK(!pal_world_switch_row(w, fem, 0, "gravity", false, NULL));
+        fall(w, fem, 0);
         REQUIRE(estimate_again(work, w, &e));
         REQUIRE(estimate_of(fem, w, &fresh));
         CHECK_LE(fresh.error_m, 1e-12);
         CHECK_LE(e.error_m, round ? 1e-9 : 1e-12);
         CHECK(!pal_world_switch_row(w, fem, 0, "gravity", true, NULL));
+        fall(w, fem, 10);
         REQUIRE(estimate_again(work, w, &e));
         REQUIRE(estimate_of(fem, w, &fresh));
         printf("  on: %.6g, made for it %.6g mm; algebraic %.3g, %.3g mm\n", 1e3 * e.discretisation_m,
@@ -300,7 +312,79 @@ static void rows_switched_off_are_off_for_the_estimate(void)
         CHECK(fresh.discretisation_m > 1e-7);
         CHECK_NEAR(e.discretisation_m, fresh.discretisation_m, 1e-3 * fresh.discretisation_m);
         CHECK_NEAR(e.algebraic_m, fresh.algebraic_m, 1e-3 * fresh.algebraic_m + 1e-12);
+        CHECK_NEAR(e.time_m, fresh.time_m, 1e-3 * fresh.time_m);
     }
+    pal_estimate_work_close(work);
+    pal_world_destroy(w);
+    free(fem);
+}
+
+/* held by loads and then let go: inertia bears what the loads bore, and the error is the same in that moment */
+static void a_body_let_go_errs_as_it_did_under_load(void)
+{
+    for (int k = 0; k < CHECK_REPEATS(2, 1); k++) {
+        pal_scene *at = fem_scene();
+        if (k) *at = scene, at->body[0].n_effect = 0;
+        at->body[0].material.damping_1_s = 40;
+        pal_world *w = NULL;
+        pal_estimate held, gone;
+        REQUIRE(!pal_world_create(at, NULL, &w));
+        pal_body *body = pal_world_body(w, 0);
+        for (int i = 0; i < body->n_node; i++)
+            if (body->node_rest[3 * i + 2] > 0) CHECK(!pal_world_load(w, 0, i, (double[3]){1e-4, 0, 0}));
+        for (int i = 0; i < 12; i++) CHECK(!pal_world_step(w, at->step_s));
+        REQUIRE(estimate_of(at, w, &held));
+        memset(body->load, 0, 24 * (size_t)body->n_node);
+        REQUIRE(estimate_of(at, w, &gone));
+        printf("  %s: held %.6g, let go %.6g mm of %.4g mm; model %.6g, %.6g mm; zz %.4g, %.4g %%\n",
+               at->body[0].model.name, 1e3 * held.discretisation_m, 1e3 * gone.discretisation_m, 1e3 * held.most_m,
+               1e3 * held.model_m, 1e3 * gone.model_m, held.zz_percent, gone.zz_percent);
+        CHECK(held.discretisation_m > 0.01 * held.most_m && held.model_m > 0);
+        CHECK_NEAR(gone.discretisation_m, held.discretisation_m, 1e-6 * held.discretisation_m);
+        CHECK_NEAR(gone.model_m, held.model_m, 1e-3 * held.model_m + 1e-9);
+        CHECK_NEAR(gone.zz_percent, held.zz_percent, 1e-3);
+        CHECK(gone.n_neighbour >= 2 && gone.neighbour[1].error_m < gone.error_m);
+        pal_world_destroy(w);
+        free(at);
+    }
+}
+
+/* moved by rounding alone it has no error, whatever the loads that balance rounding do elsewhere */
+static void what_rounding_moved_has_no_error(void)
+{
+    for (int k = 0; k < 2; k++) {
+        pal_scene *at = fem_scene();
+        if (k) *at = scene, at->body[0].n_effect = 0;
+        pal_world *w = NULL;
+        pal_estimate e;
+        REQUIRE(!pal_world_create(at, NULL, &w));
+        pal_body *body = pal_world_body(w, 0);
+        for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += i % 7 * 1e-17;
+        REQUIRE(estimate_of(at, w, &e));
+        CHECK(e.most_m > 0 && e.error_m == 0 && e.discretisation_m == 0 && e.model_m == 0 && e.time_m == 0);
+        CHECK(e.zz_percent == 0);
+        CHECK_TEXT(e.note, "");
+        pal_world_destroy(w);
+        free(at);
+    }
+}
+
+/* what a step costs asleep is not what its setting costs */
+static void a_sleeping_body_is_priced_awake(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_estimate_work *work = NULL;
+    pal_world *w = NULL;
+    pal_estimate e;
+    REQUIRE(!pal_world_create(fem, NULL, &w));
+    pal_world_body(w, 0)->asleep = true;
+    REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
+    REQUIRE(estimate_again(work, w, &e));
+    CHECK(e.ms > 0 && e.ms < 1e4 && strstr(e.note, "asleep"));
+    pal_estimate_work_state(work)->n_ms = 1;
+    pal_estimate_work_state(work)->ms[0] = 7;
+    REQUIRE(estimate_again(work, w, &e));
+    CHECK_NEAR(e.ms, 7, 0);
     pal_estimate_work_close(work);
     pal_world_destroy(w);
     free(fem);
@@ -335,6 +419,9 @@ int main(void)
     RUN(elements_that_lock_say_so);
     RUN(rows_switched_off_are_off_for_the_estimate);
     RUN(a_body_at_rest_has_no_error);
+    RUN(a_body_let_go_errs_as_it_did_under_load);
+    RUN(what_rounding_moved_has_no_error);
+    RUN(a_sleeping_body_is_priced_awake);
     pal_prepared_free(&mesh);
     return check_report();
 }
