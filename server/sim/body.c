@@ -109,12 +109,17 @@ void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3])
 
 bool pal_body_finite(const pal_body *body)
 {
-    /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells */
-    double sum = 0;
+    /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells; in lanes, as no addition then waits for another */
+    const int n = body->active ? 0 : 3 * body->n_dof;
+    double sum = 0, lane[8] = {0};
+    int j = 0;
     for (int k = 0; k < body->n_active && body->active; k++) {
         size_t i = 3 * (size_t)body->active[k];
         for (size_t c = 0; c < 3; c++) sum += 0 * body->x[i + c] + 0 * body->v[i + c];
     }
-    for (int i = 0; i < 3 * body->n_dof && !body->active; i++) sum += 0 * body->x[i] + 0 * body->v[i];
+    for (; j + 8 <= n; j += 8)
+        for (int l = 0; l < 8; l++) lane[l] += 0 * body->x[j + l] + 0 * body->v[j + l];
+    for (; j < n; j++) sum += 0 * body->x[j] + 0 * body->v[j];
+    for (int l = 0; l < 8; l++) sum += lane[l];
     return sum == 0;
 }

@@ -38,13 +38,14 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     cell_unturn(r, n_node, y, u);
     cell_minus_rest(group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane, n_node, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
-    if (!(what & FORCE)) return cell_sum(energy, n_live);
+    double sum = what & ENERGY ? cell_sum(energy, n_live) : 0;
+    if (!(what & FORCE)) return sum;
     pal_wide minus[9];
     for (int i = 0; i < 9; i++) minus[i] = -r[i];
     cell_turn(minus, n_node, u, u);
     add_turn(group, block, lane, n_node, r, s, y, u);
     cell_scatter(node, n_node, n_live, u, f);
-    return 0;
+    return sum;
 }
 
 PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_node, int what, const double *d, double *f)
@@ -68,11 +69,16 @@ void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
     all_blocks(c, PAL_CELL_PYRAMID, 5, FORCE, d, f);
 }
 
-double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d)
+PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
+{
+    return all_blocks(c, PAL_CELL_CUBIC, 64, what, d, f) + all_blocks(c, PAL_CELL_HEX, 8, what, d, f) +
+           all_blocks(c, PAL_CELL_PYRAMID, 5, what, d, f);
+}
+
+double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
     if (c->op == PAL_CELL_EDGES) return pal_cells_edges_energy(c, d);
-    return all_blocks(c, PAL_CELL_CUBIC, 64, ENERGY, d, NULL) + all_blocks(c, PAL_CELL_HEX, 8, ENERGY, d, NULL) +
-           all_blocks(c, PAL_CELL_PYRAMID, 5, ENERGY, d, NULL);
+    return f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL);
 }
 
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)

@@ -268,6 +268,7 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
 {
     if (c->sampled == c->solid->sampled) return;
     c->sampled = c->solid->sampled;
+    pal_kept_forget(&c->kept);
     fill_cubic(c->solid, &c->group[PAL_CELL_CUBIC]);
     const bool mean = c->op == PAL_CELL_POLAR;
     fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean);
@@ -276,6 +277,7 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)
 {
+    pal_kept_forget(&c->kept);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
         for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;

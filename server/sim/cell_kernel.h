@@ -15,7 +15,7 @@
  * All memory from the arena. Thread: make [load], else [sim]; energy and force move the rotations' warm start. */
 #ifndef PAL_SIM_CELL_KERNEL_H
 #define PAL_SIM_CELL_KERNEL_H
-#include "server/base/arena.h"
+#include "server/sim/kept.h"
 #include "server/sim/solid.h"
 
 typedef enum pal_cell_operator {
@@ -50,6 +50,7 @@ typedef struct pal_cells_elastic {
     const pal_solid *solid;
     pal_cell_operator op;
     uint64_t sampled; /* of the solid, what the constants were made for */
+    pal_kept kept;    /* made by the row, of PAL_CELL_POLAR under an implicit solver */
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
 } pal_cells_elastic;
@@ -68,8 +69,9 @@ void pal_cells_elastic_reset(pal_cells_elastic *c); /* rotations are none again 
 
 /* f [n][3] += forces at nodes d [n][3] */
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f);
-/* E, J; of PAL_CELL_EDGES 1/2 d^' K d^ of its own d^, of which the forces are no gradient */
-double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d);
+/* E, J; of PAL_CELL_EDGES 1/2 d^' K d^ of its own d^, of which the forces are no gradient. f: forces of PAL_CELL_POLAR
+ * are added too; NULL: none */
+double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f);
 /* takes Q at d, then out += k sum Q K Q' p: the tangent with rotations held (of both operators) */
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d);
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out);

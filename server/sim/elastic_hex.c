@@ -37,6 +37,7 @@ void pal_hex_material(pal_hex_row *row, const pal_material *material)
         row->bound[lane] = 8 * scale * fmax(2 * mu, 2 * mu + 3 * lambda);
     }
     if (row->split) pal_elastic_tets_material(row->split, material);
+    pal_kept_forget(&row->kept);
 }
 
 void pal_hex_reset(pal_hex_row *row)
@@ -47,6 +48,7 @@ void pal_hex_reset(pal_hex_row *row)
             for (int i = 0; i < 9; i++) row->turn[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
     row->tangled = false;
+    pal_kept_forget(&row->kept);
     row->n_tangled = row->n_switch = 0;
     row->n_slow = 0;
     if (row->split) pal_elastic_tets_reset(row->split);
@@ -128,6 +130,7 @@ pal_err pal_hex_make(const pal_hex_wish *wish, pal_build *build, const char *pat
     out->n_block = out->strips.n_lane / PAL_LANES;
     PAL_TRY(pal_elastic_parts_make(build, out->hexes->node, out->n_hex, 8, 8, &out->parts));
     PAL_TRY(take_memory(out, build->arena));
+    if (out->implicit) PAL_TRY(pal_kept_make(body->n_node, build->arena, &out->kept));
     for (int i = 0; i < out->strips.n_lane; i++) out->hex[i] = -1;
     for (int e = 0; e < out->n_hex; e++) {
         int lane = out->strips.place[e];

@@ -16,6 +16,7 @@
 #ifndef PAL_SIM_ELASTIC_HEX_H
 #define PAL_SIM_ELASTIC_HEX_H
 #include "server/sim/elastic_tet.h"
+#include "server/sim/kept.h"
 
 typedef enum pal_hex_element { PAL_HEX_BBAR, PAL_HEX_FULL } pal_hex_element;
 
@@ -43,6 +44,8 @@ typedef struct pal_hex_row {
     int32_t *entry;      /* implicit: blocks of the pattern last assembled into [n_hex][36], ~ where transposed */
     const int32_t *entry_row;
     const pal_blocks *entry_of;
+
+    pal_kept kept; /* implicit: of the cubes, not of the split */
 
     bool tangled;
     uint64_t n_tangled, n_switch; /* looks that found the body tangled, changes between cubes and split; since reset */
@@ -78,14 +81,15 @@ void pal_hex_stress(pal_hex_row *row, const pal_body *body, pal_stress_take *tak
 
 /* the laws: body->slots->x holds positions (or p), forces (or products) are added to body->slots->f */
 void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots);
-double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots);
+/* with forces: added as by ..force too */
+double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots, bool forces);
 void pal_hex_corot_linearise(pal_hex_row *row, pal_slots *slots);
 void pal_hex_corot_multiply(const pal_hex_row *row, pal_slots *slots, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */
 void pal_hex_corot_blocks(const pal_hex_row *row, int block, double k, double *to);
 
 void pal_hex_neo_force(pal_hex_row *row, pal_slots *slots);
-double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots);
+double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots, bool forces);
 void pal_hex_neo_linearise(pal_hex_row *row, pal_slots *slots);
 void pal_hex_neo_multiply(const pal_hex_row *row, pal_slots *slots, double k);
 void pal_hex_neo_blocks(const pal_hex_row *row, int block, double k, double *to);

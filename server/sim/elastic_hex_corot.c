@@ -44,42 +44,10 @@ PAL_WIDE_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
     g[1][1] += wz, g[0][2] -= wz;
 }
 
-PAL_WIDE_INLINE void force_all(pal_hex_row *row, pal_slots *slots, bool turned)
-{
-    row->n_slow = 0;
-    for (int b = 0; b < row->n_block; b++) {
-        hex_view v;
-        hex_open(row, slots, b, &v);
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], x[3][8], r[9], stiff[3];
-            hex_modes(&v, l, u);
-            if (turned) {
-                row->n_slow += hex_turn_block(row, b, l, u, r);
-                hex_unrotate(r, u);
-                memcpy(x, u, sizeof x);
-            }
-            for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * row->h_m;
-            load_stiff(row, b, l, -1, stiff);
-            hex_stress(stiff[0], stiff[1], stiff[2], u);
-            if (turned) {
-                turn_force(x, u);
-                hex_rotate(r, u);
-            }
-            hex_add(&v, l, u);
-        }
-        hex_close(row, slots, b, &v);
-    }
-}
+enum { FORCE = 1, ENERGY = 2 };
 
-void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots)
-{
-    if (row->law == PAL_LAW_LINEAR)
-        force_all(row, slots, false);
-    else
-        force_all(row, slots, true);
-}
-
-double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots)
+/* forces are added, the energy is returned */
+PAL_WIDE_INLINE double all_blocks(pal_hex_row *row, pal_slots *slots, bool turned, int what)
 {
     pal_wide sum = {0};
     row->n_slow = 0;
@@ -87,25 +55,48 @@ double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots)
         hex_view v;
         hex_open(row, slots, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], g[3][8], r[9], stiff[3], e = {0};
+            pal_wide u[3][8], x[3][8], r[9], stiff[3], e = {0};
             hex_modes(&v, l, u);
-            if (row->law != PAL_LAW_LINEAR) {
+            if (turned) {
                 row->n_slow += hex_turn_block(row, b, l, u, r);
                 hex_unrotate(r, u);
             }
+            memcpy(x, u, sizeof x);
             for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * row->h_m;
-            load_stiff(row, b, l, 0.5, stiff);
-            memcpy(g, u, sizeof g);
-            hex_stress(stiff[0], stiff[1], stiff[2], g);
-            for (int i = 0; i < 3; i++)
-                for (int m = 1; m < 8; m++) e += u[i][m] * g[i][m];
+            load_stiff(row, b, l, -1, stiff);
+            hex_stress(stiff[0], stiff[1], stiff[2], u);
+            for (int i = 0; i < 3 && (what & ENERGY); i++) {
+                for (int m = 1; m < 8; m++) e += m == 1 << i ? (x[i][m] - 4 * row->h_m) * u[i][m] : x[i][m] * u[i][m];
+            }
             /* what lanes without element read need not be finite */
-            sum += wide_pick(stiff[0] > 0, e, wide_of(0));
+            if (what & ENERGY) sum += wide_pick(stiff[0] < 0, e, wide_of(0));
+            if (!(what & FORCE)) continue;
+            if (turned) {
+                turn_force(x, u);
+                hex_rotate(r, u);
+            }
+            hex_add(&v, l, u);
         }
+        if (what & FORCE) hex_close(row, slots, b, &v);
     }
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
-    return all;
+    return -0.5 * all;
+}
+
+void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots)
+{
+    if (row->law == PAL_LAW_LINEAR)
+        all_blocks(row, slots, false, FORCE);
+    else
+        all_blocks(row, slots, true, FORCE);
+}
+
+double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots, bool forces)
+{
+    if (row->law == PAL_LAW_LINEAR)
+        return forces ? all_blocks(row, slots, false, FORCE | ENERGY) : all_blocks(row, slots, false, ENERGY);
+    return forces ? all_blocks(row, slots, true, FORCE | ENERGY) : all_blocks(row, slots, true, ENERGY);
 }
 
 void pal_hex_corot_linearise(pal_hex_row *row, pal_slots *slots)

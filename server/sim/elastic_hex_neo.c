@@ -77,29 +77,10 @@ PAL_WIDE_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
     return 0.125 * sum;
 }
 
-void pal_hex_neo_force(pal_hex_row *row, pal_slots *slots)
-{
-    for (int b = 0; b < row->n_block; b++) {
-        hex_view v;
-        hex_open(row, slots, b, &v);
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa;
-            load_neo(row, b, l, &mu, &k1, &kappa);
-            hex_modes(&v, l, u);
-            gauss_gradients(1 / (4 * row->h_m), u, f);
-            pal_wide pressure = kappa * mean_dilatation(f) - mu - k1;
-            for (int p = 0; p < 8; p++) {
-                pal_wide t = cofactors(f[p], c) * k1 + pressure;
-                for (int i = 0; i < 9; i++) f[p][i] = mu * f[p][i] + t * c[i];
-            }
-            gauss_sums(-0.5 * row->h_m, f, u);
-            hex_add(&v, l, u);
-        }
-        hex_close(row, slots, b, &v);
-    }
-}
+enum { FORCE = 1, ENERGY = 2 };
 
-double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots)
+/* forces are added, the energy is returned */
+PAL_WIDE_INLINE double all_blocks(const pal_hex_row *row, pal_slots *slots, int what)
 {
     pal_wide sum = {0};
     for (int b = 0; b < row->n_block; b++) {
@@ -110,19 +91,34 @@ double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots)
             load_neo(row, b, l, &mu, &k1, &kappa);
             hex_modes(&v, l, u);
             gauss_gradients(1 / (4 * row->h_m), u, f);
-            pal_wide mean = mean_dilatation(f);
+            pal_wide mean = mean_dilatation(f), pressure = kappa * mean - mu - k1;
             for (int p = 0; p < 8; p++) {
-                pal_wide j1 = cofactors(f[p], c) - 1, square = wide_of(-3);
-                for (int i = 0; i < 9; i++) square += f[p][i] * f[p][i];
-                e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
+                pal_wide det = cofactors(f[p], c), j1 = det - 1, square = wide_of(-3), t = det * k1 + pressure;
+                for (int i = 0; i < 9 && (what & ENERGY); i++) square += f[p][i] * f[p][i];
+                if (what & ENERGY) e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
+                for (int i = 0; i < 9 && (what & FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
             }
             e = 0.125 * e + 0.5 * kappa * mean * mean;
-            sum += wide_pick(mu > 0, e, wide_of(0));
+            if (what & ENERGY) sum += wide_pick(mu > 0, e, wide_of(0));
+            if (!(what & FORCE)) continue;
+            gauss_sums(-0.5 * row->h_m, f, u);
+            hex_add(&v, l, u);
         }
+        if (what & FORCE) hex_close(row, slots, b, &v);
     }
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
     return 16 * row->h_m * row->h_m * all;
+}
+
+void pal_hex_neo_force(pal_hex_row *row, pal_slots *slots)
+{
+    all_blocks(row, slots, FORCE);
+}
+
+double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots, bool forces)
+{
+    return forces ? all_blocks(row, slots, FORCE | ENERGY) : all_blocks(row, slots, ENERGY);
 }
 
 /* place of (r, s), r >= s, in the packed K; unknown 7 axis + mode - 1 */

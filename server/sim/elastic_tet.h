@@ -68,7 +68,8 @@ void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material
 void pal_elastic_tets_reset(pal_elastic_tets *t);
 /* f += force at positions d, both [n_node][3]; takes the rotations */
 void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f);
-double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d); /* J; takes the rotations */
+/* J; takes the rotations. f: forces are added as by ..force; NULL: none */
+double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d, double *f);
 /* += Gershgorin row sums of the stiffness at d */
 void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_N_m);
 /* takes the tangent (and the rotations) at d */

@@ -227,12 +227,12 @@ PAL_INLINE double all_blocks(pal_elastic_tets *t, int n_corner, pal_elastic_law 
     return sum;
 }
 
-/* the eight kernels; rotations and the list of inverted elements are taken on the way */
+/* the kernels; rotations and the list of inverted elements are taken on the way */
 static double run_blocks(pal_elastic_tets *t, int what, const double *x, double *force)
 {
     t->n_inverted = t->n_slow = 0;
 #define CASE(n, l, w)                                                                                                  \
-    if (t->wish.n_corner == n && t->wish.law == l && what == w) return all_blocks(t, n, l, w, x, force)
+    if (t->wish.n_corner == n && t->wish.law == l && what == (w)) return all_blocks(t, n, l, w, x, force)
     CASE(4, PAL_LAW_COROTATIONAL, FORCE);
     CASE(4, PAL_LAW_LINEAR, FORCE);
     CASE(4, PAL_LAW_NEO_HOOKEAN, FORCE);
@@ -245,6 +245,12 @@ static double run_blocks(pal_elastic_tets *t, int what, const double *x, double 
     CASE(10, PAL_LAW_COROTATIONAL, ENERGY);
     CASE(10, PAL_LAW_LINEAR, ENERGY);
     CASE(10, PAL_LAW_NEO_HOOKEAN, ENERGY);
+    CASE(4, PAL_LAW_COROTATIONAL, FORCE | ENERGY);
+    CASE(4, PAL_LAW_LINEAR, FORCE | ENERGY);
+    CASE(4, PAL_LAW_NEO_HOOKEAN, FORCE | ENERGY);
+    CASE(10, PAL_LAW_COROTATIONAL, FORCE | ENERGY);
+    CASE(10, PAL_LAW_LINEAR, FORCE | ENERGY);
+    CASE(10, PAL_LAW_NEO_HOOKEAN, FORCE | ENERGY);
 #undef CASE
     return 0;
 }
@@ -380,27 +386,27 @@ static bool tangled(const pal_elastic_tets *t)
     return t->n_inverted > 0 && t->wish.untangle && t->wish.law == PAL_LAW_COROTATIONAL;
 }
 
-void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f)
+static double take(pal_elastic_tets *t, int what, const double *d, double *f)
 {
     bool slots = t->wish.n_corner == 4;
     if (slots) pal_slots_load(t->slots, d);
-    run_blocks(t, FORCE, d, f);
-    if (slots) pal_slots_add(t->slots, f);
-    if (!tangled(t)) return;
-    untangle(t);
-    double torque[3] = {0};
-    for (int i = 0; i < t->n_inverted; i++) add_one(t, t->inverted[i], d, f, torque);
-    give_back(t, d, torque, f);
-}
-
-double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d)
-{
-    if (t->wish.n_corner == 4) pal_slots_load(t->slots, d);
-    double sum = run_blocks(t, ENERGY, d, NULL);
+    double sum = run_blocks(t, what, d, f), torque[3] = {0};
+    if (slots && f) pal_slots_add(t->slots, f);
     if (!tangled(t)) return sum;
     untangle(t);
-    for (int i = 0; i < t->n_inverted; i++) sum += add_one(t, t->inverted[i], d, NULL, NULL);
+    for (int i = 0; i < t->n_inverted; i++) sum += add_one(t, t->inverted[i], d, f, torque);
+    if (f) give_back(t, d, torque, f);
     return sum;
+}
+
+void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f)
+{
+    take(t, FORCE, d, f);
+}
+
+double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d, double *f)
+{
+    return take(t, f ? FORCE | ENERGY : ENERGY, d, f);
 }
 
 /* D R' of every element */

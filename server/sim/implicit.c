@@ -28,8 +28,13 @@ static size_t bytes3(const pal_implicit *core)
 
 pal_err pal_implicit_read(pal_item *item, const pal_build *build, pal_implicit_wish *out)
 {
-    *out = (pal_implicit_wish){
-        .tolerance = 1e-2, .iterations = 60, .newton = 1, .refresh_iterations = 12, .refresh = true, .warp = true};
+    *out = (pal_implicit_wish){.tolerance = 1e-2,
+                               .iterations = 60,
+                               .newton = 1,
+                               .refresh_iterations = 12,
+                               .refresh = true,
+                               .warp = true,
+                               .watch = true};
     PAL_TRY(pal_item_number(item, "tolerance", 1e-14, 0.5, &out->tolerance, build->note));
     PAL_TRY(pal_item_count(item, "iterations", 1, 100000, &out->iterations, build->note));
     PAL_TRY(pal_item_count(item, "newton", 1, 1000, &out->newton, build->note));
@@ -37,6 +42,7 @@ pal_err pal_implicit_read(pal_item *item, const pal_build *build, pal_implicit_w
     PAL_TRY(pal_item_count(item, "refresh_iterations", 1, 100000, &out->refresh_iterations, build->note));
     PAL_TRY(pal_item_bool(item, "refresh", &out->refresh, build->note));
     PAL_TRY(pal_item_bool(item, "warp", &out->warp, build->note));
+    PAL_TRY(pal_item_bool(item, "watch", &out->watch, build->note));
     PAL_TRY(pal_item_done(item, build->note));
     if (out->substep_s == 0) out->substep_s = INFINITY;
     return PAL_ERR_OK;
@@ -363,17 +369,18 @@ static double still_N(const pal_body *body)
 }
 
 /* energy at velocities v, the body being at its x: kinetic, of the rows, less the work of loads and contact since the
- * sub-step's begin; *slack: what of it is not worth an iteration */
-static double total_energy(pal_implicit *core, const double *velocity, double *slack)
+ * sub-step's begin, when it has moved; *slack: what of it is not worth an iteration */
+static double total_energy(pal_implicit *core, const double *velocity, bool moved, double *slack)
 {
     const pal_body *body = core->system.body;
     double kinetic = 0, rows = pal_system_energy(&core->system), work = 0, *p = core->cg.z, *q = core->cg.q;
-    for (int i = 0; i < core->cg.n; i++) p[i] = body->x[i] - core->x0[i];
-    work = pal_system_work(&core->system, p);
     if (body->solid_mass) kinetic = 0.5 * pal_system_square(&core->system, 1, 0, velocity);
     for (int i = 0; i < body->n_dof && !body->solid_mass; i++)
-        kinetic += 0.5 * body->mass_kg[i] * pal_dot3(velocity + 3 * i, velocity + 3 * i);
-    if (core->system.has_contact) {
+        pal_scale3(q + 3 * i, body->mass_kg[i], velocity + 3 * i);
+    if (!body->solid_mass) kinetic = 0.5 * pal_sum_products(core->cg.n, velocity, q);
+    for (int i = 0; i < core->cg.n && moved; i++) p[i] = body->x[i] - core->x0[i];
+    if (moved) work = pal_system_work(&core->system, p);
+    if (moved && core->system.has_contact) {
         memset(q, 0, bytes3(core));
         pal_system_contact(&core->system, 1, 0, p, q);
         work -= 0.5 * pal_sum_products(core->cg.n, p, q);
@@ -394,7 +401,7 @@ static bool is_led(const pal_body *body)
 static bool rises(pal_implicit *core)
 {
     double slack;
-    return core->guarded && total_energy(core, core->system.body->v, &slack) > core->energy0_J + slack;
+    return core->guarded && total_energy(core, core->system.body->v, true, &slack) > core->energy0_J + slack;
 }
 
 /* of all loads on points, Euclidean, N */
@@ -483,8 +490,8 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     pal_system_touch(&core->system, step);
     step->drag_apart = true;
     double slack;
-    core->guarded = core->wish.newton == 1 && core->system.has_energy && !is_led(body);
-    if (core->guarded) core->energy0_J = total_energy(core, body->v, &slack);
+    core->guarded = core->wish.watch && core->wish.newton == 1 && core->system.has_energy && !is_led(body);
+    if (core->guarded) core->energy0_J = total_energy(core, body->v, false, &slack);
     return true;
 }
 

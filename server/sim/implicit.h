@@ -32,6 +32,7 @@ typedef struct pal_implicit_wish {
     int refresh_iterations; /* 12: more in one solve begin a new factor ...                                */
     bool refresh;           /* ... true                                                                    */
     bool warp;              /* true: the factor turns with the body (false shows what that is worth)        */
+    bool watch;             /* true: energy is watched (false shows what that costs)                        */
 } pal_implicit_wish;
 
 typedef struct pal_implicit {

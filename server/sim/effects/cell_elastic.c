@@ -29,21 +29,28 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
-    return pal_cells_elastic_make(solid, strcmp(name, "polar") == 0 ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena,
-                                  row, build->note);
+    bool polar = strcmp(name, "polar") == 0;
+    PAL_TRY(pal_cells_elastic_make(solid, polar ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena, row, build->note));
+    return polar && build->body->implicit ? pal_kept_make(build->body->n_node, build->arena, &row->kept) : PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    pal_cells_elastic_refresh(self);
-    pal_cells_elastic_force(self, step->body->d, step->body->f);
+    pal_cells_elastic *row = self;
+    pal_cells_elastic_refresh(row);
+    if (pal_kept_at(&row->kept, step->body->d))
+        pal_kept_add(&row->kept, step->body->f);
+    else
+        pal_cells_elastic_force(row, step->body->d, step->body->f);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    pal_cells_elastic_refresh(self);
-    return pal_cells_elastic_energy(self, body->d);
+    pal_cells_elastic *row = self;
+    pal_cells_elastic_refresh(row);
+    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
+    return pal_kept_close(&row->kept, pal_cells_elastic_energy(row, body->d, pal_kept_open(&row->kept, body->d)));
 }
 
 static void reset(void *self, const pal_body *body)

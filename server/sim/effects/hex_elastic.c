@@ -43,6 +43,10 @@ static pal_err run(void *self, pal_step *step)
         body->rescue.ns += pal_clock_ns() - before;
         return PAL_ERR_OK;
     }
+    if (pal_kept_at(&row->kept, body->d)) {
+        pal_kept_add(&row->kept, body->f);
+        return PAL_ERR_OK;
+    }
     pal_slots_load(body->slots, body->d);
     if (row->law == PAL_LAW_NEO_HOOKEAN)
         pal_hex_neo_force(row, body->slots);
@@ -55,10 +59,14 @@ static pal_err run(void *self, pal_step *step)
 static double energy(void *self, const pal_body *body)
 {
     pal_hex_row *row = self;
-    if (row->tangled) return pal_elastic_tets_energy(row->split, body->d);
+    if (row->tangled) return pal_elastic_tets_energy(row->split, body->d, NULL);
+    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
     pal_slots_load(body->slots, body->d);
-    return row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->slots)
-                                           : pal_hex_corot_energy(row, body->slots);
+    double *forces = pal_kept_open(&row->kept, body->d);
+    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->slots, forces)
+                                                 : pal_hex_corot_energy(row, body->slots, forces);
+    if (forces) pal_slots_add(body->slots, forces);
+    return pal_kept_close(&row->kept, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)

@@ -19,6 +19,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_tet.h"
+#include "server/sim/kept.h"
 
 #include <string.h>
 
@@ -39,6 +40,7 @@ typedef struct tet_row {
     double least_volume_m3;       /* of those that are looked at, times six */
     bool tangled, cheap;          /* cheap: whole.n_inverted tells that the body is tangled */
     uint64_t n_tangled, n_switch; /* since reset */
+    pal_kept kept;                /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
 /* beyond the first pair a body is tangled, within the second it is whole again */
@@ -126,6 +128,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
     PAL_TRY(pal_elastic_tets_make(&wish, build, &row->whole));
+    if (body->implicit) PAL_TRY(pal_kept_make(body->n_node, build->arena, &row->kept));
     return wish.untangle && body->implicit && wish.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
 }
 
@@ -138,8 +141,12 @@ static pal_elastic_tets *acting(void *self)
 
 static pal_err run(void *self, pal_step *step)
 {
-    const tet_row *row = self;
+    tet_row *row = self;
     if (row->split) step->body->rescue.n_tangled = row->n_tangled, step->body->rescue.n_split = row->n_switch;
+    if (!row->tangled && pal_kept_at(&row->kept, step->body->d)) {
+        pal_kept_add(&row->kept, step->body->f);
+        return PAL_ERR_OK;
+    }
     uint64_t before = row->tangled ? pal_clock_ns() : 0;
     pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
     if (row->tangled) step->body->rescue.ns += pal_clock_ns() - before;
@@ -148,7 +155,12 @@ static pal_err run(void *self, pal_step *step)
 
 static double energy(void *self, const pal_body *body)
 {
-    return pal_elastic_tets_energy(acting(self), body->d);
+    tet_row *row = self;
+    if (row->tangled) return pal_elastic_tets_energy(row->split, body->d, NULL);
+    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
+    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_kept_open(&row->kept, body->d));
+    /* what inverted elements borrow may differ the next time it is asked for */
+    return row->whole.n_inverted > 0 ? sum : pal_kept_close(&row->kept, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -162,6 +174,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     (void)body, (void)note;
     pal_elastic_tets_material(&row->whole, to);
     if (row->split) pal_elastic_tets_material(row->split, to);
+    pal_kept_forget(&row->kept);
     return PAL_ERR_OK;
 }
 
@@ -172,6 +185,7 @@ static void reset(void *self, const pal_body *body)
     pal_elastic_tets_reset(&row->whole);
     if (row->split) pal_elastic_tets_reset(row->split);
     row->tangled = false;
+    pal_kept_forget(&row->kept);
     row->n_tangled = row->n_switch = 0;
 }
 

@@ -2,7 +2,7 @@
  * linearisation per step (newton 1) or as many as asked. First order, damps; contact and drag are implicit too.
  *
  * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
- * refresh (true); see implicit.h. */
+ * refresh (true), warp (true), watch (true); see implicit.h. */
 #include "server/sim/effect_list.h"
 #include "server/sim/implicit.h"
 
