@@ -25,7 +25,7 @@ static const char about[] =
     "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
     "three places; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
     "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
-    ".svg and a page .html. Ctrl-C ends after the setting under way; the same command goes on where it was.\n"
+    ".svg and a page .html. Ctrl-C ends it; the same command goes on after the last setting.\n"
     "--within and --budget name a setting, and with -o write a scene of it; when the study is there already, nothing\n"
     "is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or \"budget\": {\"step_ms\": 4} is served "
     "and\n"
@@ -40,6 +40,7 @@ typedef struct study_run {
     pal_study_question question;
     pal_setting_wish wish;
     const char *methods, *folder, *scene; /* scene: -o */
+    char load_case[PAL_NAME];             /* of the study that is there */
     bool again;
     pal_study_input input;
     char stem[PAL_STUDY_PATH], path[MOST_PATH]; /* of the study's files, study.json itself */
@@ -90,8 +91,8 @@ static bool read_amount(const char *text, const char *const *unit, const double 
     return false;
 }
 
-/* what is wrong with the words; NULL: nothing */
-static const char *take_words(study_run *run, const char *within, const char *budget)
+/* false: out says what is wrong with the words, and quotes them */
+static bool take_words(study_run *run, const char *within, const char *budget, char *out, size_t n_byte)
 {
     static const char *const length[] = {"mm", "um", "\xc2\xb5m", "cm", "m", NULL};
     static const double length_factor[] = {1e3, 1e6, 1e6, 1e2, 1};
@@ -99,21 +100,28 @@ static const char *take_words(study_run *run, const char *within, const char *bu
     static const double span_factor[] = {1, 1e3, 1e3, 1e-3};
     static const char *const model[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
     if (within && !read_amount(within, length, length_factor, &run->wish.within_m))
-        return "--within: is not a length above 0 with its unit, mm, um, cm or m, as 1mm";
+        return !snprintf(out, n_byte,
+                         "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm", within);
     if (budget && !read_amount(budget, span, span_factor, &run->wish.budget_ms))
-        return "--budget: is not a time above 0 with its unit, ms, us or s, as 4ms";
-    if (run->scene && !within && !budget) return "-o: which setting is to be written? --within or --budget says it";
-    if (run->methods && strlen(run->methods) >= sizeof run->file->methods) return "--methods: is too long";
+        return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
+                         budget);
+    if (run->scene && !within && !budget)
+        return !snprintf(out, n_byte, "-o: which setting is to be written? --within or --budget says it");
+    if (run->methods && strlen(run->methods) >= sizeof run->file->methods)
+        return !snprintf(out, n_byte, "--methods: \"%.40s...\" is too long", run->methods);
     for (const char *at = run->methods; at && *at;) {
         size_t n = strcspn(at, ",");
         int k = 0;
         while (model[k] && (strlen(model[k]) != n || strncmp(at, model[k], n) != 0)) k++;
         if (!model[k] || (at[n] && !at[n + 1]))
-            return "--methods: has a word that is not fem, tet_springs, adaptive_springs or subdivision_fem";
+            return !snprintf(out, n_byte,
+                             "--methods: \"%.80s\" has a word that is not fem, tet_springs, adaptive_springs or "
+                             "subdivision_fem",
+                             run->methods);
         at += n + (at[n] == ',');
     }
-    if (run->methods && !run->methods[0]) return "--methods: names none";
-    return NULL;
+    if (run->methods && !run->methods[0]) return !snprintf(out, n_byte, "--methods: \"\" names none");
+    return true;
 }
 
 /* the command as it was typed, words with blanks in quotes */
@@ -146,6 +154,12 @@ static pal_err check_same(const study_run *run, const pal_study_file *old, pal_n
     else if (strcmp(old->study.machine, now->study.machine) != 0)
         what = "another machine", snprintf(detail, sizeof detail, "%s", old->study.machine);
     if (!what) return PAL_ERR_OK;
+    char other[sizeof now->loads + 8];
+    snprintf(other, sizeof other, "%s, quick", now->loads);
+    if (!strcmp(other, old->loads))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "%.200s: is of a quick study: --quick goes on with it, --again starts over, --out keeps it",
+                            run->path);
     return pal_note_set(note, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
                         run->path, what, detail);
 }
@@ -174,6 +188,28 @@ static void join_methods(pal_study_file *now, const pal_study_file *old)
     if (strlen(both) < sizeof now->methods) memcpy(now->methods, both, strlen(both) + 1);
 }
 
+/* which setting is to be picked is asked of the study that is there, whatever loads it has; those that are typed count
+ */
+static pal_err take_kept_loads(study_run *run, pal_note *note)
+{
+    pal_study_file *old = NULL;
+    pal_study_question *q = &run->question;
+    bool asks = run->wish.within_m > 0 || run->wish.budget_ms > 0;
+    bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
+    double seconds = 0;
+    if (asks && !given && !run->again && !access(run->path, F_OK)) {
+        pal_note why = {""};
+        pal_err err = pal_study_file_read(run->path, &old, &why);
+        if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
+        pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
+        if (run->load_case[0]) q->load_case = run->load_case;
+        q->seconds = seconds;
+        free(old);
+    }
+    if (!(q->seconds > 0)) q->seconds = PAL_STUDY_SECONDS;
+    return PAL_ERR_OK;
+}
+
 /* *whole: nothing is left to be measured */
 static pal_err look_before(study_run *run, bool *whole, pal_note *note)
 {
@@ -188,6 +224,7 @@ static pal_err look_before(study_run *run, bool *whole, pal_note *note)
         *whole = true;
         run->n_before = old->study.n_point;
         *run->file = *old;
+        pal_study_front(&run->file->study);
     } else if (!err) {
         join_methods(run->file, old);
         run->before = malloc(sizeof *run->before);
@@ -256,8 +293,13 @@ static bool show(const char *what, double fraction, void *user)
     else
         snprintf(text, sizeof text, "%s%s", what, share);
     pal_report_progress(text, 0, &run->common);
-    /* a setting under way is finished; before there is one, there is nothing to lose */
-    return !(stop_asked && run->n_new == 0);
+    return !stop_asked;
+}
+
+static bool goes_on(void *user)
+{
+    (void)user;
+    return !stop_asked;
 }
 
 static pal_err measure(study_run *run, pal_note *note)
@@ -272,6 +314,7 @@ static pal_err measure(study_run *run, pal_note *note)
                            .before = run->before,
                            .done = keep,
                            .progress = show,
+                           .goes_on = goes_on,
                            .user = run};
     if (!out) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
     snprintf(words, sizeof words, "%s", run->methods ? run->methods : "");
@@ -405,14 +448,15 @@ static int n_files(const study_run *run, char file[FILES][MOST_PATH])
 
 static void print(const study_run *run)
 {
-    char text[PAL_SETTING_TEXT], asked[80], file[FILES][MOST_PATH];
+    char text[PAL_SETTING_TEXT], asked[80], off[PAL_STUDY_OFF], file[FILES][MOST_PATH];
     const pal_study *study = &run->file->study;
     if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_all);
-    pal_study_print(run->file, stdout);
+    /* of a study that is there already only the answer is news */
+    if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
         const pal_priced_setting *p = &study->point[run->picked].priced;
-        printf("%s: %s, %.3g mm off in %.3g ms\n", pal_setting_wish_text(&run->wish, asked),
-               pal_setting_text(&p->setting, text), 1e3 * p->error_m, p->ms);
+        printf("%s: %s, %s in %.3g ms\n", pal_setting_wish_text(&run->wish, asked), pal_setting_text(&p->setting, text),
+               pal_study_off_text(run->file, p->error_m, off), p->ms);
     }
     int n = n_files(run, file);
     for (int k = 0; k < n; k++)
@@ -450,6 +494,7 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
     if (run->scene) PAL_TRY(scene_path(run, note));
     PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, note));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
+    PAL_TRY(take_kept_loads(run, note));
     PAL_TRY(pal_study_input_open(&run->question, &run->input, note));
     if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
     pal_study_input_describe(&run->input, &run->question, run->file);
@@ -500,7 +545,7 @@ int command_study(int argc, char **argv)
     static study_run run;
     const char *within = NULL, *budget = NULL, *unit = NULL;
     pal_surface_scene surface = {.label = -1};
-    run = (study_run){.question = {.seconds = 0.5, .options = &surface}};
+    run = (study_run){.question = {.options = &surface}};
     const pal_flag flag[] = {
         {"--within", "LENGTH", PAL_FLAG_TEXT, &within, 0, 0,
          "names the cheapest setting whose error, with the reference's own, is no more: 1mm,\n300um"},
@@ -533,10 +578,12 @@ int command_study(int argc, char **argv)
                                   .most_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.question.word, &n);
     if (code >= 0) return code;
-    const char *sentence = take_words(&run, within, budget);
+    char sentence[240] = "";
+    bool fine = take_words(&run, within, budget, sentence, sizeof sentence);
     surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
-    if (!sentence && unit && surface.unit_m == 0) sentence = "--units: is not m, cm, mm, um or in";
-    if (sentence) {
+    if (fine && unit && surface.unit_m == 0)
+        fine = !snprintf(sentence, sizeof sentence, "--units: \"%.40s\" is not m, cm, mm, um or in", unit) && fine;
+    if (!fine) {
         fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", argv[0], sentence, argv[0]);
         return 2;
     }

@@ -18,6 +18,16 @@ const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80])
     return out;
 }
 
+const char *pal_study_off_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_OFF])
+{
+    const pal_study *s = &file->study;
+    char own[64] = "";
+    if (s->reference_m > 0) snprintf(own, sizeof own, ", +- %.2g mm of the reference,", 1e3 * s->reference_m);
+    snprintf(out, PAL_STUDY_OFF, "%.3g mm off%s under %s, that move it by up to %.3g mm", 1e3 * error_m, own,
+             file->loads, 1e3 * s->most_m);
+    return out;
+}
+
 static bool is_measured(const pal_study_point *p)
 {
     return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
@@ -71,6 +81,13 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_setti
         n++;
         if (!best || is_nearer(p, best, wish)) best = p;
     }
+    if (!pal_study_trusted(study)) {
+        snprintf(out, n_byte,
+                 "none of the settings is named, since the reference itself is only within %.3g mm where %.3g mm move: "
+                 "hold more of the body (palpate prepare --hold 20, with --up as it lies), study it without --quick",
+                 1e3 * study->reference_m, 1e3 * study->most_m);
+        return;
+    }
     pal_setting_wish_text(wish, asked);
     if (wish->within_m > 0 && study->reference_m > 0)
         snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
@@ -90,6 +107,7 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
     *out = NULL;
     if (access(path, F_OK)) return PAL_ERR_OK;
     PAL_TRY(pal_study_file_read(path, out, note));
+    pal_study_front(&(*out)->study);
     int body = (*out)->index;
     if (body < scene->n_body && !strcmp(pal_study_shape(&scene->body[body], shape), (*out)->shape)) return PAL_ERR_OK;
     free(*out);
@@ -100,7 +118,7 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
 static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_setting_wish *wish,
                     pal_studied *out, pal_note *note)
 {
-    char asked[80], text[PAL_SETTING_TEXT], none[360];
+    char asked[80], text[PAL_SETTING_TEXT], none[360], off[PAL_STUDY_OFF];
     const pal_study *study = &out->file->study;
     pal_setting_wish_text(wish, asked);
     out->picked = pal_study_serving(study, "", wish);
@@ -115,9 +133,9 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
     pal_err err = pal_setting_make(scene, out->file->index, &setting, &why, &out->set);
     if (err) return pal_note_set(note, err, "%s: %s: %s", path, pal_setting_text(&p->setting, text), why.text);
     out->scene = &out->set->scene;
-    snprintf(out->said, sizeof out->said, "%s: %s, %.3g mm off in %.3g ms, picked of the %d settings of %.160s (%s)",
-             scene->body[out->file->index].name, pal_setting_text(&p->setting, text), 1e3 * p->error_m, p->ms,
-             out->n_setting, path, asked);
+    snprintf(out->said, sizeof out->said, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
+             scene->body[out->file->index].name, pal_setting_text(&p->setting, text),
+             pal_study_off_text(out->file, p->error_m, off), p->ms, out->n_setting, path, asked);
     return PAL_ERR_OK;
 }
 

@@ -10,10 +10,13 @@ typedef struct pal_setting_wish {
 } pal_setting_wish;
 /* "within 1 mm", "in at most 4 ms", "within 1 mm in at most 4 ms"; returns out */
 const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80]);
+enum { PAL_STUDY_OFF = 320 };
+/* "0.54 mm off, +- 0.42 mm of the reference, under three presses and a pull, 0.5 s, that move it by up to 18 mm" */
+const char *pal_study_off_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_OFF]);
 /* pal_study_pick among the methods (words with commas, "": all); index of the point, -1: none serves */
 int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish);
-/* "none of the 48 settings is within 1 mm: the nearest is fem ..., 1.3 mm in 5.2 ms"; for a study in which none serves
- */
+/* "none of the 48 settings is within 1 mm: the nearest is fem ..., 1.3 mm in 5.2 ms", or that the reference is not to
+ * be trusted and what to do; for a study in which none serves */
 void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out,
                     size_t n_byte);
 
@@ -25,7 +28,7 @@ typedef struct pal_studied {
     int picked;             /* point of the study; -1: none was asked for               */
     int body, n_setting;    /* what a session may switch to                             */
     pal_priced_setting *setting;
-    char said[400]; /* which setting was picked and from which study; "": none                           */
+    char said[720]; /* which setting was picked and from which study; "": none                           */
     char warn[400]; /* a study that was not looked at, or that another machine made; "": nothing to say */
 } pal_studied;
 /* word: as it was given to the command (scene_arg.h); scene: loaded from it, borrowed until close. REFUSED when a

@@ -112,6 +112,18 @@ static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
     return l->has_total ? add_numbers(sum, l->total_N, 3) : sum;
 }
 
+void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME])
+{
+    static const char named[] = "load case ";
+    const char *comma = strchr(loads, ',');
+    double value = comma ? strtod(comma + 1, NULL) : 0;
+    *seconds = value >= 0.01 && value <= 60 ? value : 0;
+    *quick = strstr(loads, ", quick") != NULL;
+    load_case[0] = 0;
+    if (comma && !strncmp(loads, named, sizeof named - 1))
+        snprintf(load_case, PAL_NAME, "%.*s", (int)(comma - loads) - (int)(sizeof named - 1), loads + sizeof named - 1);
+}
+
 void pal_study_input_describe(const pal_study_input *in, const pal_study_question *q, pal_study_file *file)
 {
     const pal_scene *scene = in->scene;
@@ -120,7 +132,10 @@ void pal_study_input_describe(const pal_study_input *in, const pal_study_questio
     pal_setting now;
     pal_setting_of(scene, in->body, &now);
     sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
-    char loads[80] = "three presses";
+    const pal_body_def *def = &scene->body[in->body];
+    bool full = def->cells || def->mesh->tets.n_node > 0;
+    char loads[80];
+    snprintf(loads, sizeof loads, full ? "three presses and a pull" : "three presses");
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
     for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);
     if (in->has_samples) sum = add_numbers(sum, in->samples.x, 3 * (size_t)in->samples.n);

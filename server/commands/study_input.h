@@ -30,6 +30,10 @@ typedef struct pal_study_question {
  * readers. Closed by pal_study_input_close, also after an error */
 pal_err pal_study_input_open(const pal_study_question *question, pal_study_input *out, pal_note *note);
 void pal_study_input_close(pal_study_input *input);
+#define PAL_STUDY_SECONDS 0.5 /* of the dynamic run, where none are given */
+/* what of pal_study_input_describe's loads can be asked for again: seconds (0: not said), quick, load case ("": none)
+ */
+void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME]);
 /* says in file of what body and loads the study is: name, body, index, shape, loads, digest */
 void pal_study_input_describe(const pal_study_input *input, const pal_study_question *question, pal_study_file *file);
 #endif

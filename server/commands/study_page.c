@@ -57,9 +57,11 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
     fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
             1e3 * s->most_m);
-    if (s->reference_m > 0.25 * s->most_m)
-        fprintf(to, "Nearly as much as it moves: is the body held by too little (palpate prepare --hold 20), or was it "
-                    "--quick?\n");
+    if (!pal_study_trusted(s))
+        fprintf(to,
+                "So much that no setting is named: hold more of the body (palpate prepare --hold 20, with --up as "
+                "it lies)%s.\n",
+                is_quick(file) ? ", or study it without --quick" : "");
     if (is_quick(file))
         fprintf(to,
                 "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
@@ -86,7 +88,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
                 p->why[0] ? "; " : "", p->why);
     }
     fprintf(to,
-            "* the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with shorter "
+            "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that. "
+            "ms: for %.3g ms of the body's time, with shorter "
             "steps so "
             "many of them.\nLive: no more than that. Steps: sub-steps of one.\n",
             1e3 * s->step_s);

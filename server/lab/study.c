@@ -22,6 +22,11 @@ static void free_job(pal_study_job *job)
     free(job->scene), free(job->problem);
 }
 
+bool pal_study_goes_on(const pal_study_job *job)
+{
+    return !job->options->goes_on || job->options->goes_on(job->options->user);
+}
+
 /* ---- probes ---- */
 
 static pal_err take_room(pal_study_job *job, int n_probe)

@@ -1,23 +1,27 @@
 /* What accuracy costs: one body under the same loads in many settings, each with its error against a converged
  * reference and its milliseconds per live step. [load]
  *
- * Loads: those of a problem's load case, or of a scene three presses on patches of its surface far from the supports,
- * each as strong as moves the patch by about 2 % of the body's diagonal (linear estimate), or a half, a quarter, an
- * eighth of that where the reference finds no rest. Static: the rest under every load, at up to 1,000 points of the
- * shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes about as far as the
- * whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's own damping; what
+ * Loads: those of a problem's load case; or of a scene three presses on patches of its surface far from the supports,
+ * each as strong as moves the body by about 2 % of its diagonal (linear estimate, then the reference's own rest, within
+ * a factor of 1.5), and of a body that is full a pull at the first of these places, outward and aslant, with what the
+ * first tool may (15 N where there is none), or what moves the body by 10 % of its diagonal where that is less; half of
+ * that, up to four times, where the reference finds no rest. Static: the rest under every load, at up to 1,000 points
+ * of the shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes about as far as
+ * the whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's own damping; what
  * would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed.
  * Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own
- * error is estimated from its last changes (Richardson); its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s)
- * or a quarter (a half) of the scene's step where that is shorter;
+ * error is estimated from its last changes (Richardson of an order between 1 and 2; changes that shrink less are
+ * scatter of cut voxels, and the larger of them counts 1.25 times); a quick one is made finer, up to 12,000 nodes,
+ * until that is 15 % of what moves most. Its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s) or a quarter (a half)
+ * of the scene's step where that is shorter;
  * adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of the coarse surface; or
  * samples that the caller has. Deterministic but for the milliseconds and seconds.
  * Swept are the scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to
  * 1/60 s, and 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until
  * they have taken 50 ms together (1,200 steps at most).
- * Calibrated springs are fitted to the reference under all loads but the last, which judges them unseen; where there is
- * one load only, the point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor
- * picked. */
+ * Calibrated springs are fitted to the reference under all loads but the last (the pull), which judges them unseen;
+ * where there is one load only, the point's `why` says that it is judged by what it was fitted to, and it is neither on
+ * the front nor picked. */
 #ifndef PAL_LAB_STUDY_H
 #define PAL_LAB_STUDY_H
 #include "server/lab/sample_points.h"
@@ -65,6 +69,7 @@ typedef struct pal_study_options {
     /* [load] after every point: the study so far, to be kept; may be NULL. False stops with STATE */
     bool (*done)(const pal_study *study, int n_all, void *user);
     bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */
+    bool (*goes_on)(void *user); /* asked between the steps of whatever runs; may be NULL; false stops with STATE */
     void *user;
 } pal_study_options;
 
@@ -79,10 +84,16 @@ pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *lo
 pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_note *note,
                                 pal_set_scene **out);
 
-/* marks the front anew: points that no other beats in both ms and error_m */
+/* share of most_m that the reference's own error may be before nothing that is measured against it is worth naming */
+#define PAL_STUDY_TRUST 0.3
+/* is the reference worth its name? [any] */
+bool pal_study_trusted(const pal_study *study);
+/* marks the front anew: points that no other beats in both ms and error, where an error below the reference's own
+ * counts as that; none when the reference is not to be trusted */
 void pal_study_front(pal_study *study);
 /* the cheapest point with error_m (plus the reference's own error) at most within_m, or the most accurate one with ms
- * at most budget_ms; the one that is not asked for is NaN; both: cheapest that keeps both. -1: none serves */
+ * at most budget_ms (of those nearer than the reference's own error the cheapest); the one that is not asked for is
+ * NaN; both: cheapest that keeps both. -1: none serves, or the reference is not to be trusted */
 int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
 /* cost and error foreseen for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a +
  * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the

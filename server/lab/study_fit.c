@@ -22,11 +22,17 @@ static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out
     return PAL_ERR_OK;
 }
 
-static pal_err fit(const pal_calibration *calibration, pal_setting *setting, pal_note *note)
+static bool look(void *user, const pal_fit_step *step)
+{
+    (void)step;
+    return pal_study_goes_on(user);
+}
+
+static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_setting *setting, pal_note *note)
 {
     pal_calibration_info info;
     pal_fit_result result;
-    const pal_fit_options options = {.most_evaluation = MOST_EVALUATIONS};
+    const pal_fit_options options = {.most_evaluation = MOST_EVALUATIONS, .step = look, .user = job};
     pal_calibration_info_of(calibration, &info);
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
     if (!theta) return PAL_ERR_MEMORY;
@@ -62,7 +68,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
     if (!err)
         err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
                                      &calibration, note);
-    if (!err) err = fit(calibration, setting, note);
+    if (!err) err = fit(job, calibration, setting, note);
     pal_calibration_destroy(calibration);
     for (int k = 0; k < n_fit; k++) pal_samples_free(&samples[k]);
     return err;

@@ -1,4 +1,4 @@
-/* Presses for a scene that has no load cases: where they stand, how strong they are. */
+/* Presses and a pull for a scene that has no load cases: where they stand, how strong they are. */
 #include "server/base/vec3.h"
 #include "server/lab/study_parts.h"
 
@@ -7,10 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PRESSES = 3, COARSE = 10 };
+enum { PRESSES = 3, PULL = PRESSES, COARSE = 10, ROUNDS = 4 };
 static const double coarse_share = 0.6; /* of the reference's size, at least COARSE: a thin tip is stiff in fewer */
 /* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
 static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
+/* the same of the pull: as wide as a hand takes hold, no farther than this by the linear estimate, aslant by so much */
+static const double grip_share = 0.06, pull_share = 0.1, aslant = 0.7, usual_cap_N = 15;
+/* what the reference moves by may be so many times what was wanted, or so little of it */
+static const double wide_of = 1.5;
 
 static double diagonal(const pal_surface *s, double low[3])
 {
@@ -61,6 +65,19 @@ static void inward(const pal_surface *s, const double at[3], double half, double
     if (size > 0) pal_scale3(out, -1 / size, sum);
 }
 
+/* outward and aslant, so that no press has said it before */
+static void turn_to_pull(double n[3])
+{
+    double axis[3] = {0, 0, 0}, side[3];
+    int least = fabs(n[1]) < fabs(n[0]) ? 1 : 0;
+    if (fabs(n[2]) < fabs(n[least])) least = 2;
+    axis[least] = 1;
+    pal_cross3(side, n, axis);
+    pal_scale3(side, aslant / fmax(pal_norm3(side), 1e-30), side);
+    for (int c = 0; c < 3; c++) n[c] = side[c] - n[c];
+    pal_scale3(n, 1 / pal_norm3(n), n);
+}
+
 static void place_load(pal_study_job *job, int index, const pal_surface *s, const double at[3], double half)
 {
     pal_problem_case *c = &job->problem->load_case[index];
@@ -72,7 +89,11 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
         for (int k = 0; k < 3; k++) n[k] = low[k] - at[k] + size / 2;
         pal_scale3(n, 1 / fmax(pal_norm3(n), 1e-30), n);
     }
-    snprintf(c->id, sizeof c->id, "press %d", index + 1);
+    if (index == PULL) turn_to_pull(n);
+    if (index == PULL)
+        snprintf(c->id, sizeof c->id, "pull");
+    else
+        snprintf(c->id, sizeof c->id, "press %d", index + 1);
     c->n_load = 1;
     c->load[0] = (pal_problem_load){.kind = PAL_LOAD_TRACTION, .has_total = true};
     pal_copy3(c->load[0].total_N, n);
@@ -107,18 +128,37 @@ static pal_err scale_load(pal_study_job *job, int index, double size_m)
         double moved = 0;
         for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
         if (!(moved > 0) || !isfinite(moved))
-            return pal_note_set(job->note, PAL_ERR_REFUSED, "press %d of %g N moves nothing", index + 1,
+            return pal_note_set(job->note, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
                                 pal_norm3(total));
-        pal_scale3(total, share[round] * size_m / moved, total);
+        double wanted = share[round] * size_m / moved, size_N = pal_norm3(total);
+        /* a hand pulls with what the tool may, and no farther than a body can be said to bear */
+        double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
+        if (index == PULL) wanted = fmin(cap_N / size_N, pull_share * size_m / moved);
+        pal_scale3(total, wanted, total);
     }
     return PAL_ERR_OK;
+}
+
+bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
+{
+    if (index >= job->n_press || job->round[index] >= ROUNDS) return false;
+    double *total = job->problem->load_case[index].load[0].total_N, moved = 0, times = 1;
+    bool none = err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
+    for (int i = 0; i < job->n_probe && !err; i++) moved = fmax(moved, pal_norm3(job->still[index] + 3 * i));
+    if (none) times = 0.5;
+    if (!err && moved > 0) times = press_share * job->out->size_m / moved;
+    if (!err && index == PULL) times = moved > 0 ? fmin(wide_of * pull_share * job->out->size_m / moved, 1) : 1;
+    if (!none && times <= wide_of && times >= (index == PULL ? 1 : 1 / wide_of)) return false;
+    job->round[index]++;
+    pal_scale3(total, times, total);
+    return true;
 }
 
 pal_err pal_study_presses(pal_study_job *job)
 {
     pal_study_world w;
     pal_setting s = coarse(job);
-    int place[PRESSES], n_held = 0;
+    int place[PRESSES], n_held = 0, n_load = job->shell ? PRESSES : PULL + 1;
     double low[3];
     PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
     for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->held[i] != 0;
@@ -131,9 +171,11 @@ pal_err pal_study_presses(pal_study_job *job)
     double size_m = diagonal(surface, low);
     for (int k = 0; k < PRESSES && !err; k++)
         place_load(job, k, surface, job->probe + 3 * place[k], patch_share * size_m);
+    /* where it moves most: at the place that is farthest from what holds it */
+    if (!err && n_load > PULL) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * size_m);
     pal_study_close(&w);
-    job->n_load = job->problem->n_case = PRESSES;
-    for (int k = 0; k < PRESSES && !err; k++) err = scale_load(job, k, size_m);
+    job->n_load = job->n_press = job->problem->n_case = n_load;
+    for (int k = 0; k < n_load && !err; k++) err = scale_load(job, k, size_m);
     return err;
 }
 

@@ -37,7 +37,8 @@ typedef struct pal_study_job {
     pal_scene *scene;     /* of the one body, without what the study does not need; own */
     pal_problem *problem; /* the body and its loads in the frame of the file; own          */
     const pal_problem_case *load[PAL_STUDY_LOADS];
-    int n_load;
+    int n_load, n_press;        /* n_press: loads of a scene, which the study has chosen itself */
+    int round[PAL_STUDY_LOADS]; /* how often their strength was chosen anew              */
     const pal_study_options *options;
     const char *law; /* of the reference */
     bool shell;      /* adaptive_springs: points and loads are those of the coarse surface */
@@ -53,9 +54,9 @@ typedef struct pal_study_job {
     double (*own)[3]; /* work space [n_way]                          */
     double seconds;
     pal_study_rest rest;
-    int reference;   /* its size                                                        */
-    double box_m[3]; /* sides, where the body fills them; else 0                           */
-    double slender;  /* sizes are that many times those of a compact body               */
+    int reference, n_reference; /* its size, its nodes                                  */
+    double box_m[3];            /* sides, where the body fills them; else 0                           */
+    double slender;             /* sizes are that many times those of a compact body               */
 } pal_study_job;
 
 #define PAL_STUDY_FRAME_S (1.0 / 60)
@@ -92,9 +93,14 @@ pal_err pal_study_moved(const pal_study_world *world, const double *x, int n, do
 pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
                          int *n_node, pal_note *note);
 
-/* study_loads.c: three presses for a scene that has no load cases, and the problem that stands for its body */
+/* study_loads.c: three presses and, of what is full, a pull, for a scene that has no load cases */
 pal_err pal_study_presses(pal_study_job *job);
 void pal_study_press_less(pal_study_job *job); /* half as strong */
+/* a press whose rest by the reference is far from what was wanted, or which has none (err), is made another strength;
+ * false: it is as it should be, is no press, or was changed often enough */
+bool pal_study_press_again(pal_study_job *job, int index, pal_err err);
+/* study.c: false: the user wants it ended, now */
+bool pal_study_goes_on(const pal_study_job *job);
 /* the constants of springs fitted to the reference's rest, into the setting */
 pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note);
 

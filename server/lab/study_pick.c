@@ -29,16 +29,27 @@ static bool judged(const pal_study_point *p)
     return measured(p) && !p->why[0];
 }
 
+bool pal_study_trusted(const pal_study *study)
+{
+    return !(study->most_m > 0 && study->reference_m > PAL_STUDY_TRUST * study->most_m);
+}
+
+/* nearer than the reference is to the truth says nothing */
+static double far_of(const pal_study *study, const pal_priced_setting *p)
+{
+    return study->reference_m > p->error_m ? study->reference_m : p->error_m;
+}
+
 void pal_study_front(pal_study *study)
 {
     for (int i = 0; i < study->n_point; i++) {
         pal_priced_setting *p = &study->point[i].priced;
-        p->front = judged(&study->point[i]);
+        p->front = pal_study_trusted(study) && judged(&study->point[i]);
         for (int k = 0; k < study->n_point && p->front; k++) {
             const pal_priced_setting *q = &study->point[k].priced;
             if (!judged(&study->point[k]) || k == i) continue;
-            bool no_worse = q->ms <= p->ms && q->error_m <= p->error_m;
-            bool better = q->ms < p->ms || q->error_m < p->error_m;
+            double far = far_of(study, p), other = far_of(study, q);
+            bool no_worse = q->ms <= p->ms && other <= far, better = q->ms < p->ms || other < far;
             p->front = !(no_worse && (better || k < i));
         }
     }
@@ -47,6 +58,7 @@ void pal_study_front(pal_study *study)
 int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
 {
     int best = -1;
+    if (!pal_study_trusted(study)) return -1;
     double own = study->reference_m > 0 ? study->reference_m : 0;
     for (int i = 0; i < study->n_point; i++) {
         const pal_priced_setting *p = &study->point[i].priced;
@@ -55,8 +67,9 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
             const pal_priced_setting *b = &study->point[best].priced;
+            double far = far_of(study, p), least = far_of(study, b);
             bool cheaper = p->ms < b->ms || (p->ms == b->ms && p->error_m < b->error_m);
-            bool nearer = p->error_m < b->error_m || (p->error_m == b->error_m && p->ms < b->ms);
+            bool nearer = far < least || (far == least && p->ms < b->ms);
             if (!(isnan(within_m) ? nearer : cheaper)) continue;
         }
         best = i;

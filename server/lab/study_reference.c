@@ -9,10 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, COUNTED = 12 };
+enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, QUICK_MOST = 12000, COUNTED = 12 };
 /* at most this, and at most this share of the scene's own: about as short as any that is swept, and of second order */
 static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_share = 0.25, quick_share = 0.5,
-                    reference_tolerance = 1e-4, full_share = 0.95, least_order = 0.5;
+                    reference_tolerance = 1e-4, full_share = 0.95, least_order = 1, scatter = 1.25;
+/* a quick reference that is farther off than this share of what moves is made finer, by so much */
+static const double quick_enough = 0.15, finer = 1.42;
 
 static pal_setting reference_setting(const pal_study_job *job, int size)
 {
@@ -80,8 +82,8 @@ static double most_between(const double *a, const double *b, int n)
     return most;
 }
 
-/* what is left of one load, from its rest at two coarser sizes: what the next changes would be, summed up (Richardson)
- */
+/* what is left of one load, from its rest at two coarser sizes: what the next changes would be, summed up (Richardson,
+ * of an order between 1 and 2) */
 static pal_err estimate_load(pal_study_job *job, int load, const int size[3], double *u[2], double *out)
 {
     double h[3];
@@ -93,9 +95,8 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     for (int k = 0; k < 3; k++) h[k] = job->shell ? exp2(-size[k]) : 1.0 / size[k];
     double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
     double order = pal_richardson_order(h, first, last);
-    /* nearly no order is no order: what is left would be any number; and of chance more than the elements have */
-    order = isnan(order) ? 1 : fmin(fmax(order, least_order), 2);
-    *out = last / (pow(h[1] / h[2], order) - 1);
+    /* changes that do not shrink as first order does are scatter of cut voxels: as far as they reach, and a margin */
+    *out = order >= least_order ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : scatter * fmax(first, last);
     return PAL_ERR_OK;
 }
 
@@ -147,8 +148,12 @@ static pal_err made(pal_study_job *job)
     for (int k = 0; k < job->n_load; k++) {
         if (!say(job, "reference at rest", (double)k / (job->n_load + 2)))
             return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
-        PAL_TRY(pal_study_static(job, &s, job->load[k], job->still[k], &n_node, job->note));
+        pal_err err;
+        do err = pal_study_static(job, &s, job->load[k], job->still[k], &n_node, job->note);
+        while (pal_study_press_again(job, k, err));
+        PAL_TRY(err);
     }
+    job->n_reference = n_node;
     if (!say(job, "reference, its own error", (double)job->n_load / (job->n_load + 2)))
         return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
     PAL_TRY(estimate(job, &job->out->reference_m));
@@ -157,12 +162,23 @@ static pal_err made(pal_study_job *job)
     return PAL_ERR_OK;
 }
 
-pal_err pal_study_reference(pal_study_job *job)
+static pal_err at_rest(pal_study_job *job)
 {
     PAL_TRY(job->options->samples ? given(job) : made(job));
     job->out->most_m = 0;
     for (int k = 0; k < job->n_load; k++)
         job->out->most_m = fmax(job->out->most_m, most_of(job->still[k], job->n_probe));
+    return PAL_ERR_OK;
+}
+
+pal_err pal_study_reference(pal_study_job *job)
+{
+    PAL_TRY(at_rest(job));
+    while (job->options->quick && !job->shell && !job->options->samples &&
+           job->out->reference_m > quick_enough * job->out->most_m && job->n_reference * pow(finer, 3) <= QUICK_MOST) {
+        job->reference = pal_study_fit_size(job, finer * job->reference);
+        PAL_TRY(at_rest(job));
+    }
     if (!(job->out->most_m > 0))
         return pal_note_set(job->note, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
     for (int i = 0; i < job->n_probe; i++)

@@ -17,11 +17,12 @@ static const double rescue_work = 1e6;
 
 /* ---- finite elements ---- */
 
-static pal_err converge(pal_study_world *w, pal_note *note)
+static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_note *note)
 {
     int n_newton = 0;
     for (;;) {
         pal_solve_report report;
+        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, PAL_STUDY_FRAME_S);
         pal_world_solve_report(w->world, 0, &report);
         n_newton += report.n_newton;
@@ -45,13 +46,13 @@ static pal_err newton(pal_study_job *job, const pal_setting *setting, const pal_
     PAL_TRY(pal_study_open(job, &still, true, &w, note));
     *n_node = w.body->n_node;
     pal_err err = pal_study_put(job, &w, load, 1, note);
-    if (!err) err = converge(&w, note);
+    if (!err) err = converge(job, &w, note);
     if (err == PAL_ERR_NUMERIC) {
         pal_world_reset(w.world);
         err = PAL_ERR_OK;
         for (int k = 1; k <= RAMPS && !err; k++) {
             err = pal_study_put(job, &w, load, (double)k / RAMPS, note);
-            if (!err) err = converge(&w, note);
+            if (!err) err = converge(job, &w, note);
         }
     }
     if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, note);
@@ -177,6 +178,7 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step
     double last = 0, most = 0;
     int quiet = 0;
     for (int step = 1; step <= most_step; step++) {
+        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, w->set->scene.step_s);
         if (err || w->body->frozen)
             return pal_note_set(note, err ? err : PAL_ERR_FROZEN, "%s after %d steps on its way to rest",

@@ -85,6 +85,7 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
 {
     double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
     for (int frame = 0; frame < job->n_way;) {
+        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
         pal_err err = timed_step(w, ms, most, n_ms, note);
         if (err == PAL_ERR_FROZEN) return pal_note_set(note, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
@@ -193,7 +194,7 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
     *out = (pal_study_point){.priced = {.setting = wish->setting, .ms = NAN, .error_m = NAN}};
     out->ms_p95 = out->static_rms_m = out->static_most_m = out->way_rms_m = out->way_most_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
-    if (wish->calibrate && fit(job, out)) return PAL_ERR_OK;
+    if (wish->calibrate && fit(job, out) && pal_study_goes_on(job)) return PAL_ERR_OK;
     if (wish->calibrate && job->n_load == 1) snprintf(out->why, sizeof out->why, "fitted to the load it is judged by");
     if (!job->rest.known || !same_rest(&job->rest.of, &out->priced.setting))
         find_rest(job, &out->priced.setting, &n_node);
@@ -203,7 +204,8 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
         memcpy(out->why, job->rest.why, sizeof out->why);
     else
         out->static_rms_m = job->rest.rms_m, out->static_most_m = job->rest.most_m;
-    run(job, out);
+    if (pal_study_goes_on(job)) run(job, out);
+    if (!pal_study_goes_on(job)) return pal_note_set(job->note, PAL_ERR_STATE, "stopped in a setting");
     if (!out->err) out->priced.error_m = fmax(out->static_most_m, out->way_most_m);
     return PAL_ERR_OK;
 }

@@ -59,16 +59,17 @@ beam=$problems/beam.json
 
 # ---- words ----
 refuse 2 "nothing to work on" study
-refuse 2 "within: is not a length" study "$beam" --within 1
-refuse 2 "within: is not a length" study "$beam" --within 1ms
-refuse 2 "within: is not a length" study "$beam" --within 0mm
-refuse 2 "within: is not a length" study "$beam" --within -1mm
-refuse 2 "within: is not a length" study "$beam" --within nanmm
-refuse 2 "budget: is not a time" study "$beam" --budget 4mm
-refuse 2 "budget: is not a time" study "$beam" --budget ""
+refuse 2 "within: \"1\" is not a length" study "$beam" --within 1
+refuse 2 "within: \"1ms\" is not a length" study "$beam" --within 1ms
+refuse 2 "within: \"0mm\" is not a length" study "$beam" --within 0mm
+refuse 2 "within: \"-1mm\" is not a length" study "$beam" --within -1mm
+refuse 2 "within: \"nanmm\" is not a length" study "$beam" --within nanmm
+refuse 2 "budget: \"4mm\" is not a time" study "$beam" --budget 4mm
+refuse 2 "budget: \"\" is not a time" study "$beam" --budget ""
 refuse 2 "which setting is to be written" study "$beam" -o x
-refuse 2 "methods: has a word that is not" study "$beam" --methods fem,femur
-refuse 2 "methods: has a word that is not" study "$beam" --methods fem,
+refuse 2 "methods: \"fem,femur\" has a word that is not" study "$beam" --methods fem,femur
+refuse 2 "methods: \"fem,\" has a word that is not" study "$beam" --methods fem,
+refuse 2 "units: \"ell\" is not m, cm" study "$beam" --units ell
 refuse 2 "seconds: 0 is outside" study "$beam" --seconds 0
 refuse 1 "no load case or reference \"none\"; known are tip, tip_far, hang, timoshenko" study "$beam" --case none --out o
 refuse 1 "a problem has one body" study "$beam" --body liver --out o
@@ -141,7 +142,7 @@ end
 
 refuse 1 "other loads" study "$beam" --quick --out o --seconds 0.2
 refuse 1 "other loads" study "$beam" --quick --out o --case tip_far
-refuse 1 "other loads" study "$beam" --out o
+refuse 1 "is of a quick study: --quick goes on with it" study "$beam" --out o
 sed 's/"machine":.*/"machine": "another one",/' whole.json >o/study.json
 refuse 1 "another machine (another one): --again starts over" study "$beam" --quick --out o
 sed 's/"shape":.*/"shape": "0000000000000000",/' whole.json >o/study.json
@@ -178,6 +179,14 @@ run study "$beam" --quick --out o --budget 1s --within "$loose" --json
 check "exit code $code" code_is 0
 cheap=$(sed -n 's/.*"picked":{[^}]*"error_m":\([0-9.e+-]*\).*/\1/p' out)
 check "the cheapest ($cheap m) is nearer than the most accurate ($accurate m)" at_most "$accurate" "$cheap"
+end
+
+begin "which setting serves is asked of the study that is there, whatever its loads, and nothing else is said"
+run study "$beam" --out o --budget 1s
+check "exit code $code" code_is 0
+check "the answer does not say how far off, of what loads" has out "mm off.*under load case .*quick, that move it by up to"
+check "the table stands above it" [ "$(grep -c -E '^[* ] +[0-9]' out)" -eq 0 ]
+check "the study changed" cmp -s o/study.json whole.json
 end
 
 refuse 1 "is within 1e-06 mm: the nearest is" study "$beam" --quick --out o --within 1e-6mm -o far

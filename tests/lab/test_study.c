@@ -62,7 +62,10 @@ static int brute(const pal_study *s, double within, double budget)
         if (s->point[i].err || isnan(p->error_m)) continue;
         if (!isnan(within) && p->error_m + s->reference_m > within) continue;
         if (!isnan(budget) && p->ms > budget) continue;
-        if (!b || (isnan(within) ? p->error_m < b->error_m : p->ms < b->ms)) best = i;
+        /* below the reference's own error all are the same, and the cheapest is taken */
+        double far = fmax(p->error_m, s->reference_m), least = b ? fmax(b->error_m, s->reference_m) : INFINITY;
+        bool nearer = far < least || (b && far == least && p->ms < b->ms);
+        if (!b || (isnan(within) ? nearer : p->ms < b->ms)) best = i;
     }
     return best;
 }
@@ -71,7 +74,7 @@ static void a_pick_is_the_best_of_all(void)
 {
     pal_study *s = new_study();
     unsigned state = 11;
-    s->reference_m = 2e-5;
+    s->reference_m = 6e-5;
     for (int i = 0; i < 60; i++) put(s, "tet4", i + 2, exp(4 * noise(&state)), 1e-3 * exp(-4 * noise(&state)));
     s->point[5].err = PAL_ERR_BUDGET, s->point[5].priced.ms = 1e-6;
     for (int i = 0; i < 40; i++) {
@@ -82,6 +85,28 @@ static void a_pick_is_the_best_of_all(void)
     }
     CHECK_INT(pal_study_pick(s, 1e-5, NAN), -1);
     CHECK_INT(pal_study_pick(s, NAN, 0.5), -1);
+    free(s);
+}
+
+/* what lies below the reference's own error is no nearer for it, and a reference that is far off names nothing */
+static void the_reference_bounds_what_is_named(void)
+{
+    pal_study *s = new_study();
+    const double ms[] = {1, 2, 4, 8}, error_m[] = {5e-4, 1.5e-4, 1e-4, 2e-5};
+    for (int i = 0; i < 4; i++) put(s, "hex8_bbar", i + 6, ms[i], error_m[i]);
+    s->most_m = 1e-2, s->reference_m = 2e-4;
+    pal_study_front(s);
+    CHECK(s->point[0].priced.front && s->point[1].priced.front);
+    CHECK(!s->point[2].priced.front && !s->point[3].priced.front);
+    CHECK_INT(pal_study_pick(s, NAN, 10), 1);
+    CHECK_INT(pal_study_pick(s, 3.2e-4, NAN), 2);
+    s->reference_m = 2.9e-3;
+    CHECK(pal_study_trusted(s) && pal_study_pick(s, NAN, 10) == 0);
+    s->reference_m = 3.1e-3;
+    pal_study_front(s);
+    CHECK(!pal_study_trusted(s) && !s->point[0].priced.front);
+    CHECK_INT(pal_study_pick(s, NAN, 10), -1);
+    CHECK_INT(pal_study_pick(s, 1, NAN), -1);
     free(s);
 }
 
@@ -431,6 +456,7 @@ int main(void)
 {
     RUN(the_front_is_what_nothing_beats);
     RUN(a_pick_is_the_best_of_all);
+    RUN(the_reference_bounds_what_is_named);
     RUN(power_laws_are_foreseen_exactly);
     RUN(costs_that_go_with_what_is_counted_are_foreseen_exactly);
     RUN(how_much_is_refined_is_seen_of_other_levels);
