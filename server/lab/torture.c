@@ -544,6 +544,21 @@ static void check_reset(pal_rig *rig, double seconds)
         pal_rig_fail(rig, "%.2g %% S from rest %.0f s after a reset", 100 * left, most_s);
 }
 
+/* a solid of control cells that was folded has other rests, as elements of one rotation each do: what helps */
+static bool is_folded(const pal_rig *rig)
+{
+    bool away = rig->out->verdict == PAL_VERDICT_FAILED && rig->needs_rest && !rig->asked_back && !rig->late;
+    for (int b = 0; b < rig->scene->n_body && away; b++)
+        if (pal_world_body(rig->world, b)->embed && !(body_left(rig, b) <= back_S)) return true;
+    return false;
+}
+
+static void advise(pal_rig *rig)
+{
+    bool central = energy_limit(rig) == central_slack;
+    pal_rig_say(rig, "a reset brings it back%s", central ? ", solver implicit_euler comes back from more" : "");
+}
+
 static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
 {
     pal_torture_result *out = rig->out;
@@ -570,9 +585,11 @@ static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
     insult->run(rig);
     sum_rescues(rig);
     judge(rig);
-    bool reset = out->frozen;
+    const bool folded = is_folded(rig);
+    bool reset = out->frozen || folded;
     for (int b = 0; b < rig->scene->n_body; b++) reset = reset || (rig->may_stay[b] && !(out->back_s < INFINITY));
     if (out->verdict != PAL_VERDICT_SKIPPED && reset) check_reset(rig, seconds);
+    if (folded && rig->asked_back) advise(rig);
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
 }
 

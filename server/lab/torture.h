@@ -11,7 +11,8 @@
  * within 0.1 % S of rest in RMS, S being the box diagonal. A body that nothing holds is compared after the best rigid
  * motion. Springs (tet_springs) may stay tangled or be stopped when their shape was taken away: a lattice of lengths
  * and volumes has several rests; they have to be finite, bounded and within 0.1 % S of rest after a reset. Each body
- * of a scene is excused for itself alone.
+ * of a scene is excused for itself alone. Solids of cells are not excused: one that stays folded fails, is reset to see
+ * that this brings it back, and the note says what helps.
  *
  * Time is simulated; what comes out depends on the scene, the seed and the processor time that is allowed: an insult
  * that runs out of it before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */

@@ -93,6 +93,19 @@ check "exit code 1, not $code" code_is 1
 check "it says which was stopped" has "stretched *FAILED .*beam was stopped" out
 end
 
+begin "a folded solid of cells is told what helps, and that does"
+"$palpate" cells chair -o chair.palcells --quiet || exit 2
+cp "$problems/../demos/chair.json" folded.json
+run folded.json --only mirrored --seconds 12
+check "exit code 1, not $code" code_is 1
+check "it says what helps" has "a reset brings it back, solver implicit_euler comes back from more" out
+sed 's/"model": {/"solver": {"name": "implicit_euler"}, &/' folded.json >implicit.json
+for insult in mirrored stretched; do
+    run implicit.json --only $insult --seconds 12
+    check "exit code 0 of $insult, not $code" code_is 0
+done
+end
+
 begin "less than an hour is no hour"
 run springs --only hour --seconds 0.5
 check "exit code 1, not $code" code_is 1
