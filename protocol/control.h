@@ -78,15 +78,17 @@ typedef struct pal_wire_part_info {
     bool adapts;  /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
 } pal_wire_part_info; /* its place in the array is its part index   */
 /* rows of a plan in order, of hello, topology and status: each with the part whose body it works on, -1 the whole
- * scene, and why it is there (which key of the scene called for it). n_row_part and n_row_why 0: nobody said, and then
- * they are not on the wire; else as many as there are rows */
+ * scene, why it is there (which key of the scene called for it), and whether it can be switched off (1: it cannot).
+ * n_row_part, n_row_why and n_row_fixed 0: nobody said, and then they are not on the wire; else as many as there are
+ * rows */
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
-    uint32_t n_row, n_row_part, n_row_why; /* n_row 0: the rows did not change */
+    uint32_t n_row, n_row_part, n_row_why, n_row_fixed; /* n_row 0: the rows did not change */
     char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES];
     double row_part[PAL_WIRE_ROW_MAX];
     char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
+    double row_fixed[PAL_WIRE_ROW_MAX];
 } pal_wire_topology;
 
 typedef struct pal_wire_tool_info {
@@ -108,9 +110,10 @@ typedef struct pal_wire_hello {
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
     char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
-    uint32_t n_row_part, n_row_why;
+    uint32_t n_row_part, n_row_why, n_row_fixed;
     double row_part[PAL_WIRE_ROW_MAX];
     char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
+    double row_fixed[PAL_WIRE_ROW_MAX];
     bool estimates;  /* `estimate` may be asked for; false is not on the wire */
     uint16_t you_id; /* member id, > 0                                              */
     pal_wire_role you_role;

@@ -52,6 +52,8 @@ static const pal_control_field hello_fields[] = {
      NULL},
     {"row_whys", TEXTS_SAID, false, AT(pal_wire_hello, row_why), PAL_WIRE_WHY_BYTES, AT(pal_wire_hello, n_row_why),
      PAL_WIRE_ROW_MAX, NULL},
+    {"row_fixed", NUMBERS, false, AT(pal_wire_hello, row_fixed), 0, AT(pal_wire_hello, n_row_fixed), PAL_WIRE_ROW_MAX,
+     NULL},
     {"estimates", BOOL, false, AT(pal_wire_hello, estimates), 0, 0, 0, NULL},
     {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
     END};
@@ -64,6 +66,8 @@ static const pal_control_field topology_fields[] = {
      PAL_WIRE_ROW_MAX, NULL},
     {"row_whys", TEXTS_SAID, false, AT(pal_wire_topology, row_why), PAL_WIRE_WHY_BYTES,
      AT(pal_wire_topology, n_row_why), PAL_WIRE_ROW_MAX, NULL},
+    {"row_fixed", NUMBERS, false, AT(pal_wire_topology, row_fixed), 0, AT(pal_wire_topology, n_row_fixed),
+     PAL_WIRE_ROW_MAX, NULL},
     END};
 static const pal_control_field active_fields[] = {
     {"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},

@@ -416,6 +416,7 @@ static void hub_tick(void *user)
             continue;
         }
         judge_tier(hub, c, now);
+        pal_hub_row_answer(hub, c);
         c->status_due = true;
         pal_hub_estimates_due(c);
         c->peer->ops->ready(c->peer);

@@ -37,7 +37,9 @@ typedef struct pal_client {
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status                   */
     uint64_t tier_cycle, tier_skipped, tier_ns, clean_ns; /* of the tier's window   */
-    uint64_t scold_ns;                                    /* last error about poses               */
+    /* an order about a row that is not answered yet, until when; 0: none; what the session had refused before */
+    uint64_t row_until_ns, row_refused;
+    uint64_t scold_ns; /* last error about poses               */
 } pal_client;
 
 /* an asset that was shown before: who was told of it may still be asking for it */
@@ -138,6 +140,8 @@ void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out);
 void pal_hub_count_unwatched(pal_hub_room *room);
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out); /* rows and bodies */
+/* what the world refused of the client's order about a row is told as an error */
+void pal_hub_row_answer(pal_hub *hub, pal_client *c);
 /* an order about rows or single bodies is dealt with; false: it is another one */
 bool pal_hub_plan_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
 /* hub_pages.c */

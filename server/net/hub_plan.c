@@ -7,6 +7,8 @@
 
 #include <string.h>
 
+static const uint64_t ASKED_NS = 5000000000u; /* an order about a row is taken or refused by then */
+
 static int body_of(const pal_session *session, const char *name)
 {
     const pal_scene *scene = pal_session_scene(session);
@@ -17,7 +19,7 @@ static int body_of(const pal_session *session, const char *name)
 
 /* rows of the plan as the session was opened, as hello and topology name them */
 static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
-                          char (*why)[PAL_WIRE_WHY_BYTES])
+                          char (*why)[PAL_WIRE_WHY_BYTES], double *fixed)
 {
     int n = pal_session_rows(session);
     uint32_t n_row = 0;
@@ -27,18 +29,21 @@ static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME
         pal_plain_text(name[r], PAL_WIRE_NAME_BYTES, row.name);
         pal_plain_text(why[r], PAL_WIRE_WHY_BYTES, row.why);
         part[r] = body_of(session, row.body);
+        fixed[r] = row.fixed || part[r] < 0;
     }
     return n_row;
 }
 
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out)
 {
-    out->n_row = out->n_row_part = out->n_row_why = plan_rows(room->session, out->row, out->row_part, out->row_why);
+    out->n_row = out->n_row_part = out->n_row_why = out->n_row_fixed =
+        plan_rows(room->session, out->row, out->row_part, out->row_why, out->row_fixed);
 }
 
 void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out)
 {
-    out->n_row = out->n_row_part = out->n_row_why = plan_rows(room->session, out->row, out->row_part, out->row_why);
+    out->n_row = out->n_row_part = out->n_row_why = out->n_row_fixed =
+        plan_rows(room->session, out->row, out->row_part, out->row_why, out->row_fixed);
 }
 
 /* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
@@ -127,7 +132,25 @@ static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
         give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
 }
 
-/* what the world refuses is a sentence in `note` of status, as with materials and brushes */
+/* The world answers between two steps: a count of what it refused, and the sentence of the last */
+static void note_asked(pal_hub *hub, pal_client *c)
+{
+    const pal_frame *f = c->room->stream->frame;
+    c->row_until_ns = pal_loop_now_ns(hub->loop) + ASKED_NS;
+    c->row_refused = f ? f->n_refused : 0;
+}
+
+void pal_hub_row_answer(pal_hub *hub, pal_client *c)
+{
+    const pal_frame *f = c->room->stream->frame;
+    pal_note note = {""};
+    if (!c->row_until_ns || !f) return;
+    bool refused = f->n_refused > c->row_refused;
+    if (refused) pal_session_last_note(c->room->session, &note);
+    if (note.text[0]) pal_hub_complain(hub, c, "refused", "row: %s", note.text);
+    if (refused || pal_loop_now_ns(hub->loop) > c->row_until_ns) c->row_until_ns = 0;
+}
+
 static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 {
     pal_command command = {.kind = PAL_COMMAND_ROW, .body = -1};
@@ -153,6 +176,7 @@ static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
     }
     command.wanted = on == 1;
     strcpy(command.row, order->target);
+    note_asked(hub, c);
     give(hub, c, "row", &command);
 }
 

@@ -359,7 +359,11 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
     /* rows have come or gone, so the places mean others */
     if (frame->n_row != stream->coder->n_row) memset(stream->row_ms, 0, sizeof stream->row_ms);
     stream->coder->n_row = frame->n_row;
-    for (int r = 0; r < frame->n_row; r++) stream->row_ms[r] += 0.2 * (frame->row_ns[r] * 1e-6 - stream->row_ms[r]);
+    for (int r = 0; r < frame->n_row; r++) {
+        stream->row_ms[r] += 0.2 * (frame->row_ns[r] * 1e-6 - stream->row_ms[r]);
+        /* less than the clock's tick is what is left of a mean of nothing */
+        if (stream->row_ms[r] < 1e-6) stream->row_ms[r] = 0;
+    }
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
     return true;
 }

@@ -35,6 +35,8 @@ void pal_plan_remove(pal_plan *plan, const void *self);
  * already. material: of the body now. scratch_byte of the plan may have grown. [sim] */
 pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int body, const char *name, bool on,
                         const pal_material *material, pal_note *note, bool *changed);
+/* would pal_plan_switch refuse to switch this row off as the plan is now? */
+bool pal_plan_keeps(const pal_plan *plan, int row);
 size_t pal_plan_bytes(const pal_plan *plan); /* heap memory: tables of more rows than at load, rows, solids */
 const char *pal_stage_name(pal_stage stage); /* "contact" ... */
 /* one line per row into text (cut at n_byte, always ended); returns the length it wanted. [any] */

@@ -99,6 +99,11 @@ static pal_err may_go(const pal_plan *plan, int b, const pal_effect *effect, pal
     return PAL_ERR_OK;
 }
 
+bool pal_plan_keeps(const pal_plan *plan, int row)
+{
+    return !plan->row[row].arena || may_go(plan, plan->row_body[row], plan->row[row].effect, NULL) != PAL_ERR_OK;
+}
+
 /* the body's rows but its solver, with `more` (may be NULL) and without the one at `without` */
 static int list_rows(const pal_plan *plan, int b, int without, const pal_row *more, pal_row *out)
 {

@@ -18,6 +18,7 @@ typedef struct pal_row_info {
     uint64_t spent_ns; /* last step */
     uint64_t n_run;    /* times it was run since load */
     const char *why;   /* what in the scene calls for it: "bodies[0].effects[2]"; lives as long as the world */
+    bool fixed;        /* pal_world_switch_row would refuse to switch it off now */
 } pal_row_info;
 
 /* shown surface of a part; pointers borrow from the world and its scene and do not change while revision is the same */

@@ -190,7 +190,8 @@ void pal_world_row(const pal_world *world, int row, pal_row_info *out)
                           .n_byte = r->n_byte,
                           .spent_ns = r->spent_ns,
                           .n_run = r->n_run,
-                          .why = r->why ? r->why : ""};
+                          .why = r->why ? r->why : "",
+                          .fixed = pal_plan_keeps(&world->plan, row)};
 }
 
 int pal_world_parts(const pal_world *world)

@@ -87,6 +87,18 @@ static void rows_say_whose_they_are_and_what_called_for_them(void)
     const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
     CHECK(h->n_row > 3 && h->n_row_part == h->n_row && h->n_row_why == h->n_row);
     for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->row_part[r] == 0 && h->row_why[r][0]);
+    /* what moves and shows the body stays, elastic rows may go while there is another */
+    static const char *const stays[] = {"verlet", "skin_out"}, *const goes[] = {"tet_volume", "edge_distance",
+                                                                                "gravity"};
+    CHECK_INT(h->n_row_fixed, h->n_row);
+    for (int i = 0; i < 2; i++) {
+        int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, stays[i]);
+        CHECK(r >= 0 && h->row_fixed[r] == 1);
+    }
+    for (int i = 0; i < 3; i++) {
+        int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, goes[i]);
+        CHECK(r < 0 || h->row_fixed[r] == 0);
+    }
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
     CHECK(s->n_row_name == 0 && s->n_off == 0 && s->n_state == 0);
     CHECK_INT(s->n_row, h->n_row);
@@ -119,11 +131,19 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     CHECK_INT(a->n_row, h->n_row);
     CHECK_INT(a->n_row_name, 0); /* the plan of hello again */
 
-    /* what the world refuses changes nothing and is said in the status */
+    /* what the world refuses changes nothing and is said in the status, and to who asked as an error */
     uint64_t n_refused = a->n_refused;
+    int n_error = ada.n_text[PAL_CONTROL_ERROR], n_other = bo.n_text[PAL_CONTROL_ERROR];
     mem_text(&ada, ROW("no_such_row", 0));
     UNTIL(a->n_refused == n_refused + 1 && a->note[0], &ada, &bo);
     CHECK(strstr(a->note, "no_such_row"));
+    UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 1, &ada, &bo);
+    CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].problem.code, "refused");
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "no_such_row"));
+    mem_text(&ada, ROW("skin_out", 0));
+    UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 2, &ada, &bo);
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "cannot be switched off"));
+    CHECK_INT(bo.n_text[PAL_CONTROL_ERROR], n_other);
     CHECK_INT(a->n_row, h->n_row);
     mem_end(&ada), mem_end(&bo);
     end();

@@ -240,7 +240,7 @@ static void largest_messages_fit_their_limit(void)
     full.hello.n_row = PAL_WIRE_ROW_MAX;
     golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
     for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
-    full.hello.n_row_part = full.hello.n_row_why = PAL_WIRE_ROW_MAX;
+    full.hello.n_row_part = full.hello.n_row_why = full.hello.n_row_fixed = PAL_WIRE_ROW_MAX;
     for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row_why[i], '"', PAL_WIRE_WHY_BYTES - 1);
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);

@@ -24,7 +24,6 @@ let told = 0;
 const stage = makeStage();
 const marks = new ToolMarks(stage, byId("labels"));
 const panel = new PlanPanel(document, (verb, target, args = {}) => {
-  if (verb === "row") rowAsked = { refused: state.status?.refused ?? 0, until: performance.now() + TOLD_MS };
   order({ verb, target, args });
 });
 const cost = new AccuracyPanel(document, (wish) => order(wish));
@@ -53,7 +52,7 @@ const state = {
   wires: false, // lines of the triangles are shown
   /** @type {{low: number, high: number} | null} what the colours mean, null: no values yet */ range: null,
   /** @type {string[]} names of the plan's rows as the panel has them */ rows: [],
-  /** @type {{rows: string[], row_parts?: number[], row_whys?: string[]}} of hello or the last topology that had rows */ plan: { rows: [] },
+  /** @type {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} of hello or the last topology that had rows */ plan: { rows: [] },
 };
 
 const input = new ToolInput(
@@ -256,15 +255,6 @@ function stopped(m) {
   return still.length ? `${names}: stopped. ${still[0].why ?? ""} Reset brings it back.` : "The body diverged and was frozen. Reset brings it back.";
 }
 
-/** what the world refuses of rows is counted and said in the status @type {{refused: number, until: number} | null} */
-let rowAsked = null;
-/** @param {any} m status */
-function rowRefused(m) {
-  if (!rowAsked) return;
-  if (m.refused > rowAsked.refused && m.note) notice(m.note, TOLD_MS);
-  if (m.refused > rowAsked.refused || performance.now() > rowAsked.until) rowAsked = null;
-}
-
 function showFigures() {
   if (byId("panel").hidden || !state.status) return;
   panel.status(state.status, state.here, state.hello.parts);
@@ -323,7 +313,6 @@ const control = {
     else if (!told) notice("");
     const slow = m.paused ? "paused" : m.slowdown > 1.05 ? m.slowdown.toFixed(1) + "× slower than real time" : "live";
     showState(m.frozen ? "lost" : "live", slow);
-    rowRefused(m);
     showFigures();
   },
   members(m) {

@@ -22,19 +22,20 @@ export function activeLines(active, parts) {
   });
 }
 
-/** @typedef {{name: string, part: number, why: string, on: boolean, ms: number | null}} Row of the panel; ms: index in `row_ms`, null: off */
+/** @typedef {{name: string, part: number, why: string, fixed: boolean, on: boolean, ms: number | null}} Row of the panel; fixed: it cannot be switched; ms: index in `row_ms`, null: off */
 
 /**
  * The rows to list: those of the plan in order, then those that were switched off.
- * @param {{rows: string[], row_parts?: number[], row_whys?: string[]}} plan of `hello` or `topology`
+ * @param {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} plan of `hello` or `topology`
  * @param {{rows?: string[], row_parts?: number[], off?: {row: string, part: number}[]} | null} status
  * @returns {Row[]}
  */
 export function rowsOf(plan, status) {
   const key = (/** @type {string} */ name, /** @type {number} */ part) => `${name} ${part}`;
   const why = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_whys?.[i] ?? ""]));
+  const fixed = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_fixed?.[i] === 1]));
   const now = status?.rows?.length ? status : plan;
-  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "" });
+  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "", fixed: fixed.get(key(name, part)) ?? plan.row_fixed !== undefined }); // what came while it runs goes with who looks
   const on = (now.rows ?? []).map((name, i) => ({ ...row(name, now.row_parts?.[i] ?? 0), on: true, ms: i }));
   const off = (status?.off ?? []).map((o) => ({ ...row(o.row, o.part), on: false, ms: null }));
   return [...on, ...off];
@@ -101,11 +102,11 @@ export class PlanPanel {
   /** @param {Row[]} rows @param {{name: string}[]} parts @param {boolean} switches may this member switch them? */
   plan(rows, parts, switches) {
     this.rows.replaceChildren();
-    this.bars = rows.map(({ name, part, why, on, ms }) => {
+    this.bars = rows.map(({ name, part, why, fixed, on, ms }) => {
       const row = this.rows.insertRow();
       row.title = why;
       row.className = on ? "" : "off";
-      if (switches) row.append(this.switchOf(name, part, on));
+      if (switches) row.append(this.switchOf(name, part, on, fixed));
       const title = row.insertCell();
       title.textContent = name.replaceAll("_", " ");
       if (parts.length > 1 && parts[part]) title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
@@ -119,11 +120,13 @@ export class PlanPanel {
     });
   }
 
-  /** @param {string} name @param {number} part @param {boolean} on */
-  switchOf(name, part, on) {
+  /** @param {string} name @param {number} part @param {boolean} on @param {boolean} fixed */
+  switchOf(name, part, on, fixed) {
     const cell = document.createElement("td"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
     cell.className = "switch";
     box.setAttribute("aria-label", `${name} is part of the plan`);
+    box.disabled = fixed;
+    if (fixed) cell.title = "It cannot be switched off: it moves the body, shows it, or alone holds it together.";
     box.onchange = () => {
       this.order("row", name, { part, on: box.checked ? 1 : 0 });
       // it is as the server says: what it refuses stays
