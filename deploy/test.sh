@@ -57,13 +57,33 @@ output_of() { # LOG TEST: that test's result and output
         /^ +Start +[0-9]+: / || /^[0-9]+% tests passed/ || /^The following tests/ { on = 0 }
         on' "$1"
 }
-tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its tests
-    preset=$1
-    shift
-    log=$build/ctest_$preset.log
-    # first what computes, then, side by side, what mostly waits (tests/clients/CMakeLists.txt)
-    (cd "$build/$preset" && ctest --output-on-failure -j 2 "$@" -LE "waits${leave:+|$leave}"
-        ctest --output-on-failure -j "${side:-4}" "$@" -L waits) >"$log" 2>&1
+idle= # what stands before commands that take only what others leave of the machine
+build_preset() { # PRESET "TARGET..." [cmake options]: built() says how it went, as this may run beside other things
+    preset=$1 target=$2
+    shift 2
+    # shellcheck disable=SC2086
+    $idle cmake -S "$tree" -B "$build/$preset" -G Ninja -D PAL_PRESET="$preset" "$@" >"$build/build_$preset.log" 2>&1 &&
+        $idle cmake --build "$build/$preset" --target $target >>"$build/build_$preset.log" 2>&1 && touch "$build/built_$preset"
+}
+built() { # PRESET
+    [ ! -e "$build/built_$1" ] || return 0
+    tail -n 40 "$build/build_$1.log"
+    brief "build of $1" <"$build/build_$1.log"
+    say "FAIL  build of $1"
+    failed=$((failed + 1))
+    return 1
+}
+# the tests of one build, PRESET [ctest options]: what computes, and what mostly waits (tests/clients/CMakeLists.txt), side by side
+compute() {
+    (cd "$build/$1" && shift && $idle ctest --output-on-failure -j 2 "$@") >"$build/ctest_$1.log" 2>&1
+}
+waits() {
+    (cd "$build/$1" && shift && ctest --output-on-failure -j 4 -L waits "$@") >"$build/ctest_waits_$1.log" 2>&1
+}
+count() { # PRESET: its tests, once both have run
+    preset=$1 log=$build/ctest_$1.log
+    cat "$build/ctest_waits_$preset.log" >>"$log"
+    rm "$build/ctest_waits_$preset.log"
     grep -E "$result" "$log"
     n_pass=$(grep -cE "$result.* Passed " "$log")
     n_left=$(grep -cE "$result.*\*\*\*Skipped" "$log")
@@ -84,22 +104,26 @@ tests_of() { # PRESET [ctest options]: runs ctest in one build and counts its te
     left_out=$((left_out + n_left))
     say "$preset: $n_pass passed, $n_fail failed"
 }
-build_preset() { # PRESET "TARGET..." [cmake options]
-    preset=$1 target=$2
-    shift 2
-    # shellcheck disable=SC2086
-    cmake -S "$tree" -B "$build/$preset" -G Ninja -D PAL_PRESET="$preset" "$@" >"$build/build_$preset.log" 2>&1 &&
-        cmake --build "$build/$preset" --target $target >>"$build/build_$preset.log" 2>&1 && return 0
-    tail -n 40 "$build/build_$preset.log"
-    brief "build of $preset" <"$build/build_$preset.log"
-    say "FAIL  build of $preset"
-    failed=$((failed + 1))
-    return 1
-}
-
 say "building release"
 build_release -D PAL_BUILD_TESTS=ON
-tests_of release
+say "tests of release"
+compute release -LE waits
+if [ -z "$fast" ]; then
+    rm -f "$build"/built_* "$build"/fuzz_*.code
+    # all rooms but what is left out below; for the thread sanitizer those that have threads
+    rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
+    threads="base num session net clients"
+    # browsers and what waits leave much of the machine
+    idle="nice -n 19"
+    {
+        build_preset asan "server/all clients/all $(printf 'tests/%s/all ' $rooms)"
+        build_preset tsan "server/all clients/all $(printf 'tests/%s/all ' $threads)"
+        # without this machine's wide registers: the compiler takes minutes over them
+        build_preset fuzz fuzzers -D CMAKE_C_COMPILER=clang -D PAL_NATIVE=OFF
+    } &
+fi
+waits release
+count release
 step "sources are formatted" sh "$tree/tests/house/check_format.sh" "$tree"
 step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types "$build"
 step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test "$build"
@@ -111,19 +135,20 @@ if [ -z "$fast" ]; then
     step "a solid is sculpted in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
     step "what accuracy costs in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
-    say "building with address and undefined-behaviour sanitizers"
-    # all but what is left out below, and the ranks of MPI, which are the release build's
-    rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
-    build_preset asan "server/all clients/all $(printf 'tests/%s/all ' $rooms)" && leave="accuracy|bench" tests_of asan -E '^house/test_calibrate_mpi$'
-    say "building with thread sanitizer"
-    # the rooms that have threads
-    threads="base num session net clients"
-    build_preset tsan "server/all clients/all $(printf 'tests/%s/all ' $threads)" &&
-        side=2 tests_of tsan -R "^($(echo $threads | tr ' ' '|'))/"
-    say "building fuzzers"
-    rm -f "$build"/fuzz_*.code
-    # without this machine's wide registers: the compiler takes minutes over them
-    if build_preset fuzz fuzzers -D CMAKE_C_COMPILER=clang -D PAL_NATIVE=OFF; then
+    say "building with sanitizers"
+    wait
+    say "tests with sanitizers"
+    {
+        # ranks of MPI are the release build's
+        [ ! -e "$build/built_asan" ] || compute asan -LE 'waits|accuracy|bench' -E '^house/test_calibrate_mpi$'
+        [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread' -R "^($(echo $threads | tr ' ' '|'))/"
+    } &
+    built asan && waits asan
+    built tsan && waits tsan
+    wait
+    idle=
+    for preset in asan tsan; do [ ! -e "$build/built_$preset" ] || count $preset; done
+    if built fuzz; then
         # two at a time
         ls "$build"/fuzz/tests/fuzz | sed -n 's/^fuzz_\([a-z0-9_]*\)$/\1/p' | xargs -P 2 -I % sh -c 'cd "$0" && mkdir -p corpus/% &&
             fuzz/tests/fuzz/fuzz_% -max_total_time=5 -timeout=20 -rss_limit_mb=2048 -artifact_prefix="$0/crash_" corpus/% "$1/%" \
