@@ -114,7 +114,8 @@ if [ -z "$fast" ]; then
     rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
     threads="base num session net clients"
     # browsers and what waits leave much of the machine
-    idle="nice -n 19"
+    idle="nice -n 10"
+    trap 'kill 0' INT # of what runs beside, too
     {
         build_preset asan "server/all clients/all $(printf 'tests/%s/all ' $rooms)"
         build_preset tsan "server/all clients/all $(printf 'tests/%s/all ' $threads)"
