@@ -92,7 +92,7 @@ try {
     pressed.add(near.knob);
     const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.knob }).first(), title = await button.getAttribute("title");
     await button.click();
-    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.tick > 0);
+    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && title.startsWith(`${s.setting},`));
     check(`the button of the knob ${near.knob} goes to its neighbour`, after.setting !== before.setting && title.startsWith(`${after.setting},`), `${before.setting} -> ${after.setting}; ${title}`);
     check("it says what jumped, and against which bound", /^Switched: energy [+−][\d.]+ %, moved .* allowed, made in/.test(after.said), after.said);
   }
