@@ -84,9 +84,9 @@ static pal_err set_number(pal_config *config, const pal_config_key *s, double nu
 {
     void *place = (char *)config + s->offset;
     if (!(number >= s->low && number <= s->high))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %g is outside %g .. %g", where, number, s->low, s->high);
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.15g is outside %g .. %g", where, number, s->low, s->high);
     if (s->kind == PAL_CONFIG_KEY_INT && number != floor(number))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %g is not a whole number", where, number);
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.15g is not a whole number", where, number);
     if (s->kind == PAL_CONFIG_KEY_INT)
         *(int *)place = (int)number;
     else

@@ -408,9 +408,7 @@ static pal_err write_scene(study_run *run, pal_note *note)
     }
     loaded->scene = set->scene;
     loaded->scene.max_error_m = loaded->scene.budget_ms = 0;
-    snprintf(loaded->scene.accuracy, sizeof loaded->scene.accuracy,
-             "within %.3g mm, %.2g %% of the largest displacement, of %.40s", 1e3 * p->error_m,
-             1e2 * p->error_m / study->most_m, study->reference);
+    pal_study_accuracy_text(study, p->error_m, loaded->scene.accuracy, sizeof loaded->scene.accuracy);
     size_t n = strlen(run->scene);
     bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
     err = json ? pal_scene_save_file(loaded, run->scene, note) : pal_scene_save(loaded, run->scene, note);

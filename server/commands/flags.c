@@ -95,9 +95,9 @@ static int set_number(const parse *p, const pal_flag *flag, const char *text)
     if (end == text || *end || isspace((unsigned char)*text) || !isfinite(number))
         return wrong(p, "%s: \"%.60s\" is not a number", flag->name, text);
     if (!(number >= flag->low && number <= flag->high))
-        return wrong(p, "%s: %g is outside %.10g .. %.10g", flag->name, number, flag->low, flag->high);
+        return wrong(p, "%s: %.15g is outside %.10g .. %.10g", flag->name, number, flag->low, flag->high);
     if (flag->kind == PAL_FLAG_COUNT && number != floor(number))
-        return wrong(p, "%s: %g is not a whole number", flag->name, number);
+        return wrong(p, "%s: %.15g is not a whole number", flag->name, number);
     if (flag->kind == PAL_FLAG_COUNT)
         *(int *)flag->out = (int)number;
     else

@@ -28,6 +28,18 @@ const char *pal_study_off_text(const pal_study_file *file, double error_m, char 
     return out;
 }
 
+void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, size_t n_byte)
+{
+    char reference[sizeof study->reference];
+    int n = snprintf(out, n_byte, "within %.3g mm, %.2g %% of the largest displacement", 1e3 * error_m,
+                     1e2 * error_m / study->most_m);
+    static const char of[] = ", of ";
+    size_t left = n > 0 && (size_t)n + sizeof of < n_byte ? n_byte - (size_t)n - sizeof of : 0;
+    snprintf(reference, sizeof reference, "%s", study->reference);
+    for (char *comma; strlen(reference) > left && (comma = strrchr(reference, ',')); *comma = 0) continue;
+    if (reference[0] && strlen(reference) <= left) snprintf(out + n, n_byte - (size_t)n, "%s%s", of, reference);
+}
+
 static bool is_measured(const pal_study_point *p)
 {
     return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);

@@ -13,6 +13,9 @@ const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80]);
 enum { PAL_STUDY_OFF = 320 };
 /* "0.54 mm off, +- 0.42 mm of the reference, under three presses and a pull, 0.5 s, that move it by up to 18 mm" */
 const char *pal_study_off_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_OFF]);
+/* "within 0.54 mm, 3 % of the largest displacement, of fem hex8_bbar": for the head of the page, with as many whole
+ * parts of the reference's description as fit */
+void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, size_t n_byte);
 /* pal_study_pick among the methods (words with commas, "": all); index of the point, -1: none serves */
 int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish);
 /* "none of the 48 settings is within 1 mm: the nearest is fem ..., 1.3 mm in 5.2 ms", or that the reference is not to

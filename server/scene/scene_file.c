@@ -236,6 +236,19 @@ static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *sc
     return PAL_ERR_OK;
 }
 
+/* "x", "1 mm", "within 1 mm" tell people nothing: a wish in the wrong place */
+static bool is_wish(const char *text)
+{
+    static const char *const unit[] = {"mm", "cm", "um", "m"};
+    const char *last = strrchr(text, ' ');
+    size_t n = strlen(text), n_word = 0;
+    for (size_t i = 0; i < n; i++) n_word += text[i] != ' ' && (i == 0 || text[i - 1] == ' ');
+    if (n_word == 1) return true;
+    for (int k = 0; k < 4 && last && n_word <= 3; k++)
+        if (!strcmp(last + 1, unit[k])) return true;
+    return false;
+}
+
 /* what the scene asks of its study: "accuracy" as text or {max_error_mm, text}, "budget" {step_ms} */
 static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *scene)
 {
@@ -252,6 +265,11 @@ static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *sce
         scene->max_error_m = most_mm / 1000;
     } else {
         PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
+        if (is_wish(scene->accuracy))
+            return pal_json_bad(json, "accuracy",
+                                "\"%.40s\" is no sentence on how far off the body is; an accuracy is asked for by "
+                                "{\"max_error_mm\": 1}",
+                                scene->accuracy);
     }
     if (!budget) return PAL_ERR_OK;
     PAL_TRY(pal_json_object(json, budget, "budget", budget_keys));

@@ -32,6 +32,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
     }
     PAL_TRY(pal_switch_check(&s->from, body, to, note));
     PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
+    s->set->scene.accuracy[0] = 0; /* was said of the setting before */
     pal_setting_of(scene, body, &now);
     pal_setting_of(&s->set->scene, body, &next);
     if (pal_setting_same(&now, &next)) {

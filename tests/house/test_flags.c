@@ -85,7 +85,7 @@ static void what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range(void)
     WRONG(PARSE("--number", "inf"), "is not a number");
     WRONG(PARSE("--number", "1e999"), "is not a number");
     WRONG(PARSE("--count", "1.5"), "1.5 is not a whole number");
-    WRONG(PARSE("--count", "99999999999"), "--count: 1e+11 is outside 1 .. 9");
+    WRONG(PARSE("--count", "99999999999"), "--count: 99999999999 is outside 1 .. 9");
     WRONG(PARSE("--count"), "--count needs a value");
     WRONG(PARSE("--on=1"), "--on takes no value");
     WRONG(PARSE("--on", "--on"), "--on is there twice");

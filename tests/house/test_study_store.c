@@ -1,5 +1,6 @@
 /* Studies kept in files: every number comes back with its bits, what is not one is refused by its place, and what a
  * study is of changes with the body and not with its setting. */
+#include "server/commands/studied_scene.h"
 #include "server/commands/study_store.h"
 #include "server/mesh/prepared.h"
 #include "tests/check.h"
@@ -261,6 +262,22 @@ static void files_have_their_place_beside_the_scene(void)
     CHECK(!pal_study_method_in("tet_springs", "tet"));
 }
 
+/* the head of the page has room for 127 bytes: whole parts of a description, never half a word */
+static void a_written_scene_says_how_far_off_it_is_in_whole_words(void)
+{
+    static pal_study study = {.most_m = 0.0078};
+    char text[128];
+    snprintf(study.reference, sizeof study.reference,
+             "fem hex8_bbar corotational, 40 voxels, static_newton, tolerance 1e-06, 15111 nodes, 2 tries");
+    pal_study_accuracy_text(&study, 0.00038, text, sizeof text);
+    CHECK_TEXT(text, "within 0.38 mm, 4.9 % of the largest displacement, of fem hex8_bbar corotational, 40 voxels, "
+                     "static_newton, tolerance 1e-06");
+    pal_study_accuracy_text(&study, 0.00038, text, 90);
+    CHECK_TEXT(text, "within 0.38 mm, 4.9 % of the largest displacement, of fem hex8_bbar corotational");
+    pal_study_accuracy_text(&study, 0.00038, text, 70);
+    CHECK_TEXT(text, "within 0.38 mm, 4.9 % of the largest displacement");
+}
+
 int main(void)
 {
     if (!mkdtemp(folder)) return 1;
@@ -270,6 +287,7 @@ int main(void)
     RUN(points_are_listed_by_what_they_cost);
     RUN(a_study_is_of_a_body_whatever_its_setting);
     RUN(files_have_their_place_beside_the_scene);
+    RUN(a_written_scene_says_how_far_off_it_is_in_whole_words);
     unlink(path);
     rmdir(folder);
     return check_report();

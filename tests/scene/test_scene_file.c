@@ -94,6 +94,9 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"accuracy\": \"0123456789012345678901234567890123456789012345678901234567890123"
          "0123456789012345678901234567890123456789012345678901234567890123\"}",
          "accuracy: 128 bytes of text, more than 127"},
+        {"{\"accuracy\": \"x\"}", "accuracy: \"x\" is no sentence on how far off"},
+        {"{\"accuracy\": \"within 1 mm\"}", "\"within 1 mm\" is no sentence"},
+        {"{\"accuracy\": \"1 mm\"}", "an accuracy is asked for by {\"max_error_mm\": 1}"},
         {"{\"accuracy\": {}}", "accuracy: has no max_error_mm"},
         {"{\"accuracy\": {\"max_error_mm\": 0}}", "accuracy.max_error_mm: 0 is outside"},
         {"{\"accuracy\": {\"max_error_mm\": \"1\"}}", "accuracy.max_error_mm: is not a number"},

@@ -289,6 +289,9 @@ const control = {
       state.plan = m;
       state.status = null; // its rows were those of the plan before
       showRows();
+      // how far off it is was said of the body before
+      state.hello.accuracy = "";
+      showTitle();
     }
     sculpt.changed();
     keepParts(m.parts.length);
