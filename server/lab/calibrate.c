@@ -346,6 +346,8 @@ static pal_err make_parameters(const job *j)
             c->theta[k * c->n_used + i] = start;
             c->low[k * c->n_used + i] = start - range * log(10);
             c->high[k * c->n_used + i] = start + range * log(10);
+            if (c->kind[k] == PAL_SPRING_VOLUME && c->options.least_volume > 0)
+                c->low[k * c->n_used + i] = fmax(c->low[k * c->n_used + i], start + log(c->options.least_volume));
         }
     }
     return PAL_ERR_OK;

@@ -35,6 +35,7 @@ typedef struct pal_calibrate_options {
     bool without_area;    /* edges and volumes only                                                    */
     int grid[3];          /* nodes; 0 0 0: homogeneous                                                 */
     double decades;       /* bounds: theta within this many decades of the start; 3                    */
+    double least_volume;  /* volume constants are at least this share of the start; 0: within the decades alone */
     double smooth;        /* weight of differences of theta along the grid's edges: 0.1 (objective below) */
     double pull;          /* weight of the distance from the start's ratios of constants, on a grid: 0.1 */
     bool (*progress)(const char *what, double fraction, void *user); /* while truths are solved; may be NULL */

@@ -9,6 +9,8 @@
 #include <string.h>
 
 enum { MOST_EVALUATIONS = 60 };
+/* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate torture) */
+static const double least_volume = 0.1;
 
 /* the reference's rest under a load, in the problem's frame */
 static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
@@ -56,7 +58,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
     pal_err err = PAL_ERR_OK;
     pal_calibrate_default(&options);
     options.voxel.resolution = setting->size;
-    options.without_area = true;
+    options.without_area = true, options.least_volume = least_volume;
     int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
     for (int k = 0; k < n_fit && !err; k++) {
         err = take_samples(job, k, &samples[k]);

@@ -114,6 +114,10 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
 pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
                       pal_study_point *facts, pal_note *note);
 
+/* study_torture.c: takes off the front what is not there any more after being mistreated, and says so in its `why`;
+ * STATE: stopped */
+pal_err pal_study_torture(pal_study_job *job);
+
 /* study_pick.c: predictions of all points from the others */
 void pal_study_predict(pal_study *study);
 #endif

@@ -4,6 +4,7 @@
 
 #include "server/base/vec3.h"
 #include "server/lab/study_parts.h"
+#include "server/lab/torture.h"
 #include "server/mesh/stomach.h"
 #include "tests/check.h"
 #include "tests/sim/solid_scene.h"
@@ -59,6 +60,27 @@ static void show(const pal_study *s)
                1e3 * s->point[i].static_most_m, 1e3 * s->point[i].way_most_m, s->point[i].why);
 }
 
+/* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
+ * it a meganewton or a flat shape leaves them elsewhere for good */
+static void check_survives(const organ *o, const pal_setting *setting)
+{
+    static const char *const insult[] = {"meganewton", "flat"};
+    pal_set_scene *set = NULL;
+    pal_note note = {{0}};
+    pal_torture_report *r = calloc(1, sizeof *r);
+    REQUIRE(r && !pal_setting_make(o->scene, 0, setting, &note, &set));
+    for (int k = 0; k < 2; k++) {
+        pal_torture_options options;
+        pal_torture_default(&options);
+        options.only = insult[k], options.most_s = 2;
+        CHECK(!pal_torture(&set->scene, &options, r, &note));
+        CHECK_INT(r->n_failed, 0);
+        if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].note);
+    }
+    pal_set_scene_free(set);
+    free(r);
+}
+
 /* presses move the body by what they say, about; finer elements are nearer */
 static void a_full_organ_is_pressed(void)
 {
@@ -83,6 +105,16 @@ static void a_full_organ_is_pressed(void)
         if (!strcmp(q->model, "tet_springs") && !(q->k_distance_J > 0)) plain = p->static_rms_m;
     }
     CHECK(fine < coarse && fitted < plain);
+    int n_sprung = 0;
+    CHECK(pal_study_pick(s, NAN, 1e9) >= 0);
+    for (int i = 0; i < s->n_point; i++) {
+        const pal_setting *q = &s->point[i].priced.setting;
+        if (!(q->k_distance_J > 0)) continue;
+        n_sprung++;
+        CHECK(q->k_volume_J > 0.3 * q->k_distance_J);
+        check_survives(&o, q);
+    }
+    CHECK_INT(n_sprung, 1);
     organ_free(&o);
 }
 
