@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_CASE = 6, WARM = 12, ROUNDS = 6, MOST = 1024, MOST_NODE = 30000 };
+enum { N_CASE = 6, WARM = 12, ROUNDS = 6, LOOKS = 5, MOST = 1024, MOST_NODE = 30000 };
 static const double most_off = 1.3, round_s = 0.1;
 /* of E S^2, on all nodes together: bends it by some per cent */
 static const double pull = 0.001;
@@ -76,13 +76,16 @@ static pal_err timed(pal_world *world, double step_s, double *ms, int *n)
     return PAL_ERR_OK;
 }
 
-static pal_err estimate(const pal_scene *scene, const pal_world *world, const double *ms, int n_ms, pal_estimate *out,
+/* ms: of the steps so far; with them the state is come back to and looked at again, as a session does */
+static pal_err estimate(const pal_scene *scene, pal_world *world, const double *ms, int n_ms, pal_estimate *out,
                         pal_note *note)
 {
     pal_estimate_work *work = NULL;
     PAL_TRY(pal_estimate_work_open(scene, 0, NULL, note, &work));
     pal_estimate_state *state = pal_estimate_work_state(work);
     bool good = pal_estimate_copy(state, world, 0);
+    for (int k = 0; k < LOOKS && n_ms > 0 && good; k++)
+        good = !swing(world, scene) && pal_estimate_copy(state, world, 0);
     state->n_ms = 0;
     for (int i = 0; i < n_ms && i < PAL_ESTIMATE_STEPS; i++) state->ms[state->n_ms++] = (float)ms[i];
     good = good && pal_estimate_work_run(work, out);

@@ -332,7 +332,8 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
     state->asleep = from->asleep;
-    if (!from->asleep) state->fixed_ms = fixed_ms(world, body);
+    double fixed = from->asleep ? 0 : fixed_ms(world, body);
+    if (fixed > 0) state->fixed_ms = state->fixed_ms > 0 ? fmin(state->fixed_ms, fixed) : fixed;
     pal_world_material_now(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;

@@ -18,8 +18,8 @@ typedef struct pal_estimate_state {
     double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
     bool asleep;
     int n_substep;   /* of the step */
-    double fixed_ms; /* of the last one awake, in rows that are neither forces nor solver: what is shown, contact,
-                        guards */
+    double fixed_ms; /* of one awake, in rows that are neither forces nor solver: what is shown, contact, guards; the
+                        least of the states so far, as a step that was interrupted says too much */
     pal_material material;
     /* FORCE rows of the body: names from open on, and which of them are not switched off */
     const char *row[PAL_ESTIMATE_ROWS];
