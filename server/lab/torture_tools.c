@@ -1,12 +1,17 @@
 /* Insults by tools, by numbers that are none, by supports, and by all of it at random. */
 #include "server/base/vec3.h"
 #include "server/lab/torture_parts.h"
+#include "server/sim/elastic_hex.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const double back_s = 10, clamp_S = 0.02;
+/* RMS speed that counts as standing still after supports were switched */
+static const double still_S_s = 1e-3;
+/* of a node's cap (or the weight): bends a body, and crushes no element as a tenth of the cap, E h^2, does */
+static const double bend_share = 0.02;
 
 /* ---- tools ---- */
 
@@ -221,6 +226,24 @@ static void support_top(const pal_rig *rig, pal_scene *scene)
     }
 }
 
+/* Energy of a world that has just followed another. Cubes and their split store other energies in one shape: those that
+ * ran on their split are looked at on it here too, though only the next step will decide that */
+static double followed_J(pal_world *next, const pal_world *before)
+{
+    double energy = 0;
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < pal_world_rows(next) && i < pal_world_rows(before); i++) {
+            const pal_row *row = pal_world_effect(next, i), *was = pal_world_effect(before, i);
+            if (row->effect != was->effect || strcmp(row->effect->name, "hex_elastic")) continue;
+            pal_hex_row *to = row->self;
+            const pal_hex_row *from = was->self;
+            to->tangled = turn == 0 && from->tangled && to->split;
+        }
+        if (turn == 0) energy = pal_world_energy_J(next);
+    }
+    return energy;
+}
+
 /* a world made from another scene goes on where this one is */
 static bool go_over(pal_rig *rig, const pal_scene *scene, double *jump)
 {
@@ -232,9 +255,9 @@ static bool go_over(pal_rig *rig, const pal_scene *scene, double *jump)
     }
     double before = pal_world_energy_J(rig->world);
     pal_world_follow(next, rig->world, -1, NULL, NULL);
+    *jump = fmax(*jump, followed_J(next, rig->world) - before);
     pal_world_destroy(rig->world);
     rig->world = next;
-    *jump = fmax(*jump, pal_world_energy_J(next) - before);
     pal_rig_rebase(rig);
     return true;
 }
@@ -267,7 +290,7 @@ void pal_insult_supports(pal_rig *rig)
     support_top(rig, other);
     double jump = 0;
     for (int b = 0; b < rig->scene->n_body; b++) {
-        double size = 0.2 * pal_rig_cap_N(rig, b);
+        double size = bend_share * pal_rig_cap_N(rig, b);
         (void)pal_world_load(rig->world, b, pal_rig_far_node(rig, b), (const double[3]){size, size, 0});
     }
     pal_rig_rebase(rig);
@@ -276,14 +299,18 @@ void pal_insult_supports(pal_rig *rig)
     free(other);
     if (rig->out->verdict == PAL_VERDICT_SKIPPED) return;
     /* where it is held is another place now: it has to come to rest, not to come back */
-    double begin = rig->out->simulated_s;
-    while (good && speed_S_s(rig) > 1e-3 && rig->out->simulated_s - begin < back_s)
+    const double begin = rig->out->simulated_s, hold_s = 0.25;
+    double since_s = 0;
+    while (good && since_s < hold_s && rig->out->simulated_s - begin < back_s) {
         good = pal_rig_step(rig, rig->scene->step_s);
-    double left = speed_S_s(rig), share = rig->scale_J > 0 ? jump / rig->scale_J : 0;
+        since_s = speed_S_s(rig) <= still_S_s ? since_s + rig->scene->step_s : 0;
+    }
+    const double left = speed_S_s(rig);
+    double share = rig->scale_J > 0 ? jump / rig->scale_J : 0;
     pal_rig_say(rig, "energy rises by %.2g of what is stored, still after %.2g s", share,
                 rig->out->simulated_s - begin);
     if (!(share <= 0.01)) pal_rig_fail(rig, "more than 1 %%");
-    if (good && !(left <= 1e-3)) pal_rig_fail(rig, "it still moves by %.2g S a second", left);
+    if (good && since_s < hold_s) pal_rig_fail(rig, "it still moves, at the end by %.2g S a second", left);
 }
 
 /* ---- all of it at random ---- */

@@ -16,6 +16,9 @@ static const double floor_share = 1e-7;
 static const double still_share = 1e-11;
 /* most iterations of a step that began with one and gained energy */
 enum { rescue_newton = 8 };
+/* sub-steps that may gain energy in spite of all iterations before the body has to stand still in such; so many without
+ * one in between and they are counted anew */
+enum { patience = 30, calm_steps = 30 };
 /* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
 enum { PROBES_A_STEP = 4 };
 
@@ -456,7 +459,9 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         to->converged = core->cg.residual <= best;
         /* from here on all is a rescue: the search, and the iterations that follow it */
         if (most > core->wish.newton) body->rescue.ns += pal_clock_ns() - again_ns;
-        if (most == rescue_newton || !rises(core)) return PAL_ERR_OK;
+        if (!rises(core)) return PAL_ERR_OK;
+        core->risen = most == rescue_newton;
+        if (core->risen) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
         body->rescue.n_search++;
         search(core, tau);
@@ -487,6 +492,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     memcpy(core->x0, body->x, bytes3(core));
     memcpy(core->v0, body->v, bytes3(core));
     core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
+    core->risen = false;
     pal_system_touch(&core->system, step);
     step->drag_apart = true;
     double slack;
@@ -535,6 +541,34 @@ static void keep_probed(pal_implicit *core, pal_step *step)
     (void)pal_warp_refresh(&core->answer.warp, &core->blocks, true, step->dt_s);
 }
 
+/* Is it time to stand still? Forces that no energy has, as those of elements turned over, which borrow rotations, may
+ * lead in a circle: there is more energy than at the sub-step's begin after all iterations, now and then for ever. A
+ * tangled body needs such steps to get out, no more than a few. */
+static bool circles(pal_implicit *core)
+{
+    if (core->risen)
+        core->n_risen++, core->n_calm = 0;
+    else if (core->n_calm++ >= calm_steps)
+        core->n_risen = 0;
+    return core->risen && core->n_risen > patience;
+}
+
+/* the body goes back and stands there; what nothing holds goes on as a whole, with its momentum */
+static void stand_still(pal_implicit *core, double dt_s)
+{
+    pal_body *body = core->system.body;
+    double mean[3] = {0, 0, 0}, mass = 0;
+    for (int i = 0; i < body->n_dof && core->system.n_free == body->n_dof; i++) {
+        pal_axpy3(mean, body->mass_kg[i], body->v + 3 * i);
+        mass += body->mass_kg[i];
+    }
+    if (mass > 0) pal_scale3(mean, 1 / mass, mean);
+    for (int i = 0; i < body->n_dof; i++) {
+        for (int c = 0; c < 3; c++) body->x[3 * i + c] = core->x0[3 * i + c] + dt_s * mean[c];
+        pal_copy3(body->v + 3 * i, mean);
+    }
+}
+
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
@@ -545,6 +579,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
         pal_body_place(body);
         return;
     }
+    if (!body->solid_mass && circles(core)) stand_still(core, step->dt_s);
     pal_body_place(body);
     pal_warp_tick(&core->warp);
     pal_warp_tick(&core->answer.warp);
@@ -596,6 +631,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
 {
     pal_implicit *core = self;
     (void)body;
+    core->n_risen = core->n_calm = 0;
     if (core->system.n_free == 0) return;
     pal_turns_reset(&core->turns);
     pal_answer_forget(&core->answer);

@@ -7,8 +7,11 @@
  * The first iteration starts from the state at the stage's begin, not from an extrapolated one: with rotations taken
  * there the corotational energy (but for its volume term) is bounded from above by the quadratic that is solved, so
  * that a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more follow until energy
- * is no more than at the sub-step's begin. Conjugate gradients begin with the velocities of before. With newton > 1,
- * and in those 7, a line search on the incremental potential follows each iteration.
+ * is no more than at the sub-step's begin. A body that gains in spite of them again and again (30 times without half a
+ * second of peace at 1/60 s) goes round in a circle, as crushed elements on borrowed rotations do: from then on it goes
+ * back and stands still in each such sub-step, so that its energy cannot rise. Conjugate gradients begin with the
+ * velocities of before. With newton > 1, and in those 7, a line search on the incremental potential follows each
+ * iteration.
  *
  * Contact gave its loads at the sub-step's begin; its stiffness and damping act on what has moved since, and `settle`
  * then brings the forces on tools to the end of the sub-step. Held nodes move with body->v (0 unless a row leads them).
@@ -47,15 +50,17 @@ typedef struct pal_implicit {
     double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
     double *start;   /* V that would leave the body where it was linearised [n_dof][3] */
     double *work, *moved;
-    double *node_moved; /* the way of nodes for `settle`; moved without embed  [n_node][3] */
-    double tau_rest_s;  /* tau of the factor at rest           */
-    double density;     /* of the material, kg/m^3             */
-    double reference;   /* of the tolerance, N s               */
-    double energy0_J;   /* at the sub-step's begin             */
-    bool guarded;       /* energy is watched: see above        */
-    int most_cg, round; /* in one solve of this sub-step; rounds of settle */
-    uint64_t sampled;   /* of body->solid, at the factor       */
-    bool probing;       /* an embedded body's matrices are being found anew */
+    double *node_moved;  /* the way of nodes for `settle`; moved without embed  [n_node][3] */
+    double tau_rest_s;   /* tau of the factor at rest           */
+    double density;      /* of the material, kg/m^3             */
+    double reference;    /* of the tolerance, N s               */
+    double energy0_J;    /* at the sub-step's begin             */
+    bool guarded;        /* energy is watched: see above        */
+    bool risen;          /* ... and was not kept in this sub-step ... */
+    int n_risen, n_calm; /* ... nor in so many; sub-steps since then */
+    int most_cg, round;  /* in one solve of this sub-step; rounds of settle */
+    uint64_t sampled;    /* of body->solid, at the factor       */
+    bool probing;        /* an embedded body's matrices are being found anew */
     pal_solve_report report;
 } pal_implicit;
 

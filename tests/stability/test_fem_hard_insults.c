@@ -173,6 +173,43 @@ static void a_support_that_turns_takes_the_body_along(void)
         }
 }
 
+/* a load for good that crushes the corner it pulls at: the elements there turn over and borrow rotations, and such
+ * forces can lead in a circle. The body stands still in the end, whatever it looks like, and gains nothing from then on
+ */
+static void a_body_that_is_crushed_for_good_stands_still(void)
+{
+    static const double way[][3] = {{1, 1, 0}, {-1, -1, -1}, {-2, -2, -2}};
+    enum { SECONDS = 7, LAST = 120 };
+    double fastest = 0, most_rise = 0;
+    for (int k = 0; k < CHECK_REPEATS(2, 1); k++)
+        for (size_t w = (size_t)k; w < sizeof way / sizeof way[0]; w++) {
+            fem_beam b;
+            hard_make(&b, &hard_kinds[k], 3, 3, 3, true);
+            pal_item_init(&b.def->effect[b.def->n_effect++], "effects[0]", "gravity");
+            b.def->material.damping_1_s = 10;
+            REQUIRE(!beam_open(&b, &note));
+            double unit = b.def->material.young_Pa * 1e-4, force[3], before = INFINITY, speed = 0, rise = 0;
+            pal_scale3(force, unit, way[w]);
+            REQUIRE(!pal_world_load(b.world, 0, b.body->n_node - 1, force));
+            for (int i = 0; i < 60 * SECONDS; i++) {
+                REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+                REQUIRE(pal_body_finite(b.body));
+                if (i < 60 * SECONDS - LAST) continue;
+                double now = pal_world_energy_J(b.world) - hard_work_J(b.body), v = 0;
+                for (int n = 0; n < 3 * b.body->n_dof; n++) v += b.body->v[n] * b.body->v[n];
+                speed = fmax(speed, sqrt(v / b.body->n_dof) / b.body->size_m);
+                rise = fmax(rise, (now - before) / fabs(hard_work_J(b.body)));
+                before = now;
+            }
+            printf("  %-11s crushed %zu: %d turned over, %.2g S/s, rises by %.2g, %llu searches\n", hard_kinds[k].shown,
+                   w, hard_inverted(&b), speed, rise, (unsigned long long)b.body->rescue.n_search);
+            fastest = fmax(fastest, speed), most_rise = fmax(most_rise, rise);
+            beam_free(&b);
+        }
+    HARD_CASE("meganewton", "fem", "crushed for good: speed after 5 s", fastest, 1e-3, "S/s");
+    HARD_CASE("meganewton", "fem", "crushed for good: rise of energy in a step after 5 s", 100 * most_rise, 1e-4, "%");
+}
+
 int main(void)
 {
     RUN(long_steps_stay_bounded);
@@ -180,5 +217,6 @@ int main(void)
     RUN(a_loaded_body_rests);
     RUN(quarter_and_half_turns_store_nothing);
     RUN(a_support_that_turns_takes_the_body_along);
+    RUN(a_body_that_is_crushed_for_good_stands_still);
     return check_report();
 }
