@@ -25,7 +25,8 @@ static const char about[] =
     "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
     "three places; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
     "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
-    ".svg and a page .html. Ctrl-C ends it; the same command goes on after the last setting.\n"
+    ".svg and a page .html. Ctrl-C ends it; the same command goes on after the last setting. When all is measured\n"
+    "it draws what is gone of these anew.\n"
     "--within and --budget name a setting, and with -o write a scene of it; when the study is there already, nothing\n"
     "is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or \"budget\": {\"step_ms\": 4} is served "
     "and\n"
@@ -484,6 +485,14 @@ static cJSON *as_json(const study_run *run)
     return o;
 }
 
+/* a study that is there whole and has lost its drawing gets it anew from what was measured */
+static pal_err draw_again(const study_run *run, pal_note *note)
+{
+    char path[PAL_STUDY_PATH + 8];
+    snprintf(path, sizeof path, "%s.svg", run->stem);
+    return access(path, F_OK) ? pal_study_publish(run->file, run->stem, note) : PAL_ERR_OK;
+}
+
 /* ---- the whole ---- */
 
 static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
@@ -516,6 +525,8 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
                                 run->file->n_all > n ? run->file->n_all : n, run->path);
         if (err) return err;
         if (kept) return pal_note_set(note, kept, "%s", why.text);
+    } else {
+        PAL_TRY(draw_again(run, note));
     }
     return answer(run, note);
 }

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { METHODS = 12, FRONT_LABELS = 40 };
+enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_SETTING_TEXT };
 
 const char *pal_study_method(const pal_setting *setting, char out[PAL_SETTING_TEXT])
 {
@@ -113,6 +113,8 @@ static void knobs_of(const pal_study *study, const pal_study_point *p, double us
                                    : s->size == 1 ? "level"
                                                   : "levels")
                         : snprintf(out, n_byte, "as it is");
+    bool refined = !strcmp(s->element, "refined");
+    if (refined) n += snprintf(out + n, n_byte - (size_t)n, " refined");
     bool law = s->law[0] && strcmp(s->law, "corotational") != 0, other = !strcmp(s->solver, "sdirk2");
     n += snprintf(out + n, n_byte - (size_t)n, "%s%s%s", law ? " " : "", law ? s->law : "", other ? " sdirk2" : "");
     double step = step_of(study, p);
@@ -140,7 +142,11 @@ static double usual_tolerance(const pal_study *study)
 typedef struct series {
     char name[METHODS][PAL_SETTING_TEXT];
     int n_method, n[METHODS], n_front;
+    bool apart[METHODS]; /* not for the front, as their `why` says */
     double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
+    const char *tip[METHODS][PAL_STUDY_POINTS];
+    char tip_text[PAL_STUDY_POINTS][TIP];
+    int n_tip;
     double front_x[PAL_STUDY_POINTS], front_y[PAL_STUDY_POINTS];
     char knobs[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
     pal_plot_label label[FRONT_LABELS];
@@ -152,12 +158,18 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
 {
     char name[PAL_SETTING_TEXT];
     int k = 0;
+    bool apart = p->why[0] != 0;
     pal_study_method(&p->priced.setting, name);
-    while (k < s->n_method && strcmp(s->name[k], name) != 0) k++;
+    while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
         if (s->n_method == METHODS) return;
+        s->apart[k] = apart;
         memcpy(s->name[s->n_method++], name, sizeof name);
     }
+    char *tip = s->tip_text[s->n_tip++], text[PAL_SETTING_TEXT];
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_setting_text(&p->priced.setting, text), p->priced.ms,
+             1e3 * p->priced.error_m, apart ? "; " : "", p->why);
+    s->tip[k][s->n[k]] = tip;
     s->x[k][s->n[k]] = p->priced.ms;
     s->y[k][s->n[k]++] = 1e3 * p->priced.error_m;
     if (!p->priced.front) return;
@@ -198,9 +210,19 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
     plot.guide[1] = (pal_plot_guide){.at = 1e3 * study->reference_m, .text = s->own};
     plot.curve[plot.n_curve++] =
         (pal_curve){.name = "the front", .n = s->n_front, .x = s->front_x, .y = s->front_y, .bare = true, .ink = true};
-    for (int k = 0; k < s->n_method; k++)
-        plot.curve[plot.n_curve++] =
-            (pal_curve){.name = s->name[k], .n = s->n[k], .x = s->x[k], .y = s->y[k], .dots = true};
+    bool any_apart = false;
+    for (int k = 0; k < s->n_method; k++) {
+        any_apart = any_apart || s->apart[k];
+        plot.curve[plot.n_curve++] = (pal_curve){.name = s->name[k],
+                                                 .n = s->n[k],
+                                                 .x = s->x[k],
+                                                 .y = s->y[k],
+                                                 .tip = s->tip[k],
+                                                 .hollow = s->apart[k],
+                                                 .dots = true};
+    }
+    if (any_apart)
+        plot.y_label = "largest error, mm (hollow: fitted to this load or failed a torture, so not on the front)";
     pal_err err = pal_plot_text(&plot, svg, n_byte, note);
     free(s);
     return err;
@@ -237,8 +259,25 @@ static void put_number(FILE *to, const char *form, double value)
     fputs("</td>", to);
 }
 
-static void put_row(FILE *to, const pal_study *s, const pal_study_point *p)
+/* the command that writes the scene of a point of the front: within its own time nothing is nearer */
+static void put_order(FILE *to, const pal_study_file *file, const pal_study_point *p)
 {
+    static const char *const ends[] = {" --within", " --budget", " -o", " --again"};
+    double ms = 1.001 * p->priced.ms;
+    char asked[sizeof file->command];
+    snprintf(asked, sizeof asked, "%s", file->command);
+    for (int k = 0; k < 4; k++) {
+        char *end = strstr(asked, ends[k]);
+        if (end) *end = 0;
+    }
+    fputs("<br><code>", to);
+    put_text(to, asked);
+    fprintf(to, " --budget %.4gms -o NEW</code>", ms);
+}
+
+static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p)
+{
+    const pal_study *s = &file->study;
     char text[PAL_SETTING_TEXT];
     bool measured = is_measured(p);
     fprintf(to, "<tr%s><td>%s</td><td>",
@@ -247,6 +286,7 @@ static void put_row(FILE *to, const pal_study *s, const pal_study_point *p)
                             : " class=\"bad\"",
             p->priced.front ? "&#9733;" : "");
     put_text(to, pal_setting_text(&p->priced.setting, text));
+    if (p->priced.front) put_order(to, file, p);
     if (!measured || p->why[0]) {
         fputs("<br>", to);
         put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
@@ -273,7 +313,8 @@ static const char head[] =
     "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
     "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
     "body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:1180px;margin:1.5em auto;padding:0 1em}\n"
-    "h1{font-size:1.5em;margin:0 0 .5em}svg{max-width:100%;height:auto}\n"
+    "h1{font-size:1.5em;margin:0 0 "
+    ".5em}svg{max-width:100%;min-width:760px;height:auto}code{font-size:12px;color:#555;user-select:all}\n"
     "dl{display:grid;grid-template-columns:max-content 1fr;gap:.15em 1em;margin:0 0 1em}dt{color:#666}dd{margin:0}\n"
     ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px}\n"
     "th,td{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd;vertical-align:top}\n"
@@ -315,17 +356,20 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     put_fact(to, "settings", text);
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
+    fputs(svg ? "<div class=\"wide\">" : "", to);
     fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
+    if (svg) fputs("</div>\n", to);
     fprintf(to,
             "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
             "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
-            "at rest or on the way.</p>\n",
+            "at rest or on the way. Point at a mark for its setting; the line under one of the front writes its "
+            "scene.</p>\n",
             1e3 * s->step_s);
     fputs("<div class=\"wide\"><table><thead><tr>", to);
     for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
     fputs("</tr></thead><tbody>\n", to);
     pal_study_order(s, order);
-    for (int k = 0; k < s->n_point; k++) put_row(to, s, &s->point[order[k]]);
+    for (int k = 0; k < s->n_point; k++) put_row(to, file, &s->point[order[k]]);
     fputs("</tbody></table></div>\n", to);
     fputs(sorting, to);
     fputs("</body></html>\n", to);

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDE = 760, HIGH = 480, LEFT = 84, RIGHT = 210, TOP = 46, BOTTOM = 62, BOXES = 1024 };
+enum { WIDE = 760, HIGH = 480, LEFT = 84, RIGHT = 210, TOP = 46, BOTTOM = 62, BOXES = 2048, LINE_PIECE = 4 };
 
 typedef struct axis {
     bool log;
@@ -113,21 +113,41 @@ static void draw_axes(FILE *to, const pal_plot *plot, const axis *x, const axis 
     label(to, (x->from + x->to) / 2, 26, "middle", " font-size=\"16\" font-weight=\"600\"", plot->title);
 }
 
-static void mark(FILE *to, int kind, const char *ink, double x, double y)
+static void escape(FILE *to, const char *text)
 {
-    switch (kind % 4) {
-    case 0:
-        fprintf(to, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"4\" fill=\"%s\"/>\n", x, y, ink);
-        break;
-    case 1:
-        fprintf(to, "<rect x=\"%.1f\" y=\"%.1f\" width=\"7\" height=\"7\" fill=\"%s\"/>\n", x - 3.5, y - 3.5, ink);
-        break;
-    case 2:
-        fprintf(to, "<path d=\"M%.1f %.1fl4.6 8h-9.2z\" fill=\"%s\"/>\n", x, y - 5, ink);
-        break;
-    default:
-        fprintf(to, "<path d=\"M%.1f %.1fl4.8 4.8l-4.8 4.8l-4.8 -4.8z\" fill=\"%s\"/>\n", x, y - 4.8, ink);
+    for (; *text; text++)
+        if (*text == '<' || *text == '>' || *text == '&')
+            fprintf(to, "&#%d;", *text);
+        else
+            fputc(*text, to);
+}
+
+/* tip NULL: none */
+static void mark(FILE *to, int kind, bool hollow, const char *ink, double x, double y, const char *tip)
+{
+    static const char *const tag[] = {"circle", "rect", "path", "path"};
+    char look[64];
+    kind %= 4;
+    if (hollow)
+        snprintf(look, sizeof look, "fill=\"#fff\" stroke=\"%s\" stroke-width=\"1.4\"", ink);
+    else
+        snprintf(look, sizeof look, "fill=\"%s\"", ink);
+    fprintf(to, "<%s ", tag[kind]);
+    if (kind == 0)
+        fprintf(to, "cx=\"%.1f\" cy=\"%.1f\" r=\"4\" %s", x, y, look);
+    else if (kind == 1)
+        fprintf(to, "x=\"%.1f\" y=\"%.1f\" width=\"7\" height=\"7\" %s", x - 3.5, y - 3.5, look);
+    else if (kind == 2)
+        fprintf(to, "d=\"M%.1f %.1fl4.6 8h-9.2z\" %s", x, y - 5, look);
+    else
+        fprintf(to, "d=\"M%.1f %.1fl4.8 4.8l-4.8 4.8l-4.8 -4.8z\" %s", x, y - 4.8, look);
+    if (!tip) {
+        fputs("/>\n", to);
+        return;
     }
+    fputs("><title>", to);
+    escape(to, tip);
+    fprintf(to, "</title></%s>\n", tag[kind]);
 }
 
 static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, const axis *y)
@@ -145,11 +165,12 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
     }
     if (!c->dots) fputs("\"/>\n", to);
     for (int i = 0; i < c->n && !c->bare; i++)
-        if (drawable(plot, c, i)) mark(to, kind, ink, place(x, c->x[i]), place(y, c->y[i]));
+        if (drawable(plot, c, i))
+            mark(to, kind, c->hollow, ink, place(x, c->x[i]), place(y, c->y[i]), c->tip ? c->tip[i] : NULL);
     double at = TOP + 14 + 22.0 * k, from = wide_of(plot) - RIGHT + 16;
     if (!c->dots)
         fprintf(to, "<path stroke-width=\"%s\" stroke=\"%s\"%s d=\"M%.1f %.1fh28\"/>\n", width, ink, dash, from, at);
-    if (!c->bare) mark(to, kind, ink, from + 14, at);
+    if (!c->bare) mark(to, kind, c->hollow, ink, from + 14, at, NULL);
     label(to, from + 36, at + 4, "start", "", c->name);
 }
 
@@ -219,7 +240,7 @@ static void draw_label(FILE *to, const pal_plot_label *l, const axis *x, const a
     /* sides of the point and distances from it */
     static const double side[8][2] = {{1, 0},       {0.7, -0.7}, {0.7, 0.7}, {-1, 0},
                                       {-0.7, -0.7}, {-0.7, 0.7}, {0, -1},    {0, 1}};
-    static const double away[] = {9, 18, 30, 46};
+    static const double away[] = {9, 18, 30, 46, 64, 86};
     double px = place(x, l->x), py = place(y, l->y), wide = 6.2 * (double)strlen(l->text);
     for (size_t ring = 0; ring < sizeof away / sizeof *away; ring++)
         for (int k = 0; k < 8; k++) {
@@ -241,6 +262,21 @@ static void draw_label(FILE *to, const pal_plot_label *l, const axis *x, const a
         }
 }
 
+/* lines, as small boxes along them */
+static void take_line(const pal_plot *plot, const pal_curve *c, const axis *x, const axis *y, boxes *all)
+{
+    for (int i = 1; i < c->n && !c->dots; i++) {
+        if (!drawable(plot, c, i - 1) || !drawable(plot, c, i)) continue;
+        double ax = place(x, c->x[i - 1]), ay = place(y, c->y[i - 1]);
+        double bx = place(x, c->x[i]), by = place(y, c->y[i]);
+        int n = (int)(fmax(fabs(bx - ax), fabs(by - ay)) / LINE_PIECE) + 1;
+        for (int k = 0; k <= n; k++) {
+            double px = ax + (bx - ax) * k / n, py = ay + (by - ay) * k / n;
+            take(all, (box){{px - 2, py - 2}, {px + 2, py + 2}});
+        }
+    }
+}
+
 static void draw_labels(FILE *to, const pal_plot *plot, const axis *x, const axis *y, boxes *all)
 {
     for (int k = 0; k < plot->n_curve; k++)
@@ -250,6 +286,7 @@ static void draw_labels(FILE *to, const pal_plot *plot, const axis *x, const axi
             double px = place(x, c->x[i]), py = place(y, c->y[i]);
             take(all, (box){{px - 5, py - 5}, {px + 5, py + 5}});
         }
+    for (int k = 0; k < plot->n_curve && plot->n_label > 0; k++) take_line(plot, &plot->curve[k], x, y, all);
     for (int k = 0; k < plot->n_label; k++) {
         const pal_plot_label *l = &plot->label[k];
         bool there = isfinite(l->x) && isfinite(l->y) && (!x->log || l->x > 0) && (!y->log || l->y > 0);

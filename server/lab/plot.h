@@ -16,6 +16,8 @@ typedef struct pal_curve {
     bool dashed, bare, thin; /* bare: no marks; thin: a fine pale line, for what stands behind the others */
     bool dots;               /* marks without a line */
     bool ink;                /* dark in place of the next colour, which it leaves to the others */
+    bool hollow;             /* marks as outlines: what does not count like the others */
+    const char *const *tip;  /* of each mark, shown while it is pointed at; borrowed; NULL: none [n] */
 } pal_curve;
 
 /* a line across the plot at one value, with its meaning beside it; the axis reaches it */
@@ -25,7 +27,7 @@ typedef struct pal_plot_guide {
     const char *text; /* borrowed */
 } pal_plot_guide;
 
-/* a word beside a point: where no mark, label or guide's text is, with a fine line to its point when it had to go
+/* a word beside a point: where no mark, line, label or guide's text is, with a fine line to its point when it had to go
  * farther; left out when there is no room. Earlier labels get their place first */
 typedef struct pal_plot_label {
     double x, y;

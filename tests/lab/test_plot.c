@@ -184,6 +184,36 @@ static void labels_keep_off_each_other_and_off_marks(void)
     free(text);
 }
 
+/* a label beside a line stays off it; a mark says what it is when pointed at, outlined ones are no filled ones */
+static void labels_keep_off_lines_and_marks_have_tips(void)
+{
+    enum { N = 6 };
+    double x[N], y[N], box[N + 1][4];
+    static const char *const tip[N] = {"a < b", "1", "2", "3", "4", "5"};
+    pal_plot_label l[N];
+    for (int i = 0; i < N; i++) {
+        x[i] = i, y[i] = -i;
+        l[i] = (pal_plot_label){x[i], y[i], "16 voxels, to 1e-01"};
+    }
+    pal_plot plot = {.title = "t", .x_label = "ms", .y_label = "mm", .wide = 900, .n_curve = 2, .n_label = N};
+    plot.label = l;
+    plot.curve[0] = (pal_curve){.name = "front", .n = N, .x = x, .y = y, .bare = true, .ink = true};
+    plot.curve[1] = (pal_curve){.name = "dots", .n = N, .x = x, .y = y, .dots = true, .hollow = true, .tip = tip};
+    char *text = draw(&plot);
+    REQUIRE(text);
+    int n = small_texts(text, box, N + 1);
+    /* the line goes from corner to corner of the axes, both of 0 to 5, where there is no room for the outer two */
+    CHECK_INT(n, N - 2);
+    for (int a = 0; a < n; a++)
+        for (double t = 0; t <= 1; t += 1e-3) {
+            double px = left + (900 - 210 - left) * t, py = top + high * t;
+            CHECK(px <= box[a][0] || px >= box[a][2] || py <= box[a][1] || py >= box[a][3]);
+        }
+    CHECK(strstr(text, "<title>a &#60; b</title>") && strstr(text, "<title>5</title>"));
+    CHECK(strstr(text, "fill=\"#fff\" stroke=\"#0072b2\"") != NULL);
+    free(text);
+}
+
 static void nothing_to_draw_and_nowhere_to_write_are_refused(void)
 {
     const double x[] = {0, -1, INFINITY}, y[] = {1, 1, 1};
@@ -212,6 +242,7 @@ int main(void)
     RUN(few_decades_have_ticks_between_and_many_are_thinned);
     RUN(names_cannot_leave_their_text);
     RUN(labels_keep_off_each_other_and_off_marks);
+    RUN(labels_keep_off_lines_and_marks_have_tips);
     RUN(nothing_to_draw_and_nowhere_to_write_are_refused);
     return check_report();
 }
