@@ -121,7 +121,7 @@ static void a_body_out_of_bounds_stops_alone(void)
 
 static void tortured_together_each_is_judged(void)
 {
-    static const char *const insult_name[] = {"poisoned", "mirrored"};
+    static const char *const insult_name[] = {"poisoned", "meganewton"};
     fem_beam b;
     three_make(&b, false);
     b.scene->n_body = 2;
