@@ -226,8 +226,9 @@ typedef struct pal_wire_point {
 } pal_wire_point;
 typedef struct pal_wire_study {
     char body[PAL_WIRE_NAME_BYTES];
-    double step_ms;   /* the time that all `ms` of study and estimate are for: a step of the scene as it was opened */
-    uint32_t n_point; /* 0: there is no study, `estimate` alone */
+    double step_ms;     /* the time that all `ms` of study and estimate are for: a step of the scene as it was opened */
+    double reference_m; /* error of what the study compared with, NaN: not known: below it nothing is told apart */
+    uint32_t n_point;   /* 0: there is no study, `estimate` alone */
     pal_wire_point point[PAL_WIRE_POINT_MAX];
 } pal_wire_study;
 

@@ -165,6 +165,7 @@ static const pal_control_field point_fields[] = {
 static const pal_control_field study_fields[] = {
     {"body", TEXT, true, AT(pal_wire_study, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
     {"step_ms", F64, true, AT(pal_wire_study, step_ms), 0, 0, 0, NULL},
+    {"reference_m", KNOWN, false, AT(pal_wire_study, reference_m), 0, 0, 0, NULL},
     {"points", OBJECTS, false, AT(pal_wire_study, point), sizeof(pal_wire_point), AT(pal_wire_study, n_point),
      PAL_WIRE_POINT_MAX, point_fields},
     END};

@@ -15,6 +15,7 @@
 #include <fcntl.h>
 #include <libgen.h>
 #include <limits.h>
+#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
@@ -46,6 +47,7 @@ typedef struct serve_run {
     pal_session *session[MOST_SESSIONS];
     const pal_priced_setting *setting[MOST_SESSIONS]; /* what the server borrows of them */
     int n_setting[MOST_SESSIONS], setting_body[MOST_SESSIONS];
+    double reference_m[MOST_SESSIONS];
     pal_server_gate *gate;
     pal_server *server;
     lcm_child lcm[MOST_SESSIONS];
@@ -156,6 +158,7 @@ static pal_err open_server(serve_run *run, pal_note *note)
         run->setting[i] = run->studied[i].setting;
         run->n_setting[i] = run->studied[i].n_setting;
         run->setting_body[i] = run->studied[i].body;
+        run->reference_m[i] = run->studied[i].file ? run->studied[i].file->study.reference_m : NAN;
     }
     pal_server_options options = {.listen = run->config.listen,
                                   .port = run->config.port,
@@ -165,7 +168,8 @@ static pal_err open_server(serve_run *run, pal_note *note)
                                   .most_clients = run->config.most_clients,
                                   .setting = run->setting,
                                   .n_setting = run->n_setting,
-                                  .setting_body = run->setting_body};
+                                  .setting_body = run->setting_body,
+                                  .reference_m = run->reference_m};
     PAL_TRY(pal_server_open(&options, run->session, run->n, note, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");

@@ -444,11 +444,13 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         const pal_scene *scene = pal_session_scene(session[i]);
         room->session = session[i];
         room->step_s = scene->step_s;
+        room->reference_m = NAN;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
         if (options->setting && options->n_setting[i] > 0) {
             room->setting = options->setting[i];
             room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
+            if (options->reference_m) room->reference_m = options->reference_m[i];
         }
         err = pal_stream_open(session[i], options->error_m, note, &room->stream);
         if (!err) hub->n_room++;

@@ -20,6 +20,7 @@ typedef struct pal_hub_options {
     /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
     const pal_priced_setting *const *setting;
     const int *n_setting, *setting_body;
+    const double *reference_m; /* NULL: not known */
 } pal_hub_options;
 
 /* builds the streams; borrows loop, sessions and their array; listens to the loop. A session that a command of

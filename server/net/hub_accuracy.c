@@ -5,6 +5,8 @@
 
 #include "server/net/plain_text.h"
 
+#include "server/base/log.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -54,6 +56,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     hub->control->type = PAL_CONTROL_STUDY;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
     study->step_ms = 1e3 * room->step_s;
+    study->reference_m = n > 0 ? room->reference_m : NAN;
     for (int i = 0; i < n; i++) n_front += room->setting[i].front;
     /* as many as fit, those of the front before others */
     int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
@@ -193,6 +196,17 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
         put_neighbour(room, &from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
 }
 
+/* a scene that asks for an accuracy is served by a study of its loads: a hand that goes farther is told once */
+static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
+{
+    double asked = pal_session_scene(room->session)->max_error_m;
+    if (room->told_far || !(asked > 0) || !(e->error_m > asked)) return;
+    room->told_far = true;
+    pal_log(PAL_LOG_WARN, "accuracy",
+            "%s: the estimate is %.3g mm at %.3g mm moved, beyond the %.3g mm that the scene asks for", e->body,
+            1e3 * e->error_m, 1e3 * e->most_m, 1e3 * asked);
+}
+
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
 {
     pal_wire_estimate *out = &hub->control->estimate;
@@ -213,6 +227,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
         out->zz_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
+    tell_far(c->room, out);
     return pal_hub_encode(hub, hub->control);
 }
 

@@ -66,6 +66,8 @@ typedef struct pal_hub_room {
     double step_s;                     /* of the scene as it was opened: what all prices are for */
     const pal_priced_setting *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
     int n_setting, setting_body;
+    double reference_m; /* the study's reference's own error; NaN: not known */
+    bool told_far;      /* that an estimate is beyond what the scene asks for */
     int tier_users[PAL_STREAM_TIER];
     int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients that look at a field   */
     bool told[PAL_BODY_MAX][PAL_FIELD_COUNT];  /* the session knows that some do */

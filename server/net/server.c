@@ -95,6 +95,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, note, &s->site));
     hub.site = s->site;
     hub.setting = options->setting, hub.n_setting = options->n_setting, hub.setting_body = options->setting_body;
+    hub.reference_m = options->reference_m;
     /* besides the clients: page loads, and what lws needs itself */
     PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, note, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, note, &s->hub));

@@ -19,6 +19,7 @@ typedef struct pal_server_options {
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_setting 0: no study */
     const pal_priced_setting *const *setting; /* [n_session][n_setting] */
     const int *n_setting, *setting_body;      /* [n_session]            */
+    const double *reference_m;                /* error of each study's own reference [n_session]; NULL: not known */
 } pal_server_options;
 
 /* REFUSED: address needs allow_remote, port in use (the sentence names it); borrows sessions until close. [load] */

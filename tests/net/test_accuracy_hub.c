@@ -36,12 +36,16 @@ static void begin(bool with_study)
 {
     static const pal_priced_setting *list[1];
     static int n_setting[1] = {POINTS}, body[1] = {0};
+    static double reference_m[1] = {3e-4};
     pal_note note = {""};
     list[0] = setting;
     gate = pal_server_gate_create();
     pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {
-        .road = "mem", .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body};
+    pal_server_options net = {.road = "mem",
+                              .setting = with_study ? list : NULL,
+                              .n_setting = n_setting,
+                              .setting_body = body,
+                              .reference_m = reference_m};
     if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
     if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
     pal_server_connect(server, gate);
@@ -105,6 +109,7 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
     CHECK_TEXT(study->body, "organ");
     CHECK_INT(study->n_point, POINTS - 1);
     CHECK_NEAR(study->step_ms, 1e3 * organ.scene.step_s, 1e-9);
+    CHECK(study->reference_m == 3e-4);
     CHECK_INT(study->point[3].index, 4);
     CHECK_TEXT(study->point[3].method, "fem hex8_bbar");
     CHECK(study->point[0].front && !study->point[1].front && study->point[3].error_m == 1e-4);

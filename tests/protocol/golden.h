@@ -184,7 +184,7 @@ static inline pal_control_type golden_line_type(int line)
 
 static inline void golden_study(pal_wire_study *s)
 {
-    *s = (pal_wire_study){"liver", 50 / 3.0, 2, {{.index = 0}}};
+    *s = (pal_wire_study){"liver", 50 / 3.0, NAN, 2, {{.index = 0}}};
     s->point[0] = (pal_wire_point){3, "tet_springs", "tet_springs, 8 voxels", 1.0 / 3, 0.0021, false};
     s->point[1] = (pal_wire_point){250, "fem hex8_bbar", "fem \"hex8_bbar\", 16 voxels", 16.7, 4.5e-4, true};
 }

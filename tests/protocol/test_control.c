@@ -278,7 +278,7 @@ static void the_largest_study_fits_its_limit(void)
     static pal_control full, again;
     size_t n;
     full.type = PAL_CONTROL_STUDY;
-    full.study.n_point = PAL_WIRE_POINT_MAX;
+    full.study.n_point = PAL_WIRE_POINT_MAX, full.study.reference_m = 1e-7 / 3;
     for (uint32_t i = 0; i < PAL_WIRE_POINT_MAX; i++) {
         full.study.point[i] = (pal_wire_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true};
         memset(full.study.point[i].label, '"', PAL_WIRE_LABEL_BYTES - 1);
@@ -287,6 +287,7 @@ static void the_largest_study_fits_its_limit(void)
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
     CHECK_TEXT(again.study.point[PAL_WIRE_POINT_MAX - 1].label, full.study.point[0].label);
+    CHECK(again.study.reference_m == full.study.reference_m);
 }
 
 static void writer_refuses_what_the_reader_would(void)

@@ -28,6 +28,8 @@ export class AccuracyPanel {
     /** @type {Estimate | null} */
     this.estimate = null;
     this.stepMs = 0; // of a step in real time
+    /** @type {number | undefined} the study's own: below it nothing is told apart */
+    this.reference = undefined;
     this.held = false; // the slider, by somebody's hand
     /** @type {{order: Order, what: string, since: number} | null} not answered yet */
     this.underWay = null;
@@ -83,10 +85,11 @@ export class AccuracyPanel {
     this.show();
   }
 
-  /** @param {{body: string, step_ms?: number, points?: Point[]}} m control message `study` */
+  /** @param {{body: string, step_ms?: number, reference_m?: number, points?: Point[]}} m control message `study` */
   study(m) {
     if (m.body !== this.asked) return;
     this.points = m.points ?? [];
+    this.reference = m.reference_m;
     this.stepMs = m.step_ms ?? this.stepMs;
     this.front = frontOf(this.points);
     this.slider.max = String(Math.max(0, this.front.length - 1));
@@ -168,6 +171,10 @@ export class AccuracyPanel {
     if (this.stepMs > plot.msRange.low && this.stepMs < plot.msRange.high) {
       const x = plot.x(this.stepMs);
       out.push(this.shape("line", { x1: x, x2: x, y1: top, y2: bottom, class: "real-time" }, `${milliseconds(this.stepMs)}: dearer than this is slower than real time`));
+    }
+    if (this.reference !== undefined && 1e3 * this.reference > plot.errorRange.low && 1e3 * this.reference < plot.errorRange.high) {
+      const y = plot.y(this.reference);
+      out.push(this.shape("line", { x1: BOX.left, x2: right, y1: y, y2: y, class: "real-time" }, `the reference itself: ${millimetres(this.reference)}; below it errors are of chance`));
     }
     if (plot.front.length > 1) out.push(this.shape("polyline", { points: plot.front.map((p) => `${p.x.toFixed(1)},${p.y.toFixed(1)}`).join(" "), class: "front" }));
     for (const mark of plot.marks) out.push(this.shape("circle", { cx: mark.x, cy: mark.y, r: mark.point.front ? 4 : 2.8, fill: mark.colour, class: mark.point.front ? "point on-front" : "point" },
