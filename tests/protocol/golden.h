@@ -270,6 +270,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         break;
     case PAL_CONTROL_STUDY:
         snprintf(c->study.body, sizeof c->study.body, "liver");
+        c->study.reference_m = NAN;
         break;
     case PAL_CONTROL_ESTIMATE:
         golden_no_estimate(&c->estimate);
