@@ -223,7 +223,11 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     pal_setting_of(pal_session_scene(c->room->session), b, &now);
     pal_plain_text(out->setting, sizeof out->setting, pal_setting_text(&now, text));
     out->point = point_of(c->room, b, &now);
-    out->ms = c->room->stream->step_ms > 0 ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
+    /* until there is an estimate; asleep a step costs nothing that a setting could be judged by */
+    const pal_frame *f = c->room->stream->frame;
+    bool awake = !f || b >= f->n_part || !f->part[b].asleep;
+    bool known_ms = awake && c->room->stream->step_ms > 0;
+    out->ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
     out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
         out->zz_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
