@@ -19,7 +19,7 @@ static void add_number(cJSON *o, const char *key, double value)
 
 static cJSON *result_json(const pal_torture_result *r)
 {
-    static const char *const verdict[] = {"passed", "failed", "undecided", "skipped"};
+    static const char *const verdict[] = {"passed", "failed", "undecided", "skipped", "collapsed"};
     cJSON *o = cJSON_CreateObject(), *rescue = cJSON_AddObjectToObject(o, "rescues");
     const struct {
         const char *key;
@@ -57,6 +57,7 @@ static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options
     add_number(o, "settle_s", report->settle_s);
     add_number(o, "cpu_s", report->took_s);
     cJSON_AddNumberToObject(o, "passed", report->n_passed);
+    cJSON_AddNumberToObject(o, "collapsed", report->n_collapsed);
     cJSON_AddNumberToObject(o, "failed", report->n_failed);
     cJSON_AddNumberToObject(o, "undecided", report->n_undecided);
     cJSON_AddNumberToObject(o, "skipped", report->n_skipped);
@@ -82,12 +83,17 @@ static void print_result(const pal_torture_result *r)
 
 static void print(const pal_scene *scene, const pal_torture_report *report)
 {
-    printf("%s: %s\n\n", scene->title, report->rests ? "comes to rest by itself" : "DOES NOT COME TO REST by itself");
+    printf("%s: %s\n\n", scene->title,
+           report->rests ? "comes to rest by itself"
+           : report->led ? "is led for ever: compared with an untouched run"
+                         : "DOES NOT COME TO REST by itself");
     printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "insult", "verdict", "energy +", "forgiven", "% S left", "sim s",
            "cpu s", "what happened");
     for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
-    printf("\n%d passed, %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
-           report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
+    char collapsed[40] = "";
+    if (report->n_collapsed > 0) snprintf(collapsed, sizeof collapsed, " %d collapsed,", report->n_collapsed);
+    printf("\n%d passed,%s %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
+           collapsed, report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
 }
 
 static bool show(const char *what, double fraction, void *user)
@@ -107,11 +113,12 @@ int command_torture(int argc, char **argv)
 {
     static char about[4096];
     const char *picture = NULL, *only = NULL;
-    double seed = 1, seconds = 60;
+    double seed = 1, seconds = 0;
     const pal_flag flag[] = {
         {"--seed", "N", PAL_FLAG_NUMBER, &seed, 0, 1e15, "of what is drawn at random (1)"},
         {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "one insult alone"},
-        {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6, "processor time that all of them may take (60)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6,
+         "processor time that all of them may take (60, more where steps are dear)"},
         {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "energy over time, a plot for each"}};
     int head = snprintf(about, sizeof about,
                         "Does to a scene what is known to break simulations, one after another, "
@@ -128,6 +135,12 @@ int command_torture(int argc, char **argv)
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
+    bool known = !only;
+    for (int k = 0; k < pal_insults() && !known; k++) known = !strcmp(only, pal_insult_name(k));
+    if (!known) {
+        fprintf(stderr, "torture: there is no insult \"%.60s\", see palpate torture --help\n", only);
+        return 2;
+    }
     pal_torture_options options;
     pal_torture_default(&options);
     options.seed = (uint64_t)seed, options.most_s = seconds, options.only = only;

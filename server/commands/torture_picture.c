@@ -10,7 +10,7 @@ enum { COLUMNS = 4, WIDE = 250, HIGH = 170, LEFT = 46, TOP = 40, HEAD = 44, PLOT
 
 static const char *colour_of(pal_verdict verdict)
 {
-    static const char *const colour[] = {"#009e73", "#d55e00", "#e69f00", "#999999"};
+    static const char *const colour[] = {"#009e73", "#d55e00", "#e69f00", "#999999", "#cc79a7"};
     return colour[verdict];
 }
 
@@ -41,7 +41,10 @@ static void curve(FILE *to, const pal_torture_result *r, double x, double y)
     frame(to, x, y);
     if (!range(r, &seconds, &low, &high)) {
         pal_svg_text(to, x + 0.5 * PLOT_WIDE, y + 0.5 * PLOT_HIGH, "middle", " font-size=\"11\" fill=\"#777\"",
-                     r->verdict == PAL_VERDICT_SKIPPED ? "does not apply" : "nothing moved", 0);
+                     r->verdict == PAL_VERDICT_SKIPPED ? "does not apply"
+                     : r->frozen                       ? "stopped"
+                                                       : "nothing moved",
+                     0);
         return;
     }
     fprintf(to, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"1.4\" points=\"", colour_of(r->verdict));

@@ -17,7 +17,10 @@
 
 static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
-static const double settle_most_s = 30;
+static const double least_s = 60,
+                    typical_s = 500; /* --seconds by itself: at least, and simulated time it has to reach for */
+/* energy that is nothing to be judged: of what a body weighs (or its node cap) over S */
+static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
 static const char rule_back[] = "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S";
@@ -74,13 +77,13 @@ const char *pal_insult_what(int insult)
 
 const char *pal_verdict_name(pal_verdict verdict)
 {
-    static const char *const name[] = {"passed", "FAILED", "undecided", "does not apply"};
+    static const char *const name[] = {"passed", "FAILED", "undecided", "does not apply", "collapsed"};
     return name[verdict];
 }
 
 void pal_torture_default(pal_torture_options *options)
 {
-    *options = (pal_torture_options){.seed = 1, .most_s = 60};
+    *options = (pal_torture_options){.seed = 1};
 }
 
 /* ---- what insults say ---- */
@@ -311,23 +314,6 @@ void pal_rig_box(const pal_rig *rig, int b, double low_m[3], double high_m[3])
         }
 }
 
-/* RMS speed of the fastest body over its S, 1/s */
-static double speed_S_s(const pal_rig *rig)
-{
-    double most = 0;
-    for (int b = 0; b < rig->scene->n_body; b++) {
-        const pal_body *body = pal_world_body(rig->world, b);
-        double sum = 0;
-        for (int k = 0; k < body->n_active; k++) {
-            const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
-            sum += pal_dot3(v, v);
-        }
-        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->size_m;
-        if (!(speed <= most)) most = speed;
-    }
-    return most;
-}
-
 /* ---- watched steps ---- */
 
 /* every n-th step; when the room is full every second sample goes */
@@ -390,6 +376,7 @@ bool pal_rig_step(pal_rig *rig, double dt_s)
     rig->err = err;
     if (err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED) return false;
     rig->out->simulated_s += dt_s;
+    if (!pal_rig_step_twin(rig, dt_s)) rig->rests = false;
     look(rig);
     rig->late = 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s;
     return rig->out->finite && !halted(rig) && !rig->late;
@@ -419,56 +406,11 @@ void pal_rig_relax(pal_rig *rig, double seconds)
             out->back_s = now;
         if (now - out->back_s >= hold_s) break;
         /* what does not move any more will not come back either */
-        still_s = speed_S_s(rig) <= still_S_s ? still_s + rig->scene->step_s : 0;
+        still_s = pal_rig_speed_S_s(rig) <= still_S_s ? still_s + rig->scene->step_s : 0;
         if (still_s > 2 * hold_s) break;
     }
     out->left_S = pal_rig_left(rig);
     rig->asked_back = out->back_s < INFINITY || asked_left(rig) <= back_S;
-}
-
-/* ---- rest ---- */
-
-/* runs until nothing moves; false: it still does */
-static bool settle(pal_rig *rig, double *took_s)
-{
-    const double step = rig->scene->step_s;
-    double still_s = 0, t = 0;
-    for (; t < settle_most_s && still_s < 0.25; t += step) {
-        if (pal_world_step(rig->world, step) || 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s) return false;
-        still_s = speed_S_s(rig) <= still_S_s ? still_s + step : 0;
-    }
-    *took_s = t;
-    return still_s >= 0.25;
-}
-
-static void keep(pal_rig *rig, double **to)
-{
-    for (int b = 0; b < rig->scene->n_body; b++) {
-        const pal_body *body = pal_world_body(rig->world, b);
-        memcpy(to[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
-    }
-    rig->rest_J = pal_world_energy_J(rig->world);
-}
-
-/* the scene at rest, as if nothing had been: a new world, as solvers keep factors of what they have seen */
-static bool back_to_rest(pal_rig *rig)
-{
-    double took_s;
-    pal_world *fresh = NULL;
-    if (pal_world_create(rig->scene, NULL, &fresh)) return false;
-    pal_world_destroy(rig->world);
-    rig->world = fresh;
-    if (rig->anew) {
-        bool still = settle(rig, &took_s);
-        if (still) keep(rig, rig->rest);
-        return still;
-    }
-    for (int b = 0; b < rig->scene->n_body; b++) {
-        pal_body *body = pal_world_body(rig->world, b);
-        memcpy(body->x, rig->rest[b], 3 * sizeof(double) * (size_t)body->n_dof);
-        pal_world_moved(rig->world, b);
-    }
-    return true;
 }
 
 /* ---- verdicts ---- */
@@ -495,10 +437,17 @@ static double energy_limit(const pal_rig *rig)
     return limit;
 }
 
+/* what was put in less than this is rounding, and a share of it says nothing */
+static double nothing_J(const pal_rig *rig, int b)
+{
+    return nothing_share * pal_rig_cap_N(rig, b) * pal_world_body(rig->world, b)->size_m;
+}
+
 static void judge(pal_rig *rig)
 {
     pal_torture_result *out = rig->out;
-    bool judged = !isnan(out->energy) && rig->scale_J > 0;
+    bool judged = !isnan(out->energy) && rig->scale_J > 0 && !rig->twin; /* who leads it does work all the time */
+    for (int b = 0; b < rig->scene->n_body; b++) rig->scale_J = fmax(rig->scale_J, nothing_J(rig, b));
     out->limit = energy_limit(rig);
     out->energy = judged ? rig->excess_J / rig->scale_J : (double)NAN;
     out->forgiven = judged ? rig->forgiven_J / rig->scale_J : (double)NAN;
@@ -514,7 +463,7 @@ static void judge(pal_rig *rig)
     if (rig->late && !all_excused && !(rig->needs_rest && rig->asked_back))
         pal_rig_undecided(rig, "not judged, the time was over after %.1f simulated s: give more --seconds",
                           out->simulated_s);
-    else if (rig->needs_rest && !rig->rests)
+    else if (rig->needs_rest && !rig->rests && !rig->twin)
         pal_rig_undecided(rig, "not judged, the scene does not come to rest by itself");
     else if (rig->needs_rest && !rig->asked_back)
         pal_rig_fail(rig, "%.2g %% S from rest at the end", 100 * asked_left(rig));
@@ -527,6 +476,7 @@ static void check_reset(pal_rig *rig, double seconds)
     pal_torture_result *out = rig->out, was = *out;
     const double now = 1e-9 * (double)pal_clock_thread_ns();
     pal_world_reset(rig->world);
+    if (rig->twin) pal_world_reset(rig->twin);
     out->frozen = false, out->n_sample = 0, rig->late = false;
     memset(rig->stopped, 0, sizeof rig->stopped);
     memset(rig->may_stay, 0, sizeof rig->may_stay);
@@ -559,6 +509,14 @@ static void advise(pal_rig *rig)
     pal_rig_say(rig, "a reset brings it back%s", central ? ", solver implicit_euler comes back from more" : "");
 }
 
+/* springs whose shape was taken away and that did not find it again by themselves */
+static bool has_collapsed(const pal_rig *rig)
+{
+    for (int b = 0; b < rig->scene->n_body; b++)
+        if (rig->may_stay[b] && (rig->stopped[b] || !(body_left(rig, b) <= back_S))) return true;
+    return false;
+}
+
 static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
 {
     pal_torture_result *out = rig->out;
@@ -576,7 +534,7 @@ static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
     memset(rig->stopped, 0, sizeof rig->stopped);
     memset(rig->may_stop, 0, sizeof rig->may_stop);
     memset(rig->may_stay, 0, sizeof rig->may_stay);
-    if (!back_to_rest(rig)) {
+    if (!pal_rig_back_to_rest(rig)) {
         pal_rig_undecided(rig, "not judged, the scene did not come to rest before it");
         return;
     }
@@ -585,11 +543,15 @@ static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
     insult->run(rig);
     sum_rescues(rig);
     judge(rig);
-    const bool folded = is_folded(rig);
+    const bool folded = is_folded(rig), collapsed = has_collapsed(rig);
     bool reset = out->frozen || folded;
     for (int b = 0; b < rig->scene->n_body; b++) reset = reset || (rig->may_stay[b] && !(out->back_s < INFINITY));
     if (out->verdict != PAL_VERDICT_SKIPPED && reset) check_reset(rig, seconds);
     if (folded && rig->asked_back) advise(rig);
+    if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
+        out->verdict = PAL_VERDICT_COLLAPSED;
+        pal_rig_say(rig, "a reset brings it back");
+    }
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
 }
 
@@ -635,6 +597,7 @@ static pal_err open_rig(pal_rig *rig, const pal_scene *scene)
 static void close_rig(pal_rig *rig)
 {
     pal_world_destroy(rig->world);
+    pal_world_destroy(rig->twin);
     for (int b = 0; b < PAL_BODY_MAX; b++) free(rig->rest[b]), free(rig->start[b]);
     free(rig->scene);
 }
@@ -644,23 +607,39 @@ static void count(pal_torture_report *out)
     for (int i = 0; i < out->n; i++) {
         pal_verdict verdict = out->result[i].verdict;
         out->n_passed += verdict == PAL_VERDICT_PASSED, out->n_failed += verdict == PAL_VERDICT_FAILED;
+        out->n_collapsed += verdict == PAL_VERDICT_COLLAPSED;
         out->n_undecided += verdict == PAL_VERDICT_UNDECIDED, out->n_skipped += verdict == PAL_VERDICT_SKIPPED;
     }
+}
+
+/* processor time for everything: by what a step costs from the pose that was found */
+static double enough_s(pal_rig *rig)
+{
+    enum { PROBE = 10 };
+    double before = 1e-9 * (double)pal_clock_thread_ns();
+    for (int i = 0; i < PROBE; i++) {
+        for (int b = 0; b < rig->scene->n_body; b++) (void)pal_world_moved(rig->world, b);
+        (void)pal_world_step(rig->world, rig->scene->step_s);
+    }
+    double step_s = (1e-9 * (double)pal_clock_thread_ns() - before) / PROBE;
+    return fmin(1800, fmax(least_s, typical_s / rig->scene->step_s * step_s));
 }
 
 static pal_err run_all(pal_rig *rig, pal_torture_report *out)
 {
     const pal_torture_options *o = rig->options;
     double begin = 1e-9 * (double)pal_clock_thread_ns();
-    rig->deadline_s = begin + 0.5 * o->most_s;
+    rig->deadline_s = begin + (o->most_s > 0 ? 0.5 * o->most_s : least_s);
     if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
-    out->rests = rig->rests = settle(rig, &out->settle_s);
-    keep(rig, rig->rest);
+    out->rests = rig->rests = pal_rig_settle(rig, &out->settle_s);
+    if (!rig->rests && !rig->late) out->led = pal_rig_lead(rig);
+    pal_rig_keep(rig, rig->rest);
+    const double most_s = o->most_s > 0 ? o->most_s : enough_s(rig);
     for (int k = 0; k < N_INSULT; k++) {
         if (o->only && strcmp(o->only, insults[k].name)) continue;
         if (o->progress && !o->progress(insults[k].name, (double)k / N_INSULT, o->user))
             return pal_note_set(rig->note, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
-        double left = begin + o->most_s - 1e-9 * (double)pal_clock_thread_ns();
+        double left = begin + most_s - 1e-9 * (double)pal_clock_thread_ns();
         /* what is short leaves its time to the others; none takes more than a third of what is left */
         int n_left = o->only ? 1 : N_INSULT - k;
         rig->out = &out->result[out->n++];

@@ -14,6 +14,9 @@
  * of a scene is excused for itself alone. Solids of cells are not excused: one that stays folded fails, is reset to see
  * that this brings it back, and the note says what helps.
  *
+ * A scene that a moving support leads for ever is compared with an untouched run beside it instead of with rest; its
+ * energy is not judged. Springs that stay away until their reset are told apart: `collapsed`, no failure.
+ *
  * Time is simulated; what comes out depends on the scene, the seed and the processor time that is allowed: an insult
  * that runs out of it before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
 #ifndef PAL_LAB_TORTURE_H
@@ -26,13 +29,15 @@ typedef enum pal_verdict {
     PAL_VERDICT_PASSED,
     PAL_VERDICT_FAILED,
     PAL_VERDICT_UNDECIDED,
-    PAL_VERDICT_SKIPPED
+    PAL_VERDICT_SKIPPED,
+    PAL_VERDICT_COLLAPSED /* springs, as numerics.md part 3 has it: bounded, away from rest, back after a reset */
 } pal_verdict;
-const char *pal_verdict_name(pal_verdict verdict); /* "passed", "FAILED", "undecided", "does not apply" [any] */
+/* "passed", "FAILED", "undecided", "does not apply", "collapsed" [any] */
+const char *pal_verdict_name(pal_verdict verdict);
 
 typedef struct pal_torture_options {
     uint64_t seed;
-    double most_s;    /* processor time of all insults together; 60                    */
+    double most_s;    /* processor time of all insults together; 0: 60, more for scenes whose steps are dear */
     const char *only; /* this insult alone; NULL: all                                   */
     bool (*progress)(const char *what, double fraction, void *user); /* false: stop; may be NULL */
     void *user;
@@ -59,9 +64,10 @@ typedef struct pal_torture_result {
 typedef struct pal_torture_report {
     bool rests;      /* the scene comes to rest by itself: without that nothing can be said about coming back, and
                         insults that ask for it are undecided                                                 */
+    bool led;        /* it does not because a moving support leads it: it is judged beside an untouched run */
     double settle_s; /* simulated time that took                                                              */
     double took_s;   /* processor time of everything                                                          */
-    int n_passed, n_failed, n_undecided, n_skipped, n;
+    int n_passed, n_failed, n_undecided, n_skipped, n_collapsed, n;
     pal_torture_result result[PAL_INSULT_MOST];
 } pal_torture_report;
 

@@ -4,8 +4,8 @@
 #include "server/lab/torture.h"
 
 typedef struct pal_rig {
-    pal_scene *scene; /* the user's, with two tools at least where tools can touch; heap */
-    pal_world *world;
+    pal_scene *scene;        /* the user's, with two tools at least where tools can touch; heap */
+    pal_world *world, *twin; /* twin: an untouched run of a scene that is led; else NULL */
     const pal_torture_options *options;
     pal_note *note;              /* of the whole run */
     double *rest[PAL_BODY_MAX];  /* where the bodies rest          [n_dof][3] */
@@ -34,6 +34,13 @@ bool pal_rig_step(pal_rig *rig, double dt_s);
 bool pal_rig_run(pal_rig *rig, double seconds); /* steps of the scene */
 /* runs until all bodies have been within 0.1 % S of rest for half a second, at most seconds; sets left_S and back_s */
 void pal_rig_relax(pal_rig *rig, double seconds);
+/* torture_rest.c */
+double pal_rig_speed_S_s(const pal_rig *rig);
+bool pal_rig_settle(pal_rig *rig, double *took_s);
+void pal_rig_keep(pal_rig *rig, double **to);
+bool pal_rig_back_to_rest(pal_rig *rig);
+bool pal_rig_lead(pal_rig *rig);
+bool pal_rig_step_twin(pal_rig *rig, double dt_s);
 double pal_rig_left(const pal_rig *rig);   /* largest RMS from rest of any body over its S */
 double pal_rig_energy(const pal_rig *rig); /* energy less the work of lasting loads */
 /* loads or shapes have changed from outside: what is there now is what may not grow */

@@ -276,6 +276,10 @@ static double speed_S_s(const pal_rig *rig)
 
 void pal_insult_supports(pal_rig *rig)
 {
+    if (rig->twin) {
+        pal_rig_skip(rig, "a moving support leads it: the insult asks for rest elsewhere");
+        return;
+    }
     for (int b = 0; b < rig->scene->n_body; b++)
         if (pal_world_body(rig->world, b)->shell) {
             pal_rig_skip(rig, "a surface that adapts begins at rest when its scene changes");
