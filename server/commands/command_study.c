@@ -48,7 +48,7 @@ typedef struct study_run {
     pal_study_file *file;                       /* as it is kept */
     pal_study *before;                          /* measured before; NULL: none */
     int n_before, n_new;
-    double first_s; /* clock when the first new setting began */
+    double begin_s, first_s; /* clock when anything began, when the first new setting did */
     char doing[160];
     pal_err kept; /* of the last writing */
     pal_note kept_note;
@@ -283,6 +283,10 @@ static bool show(const char *what, double fraction, void *user)
     double now = pal_clock_s();
     const pal_study_file *f = run->file;
     if (run->n_new == 0) run->first_s = now;
+    if (run->begin_s == 0) run->begin_s = now;
+    /* of the reference, which may have to be made again */
+    if (!strncmp(what, "reference", 9) && fraction > 0 && fraction < 1)
+        snprintf(left, sizeof left, ", about %.0f s of it left", (now - run->begin_s) * (1 - fraction) / fraction);
     if (run->n_new > 0 && f->n_all > f->study.n_point) {
         double rest = (now - run->first_s) / run->n_new * (f->n_all - f->study.n_point);
         snprintf(left, sizeof left, rest < 90 ? ", about %.0f s left" : ", about %.0f min left",
@@ -292,7 +296,7 @@ static bool show(const char *what, double fraction, void *user)
     if (run->n_new > 0)
         snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_all, what, share, left);
     else
-        snprintf(text, sizeof text, "%s%s", what, share);
+        snprintf(text, sizeof text, "%s%s%s", what, share, left);
     pal_report_progress(text, 0, &run->common);
     return !stop_asked;
 }

@@ -61,15 +61,15 @@ static void show(const pal_study *s)
 }
 
 /* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
- * it a meganewton or a flat shape leaves them elsewhere for good */
+ * it a meganewton leaves them elsewhere for good */
 static void check_survives(const organ *o, const pal_setting *setting)
 {
-    static const char *const insult[] = {"meganewton", "flat"};
+    static const char *const insult[] = {"meganewton"};
     pal_set_scene *set = NULL;
     pal_note note = {{0}};
     pal_torture_report *r = calloc(1, sizeof *r);
     REQUIRE(r && !pal_setting_make(o->scene, 0, setting, &note, &set));
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 1; k++) {
         pal_torture_options options;
         pal_torture_default(&options);
         options.only = insult[k], options.most_s = 2;
