@@ -140,10 +140,12 @@ static bool sound(const finite_guard *guard, const pal_body *body)
     return far == 0 && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
-/* names what is out of bounds: no number, the point that is farthest out, or the fastest one */
+/* names what is out of bounds: no number, the point that is farthest out, or the fastest one with the mean that
+ * is judged */
 static void tell(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->size_m;
+    double twice_J = body->embed ? motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
     int far = -1, fast = -1;
     bool number = pal_body_finite(body);
     for (int k = 0; k < body->n_active && number; k++) {
@@ -159,7 +161,8 @@ static void tell(const finite_guard *guard, pal_body *body)
     else if (far_m > limit)
         pal_body_stop(body, far, "%.3g m from its rest place, %.3g m allowed", far_m, limit);
     else
-        pal_body_stop(body, fast, "speed %.3g m/s, %.3g m/s RMS allowed", fast_m_s, guard->speed_m_s);
+        pal_body_stop(body, fast, "the body %.3g m/s RMS, %.3g m/s RMS allowed", sqrt(twice_J / guard->mass_kg),
+                      guard->speed_m_s);
 }
 
 static pal_err run(void *self, pal_step *step)
