@@ -19,7 +19,8 @@
  * Swept are the scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to
  * 1/60 s, and 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until
  * they have taken 50 ms together (1,200 steps at most).
- * What is on the front is tortured shortly (study_torture.c); what fails says so in its `why` and is not named.
+ * What is on the front is tortured shortly (study_torture.c); what fails without its guard stopping it says so
+ * in its `why` and is not named.
  * Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the reference
  * under all loads but the last (the pull), which judges them unseen; where there is one load only, the point's `why`
  * says that it is judged by what it was fitted to, and it is neither on the front nor picked. */

@@ -1,5 +1,6 @@
 /* What may stand on the front has to bear being mistreated: the cheapest two insults of the torture that springs fitted
- * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing. */
+ * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing, nor does
+ * a body that its guard has stopped: it is safe, says so and is reset, while one that stays elsewhere says nothing. */
 #include "server/lab/study_parts.h"
 #include "server/lab/torture.h"
 
@@ -31,7 +32,8 @@ static const char *failed(pal_study_job *job, const pal_setting *setting)
         pal_torture_options o;
         pal_torture_default(&o);
         o.only = insult[k], o.most_s = most_s, o.progress = keeps_on, o.user = job;
-        if (!pal_torture(&set->scene, &o, report, &why) && report->n_failed > 0) found = insult[k];
+        if (!pal_torture(&set->scene, &o, report, &why) && report->n_failed > 0 && !report->result[0].frozen)
+            found = insult[k];
     }
     pal_set_scene_free(set);
     free(report);
