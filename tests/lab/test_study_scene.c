@@ -61,10 +61,10 @@ static void show(const pal_study *s)
 }
 
 /* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
- * it a meganewton leaves them elsewhere for good */
+ * it being laid flat leaves them elsewhere for good */
 static void check_survives(const organ *o, const pal_setting *setting)
 {
-    static const char *const insult[] = {"meganewton"};
+    static const char *const insult[] = {"flat"};
     pal_set_scene *set = NULL;
     pal_note note = {{0}};
     pal_torture_report *r = calloc(1, sizeof *r);
