@@ -165,10 +165,12 @@ static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
     return pal_hub_encode(hub, hub->control);
 }
 
+/* NULL: nothing to tell yet of bodies that have just taken others' place; their time goes on with the first frame */
 static pal_packet *status_message(pal_hub *hub, pal_client *c)
 {
     const pal_stream *s = c->room->stream;
     const pal_frame *f = s->frame;
+    if (!f && s->cycle) return NULL;
     uint64_t now = pal_loop_now_ns(hub->loop);
     pal_wire_status *w = &hub->control->status;
     pal_note note = {""};

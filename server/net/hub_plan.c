@@ -3,6 +3,7 @@
  * rescues, sleep"). */
 #include "server/net/hub_parts.h"
 
+#include "server/base/clock.h"
 #include "server/net/plain_text.h"
 
 #include <string.h>
@@ -132,11 +133,12 @@ static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
         give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
 }
 
-/* The world answers between two steps: a count of what it refused, and the sentence of the last */
-static void note_asked(pal_hub *hub, pal_client *c)
+/* The world answers between two steps: a count of what it refused, and the sentence of the last. Its thread goes by the
+ * machine's clock, whatever the loop's is */
+static void note_asked(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
-    c->row_until_ns = pal_loop_now_ns(hub->loop) + ASKED_NS;
+    c->row_until_ns = pal_clock_ns() + ASKED_NS;
     c->row_refused = f ? f->n_refused : 0;
 }
 
@@ -148,7 +150,7 @@ void pal_hub_row_answer(pal_hub *hub, pal_client *c)
     bool refused = f->n_refused > c->row_refused;
     if (refused) pal_session_last_note(c->room->session, &note);
     if (note.text[0]) pal_hub_complain(hub, c, "refused", "row: %s", note.text);
-    if (refused || pal_loop_now_ns(hub->loop) > c->row_until_ns) c->row_until_ns = 0;
+    if (refused || pal_clock_ns() > c->row_until_ns) c->row_until_ns = 0;
 }
 
 static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
@@ -176,7 +178,7 @@ static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
     }
     command.wanted = on == 1;
     strcpy(command.row, order->target);
-    note_asked(hub, c);
+    note_asked(c);
     give(hub, c, "row", &command);
 }
 
