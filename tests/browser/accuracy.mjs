@@ -22,12 +22,13 @@ const plan = (page) => page.evaluate(() => ({
   switches: document.querySelectorAll("#rows input").length, why: document.querySelector("#rows tr")?.title ?? "", rows: window.palpate.state.rows,
   row_ms: window.palpate.state.status?.row_ms.length ?? 0, unwatched: document.querySelector("#unwatched").textContent, off_wire: window.palpate.state.status?.off ?? [],
 }));
-/** moves the slider to a place and lets it go, as a hand does */
+/** moves the slider to a place and lets it go, as a hand does; what the panel shows at that moment: a switch may take 40 ms */
 const slide = (page, place) => page.evaluate((value) => {
   const slider = document.querySelector("#cost-slider");
   slider.value = String(value);
   slider.dispatchEvent(new Event("input"));
   slider.dispatchEvent(new Event("change"));
+  return { busy: window.palpate.cost.underWay !== null, said: document.querySelector("#cost-say").textContent };
 }, place);
 const flip = (page, row) => page.click(`#rows input[aria-label="${row} is part of the plan"]`);
 
@@ -71,8 +72,7 @@ try {
   for (const [place, what] of [[0, "the cheapest"], [begin.most, "the most accurate"], [0, "the cheapest again"]]) {
     const before = await shown(ada);
     if (before.front[place] === before.estimate?.point) continue;
-    await slide(ada, place);
-    const making = await shown(ada);
+    const making = await slide(ada, place);
     check(`let go at ${what}, the panel says what is made`, making.busy && /^Making /.test(making.said), making.said);
     const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.point === s.front[place]);
     check(`${what} runs, and what the switch did is said`, /^Switched: energy [+−][\d.]+ %/.test(after.said) && after.estimate?.point === after.front[place], `${after.said} ${after.setting}`);
