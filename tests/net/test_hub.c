@@ -219,18 +219,24 @@ static void without_acknowledgement_frames_stop_and_control_goes_on(void)
     end();
 }
 
+/* an observer and one who sees every third cycle, until that one gets coarser frames. The step of the finer ones, m */
+static double until_coarser(mem_client *all, mem_client *c, pal_wire_role role)
+{
+    begin(false, 0);
+    mem_join(all, road, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(c, road, "c", role, role == PAL_WIRE_ROLE_VIEWER ? PAL_WIRE_TOOL_NONE : PAL_WIRE_TOOL_ANY);
+    UNTIL(c->n_frame > 5, all, c);
+    double fine = (double)c->frame.q_m;
+    apart_ns = 6 * FRAME_NS;
+    for (int i = 0; i < 1500 && (double)c->frame.q_m < 1.5 * fine; i++) turn(all, i % 3 ? NULL : c);
+    CHECK_NEAR((double)c->frame.q_m / fine, 2, 1e-5);
+    return fine;
+}
+
 static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void)
 {
     mem_client c, all;
-    begin(false, 0);
-    mem_join(&all, road, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&c, road, "c", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    UNTIL(c.n_frame > 5, &all, &c);
-    double fine = (double)c.frame.q_m;
-    apart_ns = 6 * FRAME_NS;
-    /* an observer sees every cycle, this one every third */
-    for (int i = 0; i < 1500 && (double)c.frame.q_m < 1.5 * fine; i++) turn(&all, i % 3 ? NULL : &c);
-    CHECK_NEAR((double)c.frame.q_m / fine, 2, 1e-5);
+    double fine = until_coarser(&all, &c, PAL_WIRE_ROLE_VIEWER);
     for (int i = 0; i < 20000 && (double)c.frame.q_m > 1.5 * fine; i++) turn(&all, &c);
     CHECK_NEAR((double)c.frame.q_m / fine, 1, 1e-5);
     CHECK_INT(c.n_bad, 0);
@@ -243,14 +249,7 @@ static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void
 static void numbers_grow_through_every_change_of_tier(void)
 {
     mem_client c, all;
-    begin(false, 0);
-    mem_join(&all, road, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&c, road, "c", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
-    UNTIL(c.n_frame > 5, &all, &c);
-    double fine = (double)c.frame.q_m;
-    apart_ns = 6 * FRAME_NS;
-    for (int i = 0; i < 1500 && (double)c.frame.q_m < 1.5 * fine; i++) turn(&all, i % 3 ? NULL : &c);
-    CHECK_NEAR((double)c.frame.q_m / fine, 2, 1e-5);
+    double fine = until_coarser(&all, &c, PAL_WIRE_ROLE_TRAINEE);
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"pause\"}");
     running = false;
     UNTIL(c.last[PAL_CONTROL_STATUS].status.paused, &all, &c);
