@@ -5,52 +5,17 @@
 # usage: test_calibrate.sh PALPATE
 set -u
 palpate=$(realpath "$1")
-problems=$(realpath "$(dirname "$0")/../../deploy/problems")
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-passed=0 failed=0 bad=0
-
-check() { # check SENTENCE CONDITION...: the condition is a command
-    what=$1
-    shift
-    if "$@"; then return 0; fi
-    echo "  $name: $what"
-    bad=1
-}
+. "$(dirname "$0")/shell.sh"
 run() { # run ARGS...: into out, err, code
     timeout 120 "$palpate" "$@" >out 2>err </dev/null
     code=$?
 }
-begin() { name=$1 bad=0; }
-end() {
-    if [ "$bad" -eq 0 ]; then
-        passed=$((passed + 1))
-        echo "ok   $name"
-    else
-        failed=$((failed + 1))
-        echo "FAIL $name"
-        sed 's/^/    err: /' err
-    fi
-}
-code_is() { [ "$code" -eq "$1" ]; }
-lines_are() { [ "$(wc -l <"$1" | tr -d ' ')" -eq "$2" ]; }
-is_empty() { [ ! -s "$1" ]; }
-has() { grep -q -- "$2" "$1"; }
-same() { cmp -s "$1" "$2"; }
 number() { # number KEY: the first number of that key in out
     sed -n "s/.*\"$1\":\(-\{0,1\}[0-9.e+-]*\)[,}].*/\1/p" out | head -n 1
 }
-at_most() { # at_most A B: numbers
-    awk "BEGIN { exit !($1 <= $2) }" </dev/null
-}
-refused() { # refused CODE TEXT: exit code, one line on stderr that has the text, nothing on stdout, no file
-    check "exit code $code, wanted $1" code_is "$1"
-    check "more or less than one line on stderr" lines_are err 1
-    check "stderr does not say \"$2\"" has err "$2"
-    check "something is on stdout" is_empty out
-    check "a file was left" [ ! -e no.json ]
-    check "a mesh was left" [ ! -e no.palmesh ]
+nothing_is_left() {
+    check "a file was left" no_such no.json
+    check "a mesh was left" no_such no.palmesh
 }
 refuse() { # refuse CODE TEXT ARGS...
     wanted=$1 text=$2
@@ -58,6 +23,7 @@ refuse() { # refuse CODE TEXT ARGS...
     begin "refuses: $text"
     run calibrate "$@"
     refused "$wanted" "$text"
+    nothing_is_left
     end
 }
 
@@ -230,5 +196,4 @@ refuse 1 "all on one line" problem.json --case c --resolution 16 -o no.json
 problem "{\"type\": \"moved\", \"region\": $end_box, \"move\": [0, 0, 0.01]}" "$tip"
 refuse 1 "supports\[0\]: moves" problem.json --case c --resolution 16 -o no.json
 
-echo "$passed passed, $failed failed"
-[ "$failed" -eq 0 ]
+finish

@@ -9,48 +9,21 @@ if [ ! -x "${1:-}" ] || ! command -v mpirun >/dev/null 2>&1; then
     exit 0
 fi
 program=$(realpath "$1")
-problems=$(realpath "$(dirname "$0")/../../deploy/problems")
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
+. "$(dirname "$0")/shell.sh"
 # MPI itself keeps memory until the end
 export ASAN_OPTIONS=detect_leaks=0 OMPI_MCA_btl=self,vader OMPI_MCA_plm=isolated OMPI_MCA_oob_tcp_if_include=lo
 export TMPDIR="$dir" OMPI_MCA_orte_base_help_aggregate=0
 ranks='mpirun --oversubscribe'
 [ "$(id -u)" -eq 0 ] && ranks="$ranks --allow-run-as-root"
-passed=0 failed=0 bad=0
-
-check() { # check SENTENCE CONDITION...
-    what=$1
-    shift
-    if "$@"; then return 0; fi
-    echo "  $name: $what"
-    bad=1
-}
 run() { # run RANKS ARGS...: into out, err, code
     n=$1
     shift
     timeout 60 $ranks -n "$n" "$program" "$@" >out 2>err </dev/null
     code=$?
 }
-begin() { name=$1 bad=0; }
-end() {
-    if [ "$bad" -eq 0 ]; then
-        passed=$((passed + 1))
-        echo "ok   $name"
-    else
-        failed=$((failed + 1))
-        echo "FAIL $name"
-        sed 's/^/    err: /' err
-    fi
-}
-code_is() { [ "$code" -eq "$1" ]; }
-has() { grep -q -- "$2" "$1"; }
-same() { cmp -s "$1" "$2"; }
 # the answer without what differs from run to run
 answer() { sed 's/,"run":.*//' out >"$1"; }
 number() { sed "s/.*\"$1\":\([0-9]*\).*/\1/" out; } # number KEY: of out
-lines() { wc -l <"$1" | tr -d ' '; }
 said_once() { [ "$(grep -c 'palpate calibrate-mpi: ' err)" -eq 1 ]; }
 
 beam="$problems/beam.json --case tip --resolution 10 --split 1"
@@ -141,5 +114,4 @@ for words in "--case tip --seed 1,x" "--case tip --grid 3x3"; do
 done
 end
 
-echo "$passed passed, $failed failed"
-[ "$failed" -eq 0 ]
+finish

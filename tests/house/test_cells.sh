@@ -5,18 +5,7 @@
 set -u
 palpate=$(realpath "$1")
 most_kb=${2:-0}
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-passed=0 failed=0 bad=0
-
-check() { # check SENTENCE CONDITION...: the condition is a command
-    what=$1
-    shift
-    if "$@"; then return 0; fi
-    echo "  $name: $what"
-    bad=1
-}
+. "$(dirname "$0")/shell.sh"
 run() { # run ARGS...: into out, err, code
     (
         [ "$most_kb" -gt 0 ] && ulimit -v "$most_kb"
@@ -24,33 +13,10 @@ run() { # run ARGS...: into out, err, code
     ) >out 2>err </dev/null
     code=$?
 }
-begin() { name=$1 bad=0; }
-end() {
-    if [ "$bad" -eq 0 ]; then
-        passed=$((passed + 1))
-        echo "ok   $name"
-    else
-        failed=$((failed + 1))
-        echo "FAIL $name"
-        sed 's/^/    err: /' err
-    fi
-}
-lines() { wc -l <"$1" | tr -d ' '; }
-code_is() { [ "$code" -eq "$1" ]; }
-lines_are() { [ "$(lines "$1")" -eq "$2" ]; }
-is_empty() { [ ! -s "$1" ]; }
-has() { grep -q -- "$2" "$1"; }
-no_such() { [ ! -e "$1" ]; }
 good() { # good ARGS...: runs, exit code 0, nothing on stderr
     run "$@"
     check "exit code $code of $*" code_is 0
     check "stderr is not empty after $*" is_empty err
-}
-refused() { # refused CODE TEXT: exit code, one line on stderr that has the text, nothing on stdout
-    check "exit code $code, wanted $1" code_is "$1"
-    check "$(lines err) lines on stderr, wanted 1" lines_are err 1
-    check "stderr does not say \"$2\"" has err "$2"
-    check "something is on stdout" is_empty out
 }
 # what the object on stdout says of the solid, volumes to nine digits
 facts() { sed 's/.*"control_cells"/"control_cells"/; s/,"paper":{[^}]*}//; s/,"file".*//; s/\(volume_m3":[0-9.]\{12\}\)[^,]*/\1/g' "$1"; }
@@ -219,5 +185,4 @@ check "exit code $code" code_is 1
 check "no object" has out '^{"ok":false,"error":{"code":"REFUSED"'
 end
 
-echo "$passed passed, $failed failed"
-[ "$failed" -eq 0 ]
+finish

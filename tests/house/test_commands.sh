@@ -4,21 +4,9 @@
 # usage: test_commands.sh PALPATE [MOST_KB]     MOST_KB: address space a command may take (0: no limit, for sanitizers)
 set -u
 palpate=$(realpath "$1")
-problems=$(realpath "$(dirname "$0")/../../deploy/problems")
 here=$(realpath "$(dirname "$0")")
 most_kb=${2:-0}
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-passed=0 failed=0 bad=0
-
-check() { # check SENTENCE CONDITION...: the condition is a command
-    what=$1
-    shift
-    if "$@"; then return 0; fi
-    echo "  $name: $what"
-    bad=1
-}
+. "$(dirname "$0")/shell.sh"
 run() { # run ARGS...: into out, err, code
     (
         [ "$most_kb" -gt 0 ] && ulimit -v "$most_kb"
@@ -26,24 +14,6 @@ run() { # run ARGS...: into out, err, code
     ) >out 2>err </dev/null
     code=$?
 }
-begin() { name=$1 bad=0; }
-end() {
-    if [ "$bad" -eq 0 ]; then
-        passed=$((passed + 1))
-        echo "ok   $name"
-    else
-        failed=$((failed + 1))
-        echo "FAIL $name"
-        sed 's/^/    err: /' err
-    fi
-}
-lines() { wc -l <"$1" | tr -d ' '; }
-code_is() { [ "$code" -eq "$1" ]; }
-lines_are() { [ "$(lines "$1")" -eq "$2" ]; }
-is_empty() { [ ! -s "$1" ]; }
-has() { grep -q -- "$2" "$1"; }
-hasnt() { ! grep -q -- "$2" "$1"; }
-no_such() { [ ! -e "$1" ]; }
 is_json() { # one object, nothing else; with node when it is there
     [ "$(lines "$1")" -eq 1 ] || return 1
     if command -v node >/dev/null 2>&1; then
@@ -52,12 +22,6 @@ is_json() { # one object, nothing else; with node when it is there
     else
         grep -q '^{.*}$' "$1"
     fi
-}
-refused() { # refused CODE TEXT: exit code, one line on stderr that has the text, nothing on stdout
-    check "exit code $code, wanted $1" code_is "$1"
-    check "$(lines err) lines on stderr, wanted 1" lines_are err 1
-    check "stderr does not say \"$2\"" has err "$2"
-    check "something is on stdout" is_empty out
 }
 
 # ---- good input ----
@@ -660,5 +624,4 @@ run prepare bomb.inr.gz -o hostile
 refused 1 "bomb.inr.gz"
 end
 
-echo "$passed passed, $failed failed"
-[ "$failed" -eq 0 ]
+finish
