@@ -2,52 +2,22 @@
 #ifndef TESTS_NET_ORDER_ROOM_H
 #define TESTS_NET_ORDER_ROOM_H
 #include "protocol/asset.h"
-#include "server/net/server.h"
-#include "tests/net/mem_client.h"
-
-#include <time.h>
-
-#define FRAME_NS 16666667ull
-
-static pal_session *session;
-static pal_server *server;
-static pal_server_gate *gate;
-static pal_transport *road;
-static uint64_t now_ns;
+#include "tests/net/served.h"
 
 /* of body 0 */
 static inline void order_begin(const pal_scene *scene, const pal_priced_setting *point, int n_point)
 {
-    pal_note note = {""};
-    gate = pal_server_gate_create();
-    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
     static const pal_priced_setting *list[1];
     static int n[1], body[1];
     list[0] = point, n[0] = n_point, body[0] = 0;
-    pal_server_options net = {.road = "mem", .setting = point ? list : NULL, .n_setting = n, .setting_body = body};
-    if (pal_session_open(scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
-    pal_server_connect(server, gate);
-    road = pal_server_transport(server);
-    now_ns = 1000000000ull;
-}
-
-static inline void end(void)
-{
-    pal_server_close(server);
-    pal_session_close(session);
-    pal_server_gate_destroy(gate);
-    CHECK_INT(pal_packet_total(), 0);
+    served_begin(scene, (pal_session_options){0},
+                 (pal_server_options){.setting = point ? list : NULL, .n_setting = n, .setting_body = body});
 }
 
 /* the loop goes on by a little; others read too, or their queues would fill */
 static inline void turn(mem_client *a, mem_client *b)
 {
-    now_ns += FRAME_NS / 4;
-    pal_server_turn(server, now_ns);
-    if (a) mem_pull(a, 1000);
-    if (b) mem_pull(b, 1000);
-    nanosleep(&(struct timespec){0, 500000}, NULL);
+    served_turn(FRAME_NS / 4, a, b);
 }
 
 static inline int n_answer(const mem_client *c)

@@ -1,18 +1,9 @@
 /* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
-#include "server/net/server.h"
 #include "server/session/estimate.h"
-#include "tests/net/mem_client.h"
+#include "tests/net/served.h"
 #include "tests/net/small_scene.h"
 
-#include <time.h>
-
 static small_scene organ;
-static pal_session *session;
-static pal_server *server;
-static pal_server_gate *gate;
-static pal_transport *road;
-static uint64_t now_ns;
-
 enum { POINTS = 5 };
 static pal_priced_setting setting[POINTS];
 
@@ -37,44 +28,17 @@ static void begin(bool with_study)
     static const pal_priced_setting *list[1];
     static int n_setting[1] = {POINTS}, body[1] = {0};
     static double reference_m[1] = {3e-4};
-    pal_note note = {""};
     list[0] = setting;
-    gate = pal_server_gate_create();
-    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem",
-                              .setting = with_study ? list : NULL,
-                              .n_setting = n_setting,
-                              .setting_body = body,
-                              .reference_m = reference_m};
-    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
-    pal_server_connect(server, gate);
-    road = pal_server_transport(server);
-    now_ns = 1000000000ull;
-}
-
-static void end(void)
-{
-    pal_server_close(server);
-    pal_session_close(session);
-    pal_server_gate_destroy(gate);
+    pal_server_options net = {
+        .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body, .reference_m = reference_m};
+    served_begin(&organ.scene, (pal_session_options){0}, net);
 }
 
 /* half a second of the hub's time, so that every turn is a tick */
 static void turn(mem_client *a, mem_client *b)
 {
-    now_ns += 500000000ull;
-    pal_server_turn(server, now_ns);
-    if (a) mem_pull(a, 1000);
-    if (b) mem_pull(b, 1000);
-    nanosleep(&(struct timespec){0, 2000000}, NULL);
+    served_turn(500000000ull, a, b);
 }
-
-#define UNTIL(condition, a, b)                                                                                         \
-    do {                                                                                                               \
-        for (int turns = 0; !(condition) && turns < 10000; turns++) turn(a, b);                                        \
-        CHECK(condition);                                                                                              \
-    } while (0)
 
 #define LOOK(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"on\":" #on "}}"
 

@@ -1,41 +1,14 @@
 /* A body that adapts, from a real session to clients on mem://: who is told of its triangles, when, and that what they
  * have is the world's. */
 #include "server/net/credit.h"
-#include "server/net/server.h"
 #include "server/net/stream.h"
 #include "tests/net/adaptive_scene.h"
-#include "tests/net/mem_client.h"
-
-#include <time.h>
-
-#define FRAME_NS 16666667ull
+#include "tests/net/served.h"
 
 static adaptive_scene calm, storm, weightless;
-static pal_session *session;
-static pal_server *server;
-static pal_server_gate *gate;
-static pal_transport *road;
-static uint64_t now_ns;
-
 static void begin(const adaptive_scene *which)
 {
-    pal_note note = {""};
-    gate = pal_server_gate_create();
-    pal_session_options options = {
-        .lease_s = 60, .start_paused = true, .wake = pal_server_gate_wake, .user = gate, .unpaced = true};
-    pal_server_options net = {.road = "mem"};
-    if (pal_session_open(&which->scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
-    pal_server_connect(server, gate);
-    road = pal_server_transport(server);
-    now_ns = 1000000000ull;
-}
-
-static void end(void)
-{
-    pal_server_close(server);
-    pal_session_close(session);
-    pal_server_gate_destroy(gate);
+    served_begin(&which->scene, (pal_session_options){.start_paused = true, .unpaced = true}, (pal_server_options){0});
 }
 
 static void nap(void)

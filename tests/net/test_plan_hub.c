@@ -1,18 +1,9 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
-#include "server/net/server.h"
 #include "server/session/estimate.h"
-#include "tests/net/mem_client.h"
+#include "tests/net/served.h"
 #include "tests/net/small_scene.h"
 
-#include <time.h>
-
 static small_scene organ;
-static pal_session *session;
-static pal_server *server;
-static pal_server_gate *gate;
-static pal_transport *road;
-static uint64_t now_ns;
-
 static void hurt(void *user, pal_world *next, const pal_world *before)
 {
     (void)user, (void)before;
@@ -31,42 +22,16 @@ static void begin_hurt(void)
 
 static void begin(bool hurts)
 {
-    pal_session *sessions[1];
-    pal_note note = {""};
-    gate = pal_server_gate_create();
-    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem"};
-    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    served_session(&organ.scene, (pal_session_options){0});
     if (hurts) begin_hurt();
-    sessions[0] = session;
-    if (pal_server_open(&net, sessions, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
-    pal_server_connect(server, gate);
-    road = pal_server_transport(server);
-    now_ns = 1000000000ull;
-}
-
-static void end(void)
-{
-    pal_server_close(server);
-    pal_session_close(session);
-    pal_server_gate_destroy(gate);
+    served_open((pal_server_options){0});
 }
 
 /* half a second of the hub's time, so that every turn is a tick */
 static void turn(mem_client *a, mem_client *b)
 {
-    now_ns += 500000000ull;
-    pal_server_turn(server, now_ns);
-    if (a) mem_pull(a, 1000);
-    if (b) mem_pull(b, 1000);
-    nanosleep(&(struct timespec){0, 2000000}, NULL);
+    served_turn(500000000ull, a, b);
 }
-
-#define UNTIL(condition, a, b)                                                                                         \
-    do {                                                                                                               \
-        for (int turns = 0; !(condition) && turns < 10000; turns++) turn(a, b);                                        \
-        CHECK(condition);                                                                                              \
-    } while (0)
 
 static int find(uint32_t n, char (*row)[PAL_WIRE_NAME_BYTES], const char *name)
 {

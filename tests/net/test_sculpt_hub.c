@@ -1,20 +1,9 @@
 /* Sculpting over the wire: commands of clients on mem:// to a real session that runs, the topology that comes of them,
  * frames that fit it, answers, refusals, and who goes in the middle. */
-#include "protocol/asset.h"
-#include "server/net/server.h"
-#include "tests/net/mem_client.h"
+#include "tests/net/order_room.h"
 #include "tests/session/clay.h"
 
-#include <time.h>
-
-#define FRAME_NS 16666667ull
-
 static clay_scene clay;
-static pal_session *session;
-static pal_server *server;
-static pal_server_gate *gate;
-static pal_transport *road;
-static uint64_t now_ns;
 
 /* places of a block of 0.1 m, on its top and beside it */
 #define TOP  "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"
@@ -23,81 +12,7 @@ static uint64_t now_ns;
 
 static void begin(void)
 {
-    pal_note note = {""};
-    gate = pal_server_gate_create();
-    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem"};
-    if (pal_session_open(&clay.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
-    pal_server_connect(server, gate);
-    road = pal_server_transport(server);
-    now_ns = 1000000000ull;
-}
-
-static void end(void)
-{
-    pal_server_close(server);
-    pal_session_close(session);
-    pal_server_gate_destroy(gate);
-    CHECK_INT(pal_packet_total(), 0);
-}
-
-/* the loop goes on by a little; others read too, or their queues would fill */
-static void turn(mem_client *a, mem_client *b)
-{
-    now_ns += FRAME_NS / 4;
-    pal_server_turn(server, now_ns);
-    if (a) mem_pull(a, 1000);
-    if (b) mem_pull(b, 1000);
-    nanosleep(&(struct timespec){0, 500000}, NULL);
-}
-
-static int n_answer(const mem_client *c)
-{
-    return c->n_text[PAL_CONTROL_ANSWER] + c->n_text[PAL_CONTROL_ERROR];
-}
-
-static void until_answers(mem_client *c, mem_client *other, int n)
-{
-    for (int i = 0; i < 20000 && n_answer(c) < n; i++) turn(c, other);
-    CHECK_INT(n_answer(c), n);
-}
-
-static void send(mem_client *c, const char *verb, const char *args)
-{
-    char text[512];
-    snprintf(text, sizeof text, "{\"type\":\"command\",\"verb\":\"%s\",\"target\":\"\",\"args\":{%s}}", verb, args);
-    mem_text(c, text);
-}
-
-/* was it done? */
-static bool order(mem_client *c, const char *verb, const char *args)
-{
-    int n_done = c->n_text[PAL_CONTROL_ANSWER];
-    send(c, verb, args);
-    until_answers(c, NULL, n_answer(c) + 1);
-    return c->n_text[PAL_CONTROL_ANSWER] > n_done;
-}
-
-static double told(const mem_client *c, const char *key)
-{
-    const pal_wire_answer *a = &c->last[PAL_CONTROL_ANSWER].answer;
-    for (uint32_t i = 0; i < a->n_arg; i++)
-        if (!strcmp(a->arg[i].key, key)) return a->arg[i].value;
-    return NAN;
-}
-
-static const char *trouble(const mem_client *c)
-{
-    return c->last[PAL_CONTROL_ERROR].problem.text;
-}
-
-/* waits for a frame of the epoch that the client has */
-static void until_frame(mem_client *c)
-{
-    for (int i = 0; i < 20000 && (c->frame.epoch != c->epoch || c->n_tools == 0); i++) turn(c, NULL);
-    CHECK_INT(c->frame.epoch, c->epoch);
-    CHECK_INT(c->n_bad, 0);
+    order_begin(&clay.scene, NULL, 0);
 }
 
 /* farthest vertex from its place at rest, m */
@@ -107,20 +22,6 @@ static double moved(const mem_client *c)
     for (size_t i = 0; i < 3 * (size_t)c->asset->order->n_vertex; i++)
         most = fmax(most, fabs((double)c->position_m[i] - (double)c->asset->rest_m[i]));
     return most;
-}
-
-static void join(mem_client *c, const char *name, pal_wire_role role, int tool)
-{
-    mem_join(c, road, name, role, tool);
-    mem_pull(c, 1000);
-    REQUIRE(c->asset);
-    until_frame(c);
-}
-
-static const pal_wire_part_info *part(const mem_client *c)
-{
-    return c->n_text[PAL_CONTROL_TOPOLOGY] ? &c->last[PAL_CONTROL_TOPOLOGY].topology.part[0]
-                                           : &c->last[PAL_CONTROL_HELLO].hello.part[0];
 }
 
 static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
