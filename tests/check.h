@@ -6,11 +6,13 @@
  * A failed check prints file, line and the numbers, marks the test failed and goes on. check_report prints
  * "N passed, N failed" (tests, not checks) and is the exit code. A test that ran no check counts as failed.
  * check_shared(path) gives the path of a file of ../shared (environment PAL_SHARED, default ../shared) or NULL after
- * saying that the test is left out because it is not there. */
+ * saying that the test is left out because it is not there.
+ * check_random(&seed) draws the same numbers everywhere, in [-1, 1); check_random01 in [0, 1). */
 #ifndef TESTS_CHECK_H
 #define TESTS_CHECK_H
 #include <math.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +20,17 @@
 
 static int check_passed, check_failed, check_count;
 static bool check_bad;
+
+static inline double check_random01(uint64_t *seed)
+{
+    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*seed >> 11) * 0x1p-53;
+}
+
+static inline double check_random(uint64_t *seed)
+{
+    return 2 * check_random01(seed) - 1;
+}
 
 #define CHECK_FAIL(...)                                                                                                \
     do {                                                                                                               \

@@ -13,8 +13,7 @@ static uint64_t seed = 1;
 
 static double random01(void)
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(seed >> 11) * 0x1p-53;
+    return check_random01(&seed);
 }
 
 /* over many powers of ten, with all bits of a double in use */

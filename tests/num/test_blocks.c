@@ -5,8 +5,7 @@
 static double draw(void)
 {
     static uint64_t state = 0x9e3779b97f4a7c15u;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(state >> 11) / 9007199254740992.0 * 2 - 1;
+    return check_random(&state);
 }
 
 static int draw_int(int n)

@@ -39,8 +39,7 @@ void *__wrap_aligned_alloc(size_t a, size_t n)
 static double draw(void)
 {
     static uint64_t state = 88172645463325252u;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(state >> 11) / 9007199254740992.0 * 2 - 1;
+    return check_random(&state);
 }
 
 /* a body of voxels, nx * ny * nz of them, its stiffness and inertia */

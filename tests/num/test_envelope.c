@@ -14,8 +14,7 @@ typedef struct lattice {
 static uint64_t seed;
 static double uniform(void)
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(seed >> 11) * 0x1p-53;
+    return check_random01(&seed);
 }
 
 /* the same number for both ways round */

@@ -36,8 +36,7 @@ static pal_lanczos begin(chain *c, room *r, double stiff, double m)
     for (int i = 0; i < N; i++) c->m[i] = m;
     uint64_t seed = 3;
     for (int i = 0; i < N; i++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        r->z[i] = (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+        r->z[i] = check_random(&seed);
     }
     return (pal_lanczos){N, multiply, solve, c, r->z, r->basis, r->w, r->u, 0, 0, 0};
 }

@@ -8,8 +8,7 @@
 static double draw(void)
 {
     static uint64_t state = 362436069u;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(state >> 11) / 9007199254740992.0 * 2 - 1;
+    return check_random(&state);
 }
 
 static void draw_quat(double q[4])

@@ -7,8 +7,7 @@
 static double draw(void)
 {
     static uint64_t state = 88172645463325252u;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(state >> 11) / 9007199254740992.0 * 2 - 1;
+    return check_random(&state);
 }
 
 static const double tet_node[10][4] = {{1, 0, 0, 0},   {0, 1, 0, 0},   {0, 0, 1, 0},   {0, 0, 0, 1},   {.5, .5, 0, 0},

@@ -7,8 +7,7 @@ static uint64_t seed = 5;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 /* paper B 3.5: the products of v_rel and 1 - v_rel, here (0.25, 0.5, 0.75) of one cell */

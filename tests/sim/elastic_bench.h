@@ -25,8 +25,7 @@ typedef struct elastic_bench {
 static uint64_t elastic_seed = 7;
 static inline double uniform(void) /* in [-1, 1) */
 {
-    elastic_seed = elastic_seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(elastic_seed >> 11) * 0x1p-52 - 1;
+    return check_random(&elastic_seed);
 }
 
 /* ten-node elements: the middle of each edge once, behind the corners */

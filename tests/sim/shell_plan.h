@@ -17,8 +17,7 @@ typedef struct shell_plan {
 
 static inline double shell_plan_uniform(shell_plan *p) /* in [-1, 1) */
 {
-    p->seed = p->seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(p->seed >> 11) * 0x1p-52 - 1;
+    return check_random(&p->seed);
 }
 
 /* a sphere of 114 vertices, the stomach, a sheet */

@@ -24,8 +24,7 @@ typedef struct shell_row {
 
 static inline double shell_row_uniform(shell_row *r) /* in [-1, 1) */
 {
-    r->seed = r->seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(r->seed >> 11) * 0x1p-52 - 1;
+    return check_random(&r->seed);
 }
 
 /* pal_stomach_make takes a while: made once in a process, then copied */

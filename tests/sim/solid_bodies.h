@@ -25,8 +25,7 @@ typedef struct solid_test {
 
 static inline double solid_uniform(solid_test *t) /* in [-1, 1) */
 {
-    t->seed = t->seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(t->seed >> 11) * 0x1p-52 - 1;
+    return check_random(&t->seed);
 }
 
 /* a block of n x n x n cells with edge size_m, corners moved at random by up to `crooked` of a cell */

@@ -86,8 +86,7 @@ static void crumple(tool_scene *s, double far_m)
 {
     uint64_t seed = 5;
     for (int i = 0; i < 3 * s->body->n_dof; i++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        s->body->x[i] = s->body->x_rest[i] + far_m * ((double)(int64_t)(seed >> 11) * 0x1p-52 - 1);
+        s->body->x[i] = s->body->x_rest[i] + far_m * check_random(&seed);
     }
     pal_world_moved(s->world, 0);
 }

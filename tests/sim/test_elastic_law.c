@@ -9,8 +9,7 @@
 static uint64_t seed = 5;
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 static const double mu = 1.3, k1 = 7.1;

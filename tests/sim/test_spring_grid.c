@@ -7,6 +7,7 @@
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
+#include "tests/sim/largest_w2.h"
 
 enum { NODES = 5 * 4 * 3 };
 static pal_note note;
@@ -14,8 +15,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 /* a free block of 4 x 3 x 2 voxels of 1 cm whose springs stand on a grid of 5 x 4 x 3 nodes */
@@ -297,39 +297,6 @@ static void forces_of_varied_springs_are_the_gradient_of_their_energy(void)
     bench_close(&b);
 }
 
-/* largest w^2 of M^-1 K about the present state by power iteration on force differences */
-static double largest_w2(bench *b)
-{
-    enum { MOST = 384 };
-    double p[MOST], up[MOST], x[MOST], w2 = 0, eps = 1e-5 * b->body->h_m;
-    const int n = 3 * b->body->n_dof;
-    if (n > MOST) return NAN;
-    pal_step step = {.body = b->body,
-                     .force = b->plan.row + b->plan.first[PAL_STAGE_FORCE][0],
-                     .n_force = b->plan.n_of[PAL_STAGE_FORCE][0],
-                     .drag_apart = true};
-    memcpy(x, b->body->x, sizeof(double) * (size_t)n);
-    for (int i = 0; i < n; i++) p[i] = uniform();
-    for (int turn = 0; turn < 300; turn++) {
-        double size = 0, along = 0;
-        for (int i = 0; i < n; i++) size += p[i] * p[i];
-        for (int i = 0; i < n; i++) p[i] /= sqrt(size);
-        for (int i = 0; i < n; i++) b->body->x[i] = x[i] + eps * p[i];
-        pal_gather(&step);
-        memcpy(up, b->body->f, sizeof(double) * (size_t)n);
-        for (int i = 0; i < n; i++) b->body->x[i] = x[i] - eps * p[i];
-        pal_gather(&step);
-        for (int i = 0; i < n; i++) {
-            double q = (b->body->f[i] - up[i]) / (2 * eps) / b->body->mass_kg[i / 3];
-            along += q * p[i];
-            p[i] = q;
-        }
-        w2 = along;
-    }
-    memcpy(b->body->x, x, sizeof(double) * (size_t)n);
-    return w2;
-}
-
 static void the_substep_is_half_the_stable_one_of_varied_springs_or_less(void)
 {
     for (int by_volume = 0; by_volume < 2; by_volume++) {
@@ -344,7 +311,7 @@ static void the_substep_is_half_the_stable_one_of_varied_springs_or_less(void)
                              .force = b.plan.row + b.plan.first[PAL_STAGE_FORCE][0],
                              .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
             solve->effect->reset(solve->self, b.body);
-            double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b));
+            double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
             printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
             CHECK_LE(chosen, 0.5 * stable * 1.001);
             CHECK_LE(0.15 * stable, chosen);

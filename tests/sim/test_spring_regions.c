@@ -12,8 +12,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 /* 4 x 3 x 2 voxels of 1 cm, held nowhere, with area springs unless without */

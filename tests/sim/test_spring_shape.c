@@ -8,8 +8,7 @@ static uint64_t seed = 3;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 typedef struct spring {

@@ -6,6 +6,7 @@
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
+#include "tests/sim/largest_w2.h"
 #include "tests/stability/hard_case.h"
 
 static pal_note note;
@@ -13,8 +14,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int64_t)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 /* a free box with every FORCE effect there is, springs damped too, at rest */
@@ -157,40 +157,6 @@ static void forces_are_the_gradient_of_their_energy(void)
     bench_close(&b);
 }
 
-/* largest of w^2 = eigenvalues of M^-1 K about the present state by power iteration on force differences */
-static double power_iteration(bench *b)
-{
-    int n = 3 * b->body->n_dof;
-    double *p = malloc(sizeof(double) * (size_t)n), *up = malloc(sizeof(double) * (size_t)n), w2 = 0;
-    double *x = malloc(sizeof(double) * (size_t)n);
-    pal_step step = {.body = b->body,
-                     .force = b->plan.row + b->plan.first[PAL_STAGE_FORCE][0],
-                     .n_force = b->plan.n_of[PAL_STAGE_FORCE][0],
-                     .drag_apart = true};
-    double eps = 1e-5 * b->body->h_m;
-    memcpy(x, b->body->x, sizeof(double) * (size_t)n);
-    for (int i = 0; i < n; i++) p[i] = uniform();
-    for (int turn = 0; turn < 300; turn++) {
-        double size = 0, along = 0;
-        for (int i = 0; i < n; i++) size += p[i] * p[i];
-        for (int i = 0; i < n; i++) p[i] /= sqrt(size);
-        for (int i = 0; i < n; i++) b->body->x[i] = x[i] + eps * p[i];
-        pal_gather(&step);
-        memcpy(up, b->body->f, sizeof(double) * (size_t)n);
-        for (int i = 0; i < n; i++) b->body->x[i] = x[i] - eps * p[i];
-        pal_gather(&step);
-        for (int i = 0; i < n; i++) {
-            double q = (b->body->f[i] - up[i]) / (2 * eps) / b->body->mass_kg[i / 3];
-            along += q * p[i];
-            p[i] = q;
-        }
-        w2 = along;
-    }
-    memcpy(b->body->x, x, sizeof(double) * (size_t)n);
-    free(p), free(up), free(x);
-    return w2;
-}
-
 static void chooses_half_the_stable_substep_or_less(void)
 {
     bench b;
@@ -204,7 +170,7 @@ static void chooses_half_the_stable_substep_or_less(void)
                          .force = b.plan.row + b.plan.first[PAL_STAGE_FORCE][0],
                          .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
         solve->effect->reset(solve->self, b.body);
-        double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(power_iteration(&b));
+        double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
         printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
         CHECK_LE(chosen, 0.5 * stable * 1.001);
         CHECK_LE(0.15 * stable, chosen);

@@ -26,8 +26,7 @@ enum { HARD_SLOW = 1, HARD_KINDS = 6 };
 /* the same everywhere, in [0, 1) */
 static inline double hard_random(uint64_t *seed)
 {
-    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*seed >> 11) * 0x1p-53;
+    return check_random01(seed);
 }
 
 /* a box of nx x ny x nz voxels of 1 cm, soft and slightly damped, held at x = 0 unless free; not yet open */

@@ -21,8 +21,7 @@ static const double solid_step_s = 1.0 / 60;
 /* the same everywhere, in [0, 1) */
 static inline double solid_random(uint64_t *seed)
 {
-    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*seed >> 11) * 0x1p-53;
+    return check_random01(seed);
 }
 
 /* a block of n cells of 2 cm, one level, smooth; its lowest points held unless free; not yet open */

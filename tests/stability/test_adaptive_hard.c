@@ -14,8 +14,7 @@ static const double radius_m = 0.05;
 static uint64_t seed;
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 /* a sphere with its lowest part held, anchors on its rest place, damped */

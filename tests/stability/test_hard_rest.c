@@ -11,8 +11,7 @@ static const double step_s = 1.0 / 60;
 static uint64_t seed;
 static double uniform(void) /* in [-1, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(seed >> 11) * 0x1p-52 - 1;
+    return check_random(&seed);
 }
 
 static void shake(four *s, double amount_m, double speed_m_s)

@@ -12,8 +12,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [0, 1) */
 {
-    seed = seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(seed >> 11) * 0x1p-53;
+    return check_random01(&seed);
 }
 
 typedef struct bench {
