@@ -72,11 +72,18 @@ static void big_files_are_refused_before_they_are_parsed(void)
     free(text);
 }
 
+typedef struct refusal {
+    const char *text, *sentence;
+} refusal;
+
+static void expect_refusals(size_t n, const refusal *bad)
+{
+    for (size_t k = 0; k < n; k++) expect_refusal(bad[k].text, bad[k].sentence);
+}
+
 static void every_bad_scene_has_its_sentence(void)
 {
-    static const struct {
-        const char *text, *sentence;
-    } bad[] = {
+    static const refusal bad[] = {
         {"{}", "bodies: a scene needs at least one body"},
         {"{\"bodies\": []}", "bodies: a scene needs at least one body"},
         {"{\"bodies\": {}}", "bodies: is not a list"},
@@ -121,6 +128,13 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"tools\": [{\"force_cap_N\": 0}]}", "tools[0].force_cap_N: 0 is outside"},
         {"{\"tools\": [{},{},{},{},{},{},{},{},{}]}", "tools: 9 entries, more than 8"},
         {"{\"bodies\": [{},{},{},{},{},{},{},{},{}]}", "bodies: 9 entries, more than 8"},
+    };
+    expect_refusals(sizeof bad / sizeof bad[0], bad);
+}
+
+static void every_bad_body_has_its_sentence(void)
+{
+    static const refusal bad[] = {
         {"{\"bodies\": [{}]}", "bodies[0]: needs either mesh or surface"},
         {"{\"bodies\": [{\"mesh\": \"a\", \"surface\": \"b\"}]}", "bodies[0]: needs either mesh or surface"},
         {"{\"bodies\": [{\"mesh\": \"none.palmesh\"}]}", "bodies[0].mesh: "},
@@ -163,7 +177,7 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"bodies\": [{\"name\": \"a\", \"mesh\": \"ball.palmesh\"}, {\"name\": \"a\", \"mesh\": \"ball.palmesh\"}]}",
          "bodies[1]: the name \"a\" is there twice"},
     };
-    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) expect_refusal(bad[k].text, bad[k].sentence);
+    expect_refusals(sizeof bad / sizeof bad[0], bad);
 }
 
 #define GRID(grid)                                                                                                     \
@@ -201,7 +215,7 @@ static void every_bad_grid_of_springs_has_its_sentence(void)
         {"{\"bodies\": [{\"solver\": {\"name\": \"verlet\", \"grid\": {}}}]}",
          "bodies[0].solver.grid: is not a number, text"},
     };
-    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) expect_refusal(bad[k].text, bad[k].sentence);
+    expect_refusals(sizeof bad / sizeof bad[0], bad);
 }
 
 static void absent_keys_take_the_defaults(void)
@@ -627,6 +641,7 @@ int main(void)
     RUN(what_is_not_json_is_refused_with_its_line);
     RUN(big_files_are_refused_before_they_are_parsed);
     RUN(every_bad_scene_has_its_sentence);
+    RUN(every_bad_body_has_its_sentence);
     RUN(every_bad_grid_of_springs_has_its_sentence);
     RUN(absent_keys_take_the_defaults);
     RUN(given_keys_arrive);
