@@ -7,6 +7,7 @@
 #include "server/commands/report.h"
 #include "server/commands/studied_scene.h"
 #include "server/commands/study_input.h"
+#include "server/commands/study_journal.h"
 #include "server/commands/study_page.h"
 #include "server/mesh/mesh_file.h"
 
@@ -25,13 +26,17 @@ static const char about[] =
     "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
     "three places; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
     "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
-    ".svg and a page .html. Ctrl-C ends it; the same command goes on after the last setting. When all is measured\n"
+    ".svg and a page .html, and the answers of the reference in study.reference. Ctrl-C ends it; the same command\n"
+    "goes on after the last answer of the reference, or after the last setting. When all is measured\n"
     "it draws what is gone of these anew.\n"
-    "--within and --budget name a setting, and with -o write a scene of it; when the study is there already, nothing\n"
-    "is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or \"budget\": {\"step_ms\": 4} is served "
+    "--within and --budget name a setting, --pick the one of a row of the table, and with -o they write a scene of "
+    "it;\n"
+    "when the study is there already, nothing is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or "
+    "\"budget\": {\"step_ms\": 4} is served "
     "and\n"
     "planned with the setting that the study beside it gives.\n"
     "Example: palpate study liver/scene.json --within 1mm -o liver_1mm\n"
+    "Example: palpate study liver/scene.json --pick 12 -o liver_12\n"
     "Example: palpate study deploy/problems/beam.json --case tip --out beam_study --budget 4ms -o beam_4ms\n";
 
 enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
@@ -43,10 +48,13 @@ typedef struct study_run {
     const char *methods, *folder, *scene; /* scene: -o */
     char load_case[PAL_NAME];             /* of the study that is there */
     bool again;
+    bool of_kept; /* a setting of the study that is there is asked for, whatever its loads */
+    int row;      /* of the table, from 1; 0: none was asked for                           */
     pal_study_input input;
     char stem[PAL_STUDY_PATH], path[MOST_PATH]; /* of the study's files, study.json itself */
     pal_study_file *file;                       /* as it is kept */
     pal_study *before;                          /* measured before; NULL: none */
+    pal_study_journal *journal;                 /* what is known of the reference; NULL: nothing is measured */
     int n_before, n_new;
     double begin_s, first_s; /* clock when anything began, when the first new setting did */
     char doing[160];
@@ -106,8 +114,13 @@ static bool take_words(study_run *run, const char *within, const char *budget, c
     if (budget && !read_amount(budget, span, span_factor, &run->wish.budget_ms))
         return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
                          budget);
-    if (run->scene && !within && !budget)
-        return !snprintf(out, n_byte, "-o: which setting is to be written? --within or --budget says it");
+    if (run->scene && !within && !budget && !run->row)
+        return !snprintf(out, n_byte, "-o: which setting is to be written? --within, --budget or --pick says it");
+    if (run->row && (within || budget || run->again))
+        return !snprintf(out, n_byte, "--pick: names the setting of a row, so that %s has nothing to say",
+                         run->again ? "--again"
+                         : within   ? "--within"
+                                    : "--budget");
     if (run->methods && strlen(run->methods) >= sizeof run->file->methods)
         return !snprintf(out, n_byte, "--methods: \"%.40s...\" is too long", run->methods);
     for (const char *at = run->methods; at && *at;) {
@@ -140,19 +153,20 @@ static void take_command(pal_study_file *file, int argc, char **argv)
 
 /* ---- what was measured before ---- */
 
-/* is it of the same body, loads and machine? */
-static pal_err check_same(const study_run *run, const pal_study_file *old, pal_note *note)
+/* is it of the same body, loads and machine? Which setting of it serves is asked of a study that goes with a scene
+ * whatever its loads were, and a row's setting whatever the machine */
+static pal_err check_same(const study_run *run, const pal_study_file *old, bool answers, pal_note *note)
 {
     const pal_study_file *now = run->file;
     const char *what = NULL;
     char detail[300] = "";
     if (strcmp(old->shape, now->shape) != 0 || old->index != now->index)
         what = "another body", snprintf(detail, sizeof detail, "%s of %s", old->body, old->study.name);
-    else if (strcmp(old->loads, now->loads) != 0)
+    else if (!answers && strcmp(old->loads, now->loads) != 0)
         what = "other loads", snprintf(detail, sizeof detail, "%s", old->loads);
-    else if (strcmp(old->digest, now->digest) != 0)
+    else if (!answers && strcmp(old->digest, now->digest) != 0)
         what = "other loads, samples or steps", snprintf(detail, sizeof detail, "%s", old->loads);
-    else if (strcmp(old->study.machine, now->study.machine) != 0)
+    else if (!run->row && strcmp(old->study.machine, now->study.machine) != 0)
         what = "another machine", snprintf(detail, sizeof detail, "%s", old->study.machine);
     if (!what) return PAL_ERR_OK;
     char other[sizeof now->loads + 8];
@@ -195,7 +209,7 @@ static pal_err take_kept_loads(study_run *run, pal_note *note)
 {
     pal_study_file *old = NULL;
     pal_study_question *q = &run->question;
-    bool asks = run->wish.within_m > 0 || run->wish.budget_ms > 0;
+    bool asks = run->row > 0 || run->wish.within_m > 0 || run->wish.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     double seconds = 0;
     if (asks && !given && !run->again && !access(run->path, F_OK)) {
@@ -203,7 +217,8 @@ static pal_err take_kept_loads(study_run *run, pal_note *note)
         pal_err err = pal_study_file_read(run->path, &old, &why);
         if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
         pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
-        if (run->load_case[0]) q->load_case = run->load_case;
+        if (run->load_case[0]) q->load_case = run->load_case, q->kept_case = true;
+        run->of_kept = true;
         q->seconds = seconds;
         free(old);
     }
@@ -217,11 +232,17 @@ static pal_err look_before(study_run *run, bool *whole, pal_note *note)
     pal_study_file *old = NULL;
     pal_note why = {""};
     *whole = false;
-    if (run->again || access(run->path, F_OK)) return PAL_ERR_OK;
+    bool is_there = !access(run->path, F_OK);
+    if (run->row && !is_there)
+        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
+                            run->row, run->path, run->question.word);
+    if (run->again || !is_there) return PAL_ERR_OK;
     pal_err err = pal_study_file_read(run->path, &old, &why);
     if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
-    err = check_same(run, old, note);
-    if (!err && covers(old, run->methods)) {
+    /* a row is of the table that is there, also of one that was broken off */
+    bool there = run->row || covers(old, run->methods);
+    err = check_same(run, old, there && run->of_kept, note);
+    if (!err && there) {
         *whole = true;
         run->n_before = old->study.n_point;
         *run->file = *old;
@@ -276,6 +297,19 @@ static bool keep(const pal_study *study, int n_all, void *user)
     return !run->kept && (!stop_asked || study->n_point == n_all);
 }
 
+static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n, void *user)
+{
+    const study_run *run = user;
+    return pal_study_journal_find(run->journal, key, answer, value, n);
+}
+
+/* one that cannot be kept is worked out again, should this run be ended */
+static void remember(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
+{
+    study_run *run = user;
+    pal_study_journal_add(run->journal, key, answer, value, n);
+}
+
 static bool show(const char *what, double fraction, void *user)
 {
     study_run *run = user;
@@ -307,6 +341,18 @@ static bool goes_on(void *user)
     return !stop_asked;
 }
 
+/* of the same body, loads and machine */
+static pal_err open_journal(study_run *run, pal_note *note)
+{
+    const pal_study_file *f = run->file;
+    char path[MOST_PATH + 4];
+    uint64_t of = pal_study_sum(0, f->shape, strlen(f->shape));
+    of = pal_study_sum(pal_study_sum(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
+    of = pal_study_sum(of, f->study.machine, strlen(f->study.machine));
+    snprintf(path, sizeof path, "%.*s.reference", PAL_STUDY_PATH, run->stem);
+    return pal_study_journal_open(path, of, run->again, &run->journal, note);
+}
+
 static pal_err measure(study_run *run, pal_note *note)
 {
     const char *method[PAL_STUDY_METHODS] = {NULL};
@@ -317,11 +363,18 @@ static pal_err measure(study_run *run, pal_note *note)
                            .quick = run->question.quick,
                            .samples = run->input.has_samples ? &run->input.samples : NULL,
                            .before = run->before,
+                           .recall = recall,
+                           .remember = remember,
                            .done = keep,
                            .progress = show,
                            .goes_on = goes_on,
                            .user = run};
     if (!out) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+    pal_err opened = open_journal(run, note);
+    if (opened) {
+        free(out);
+        return opened;
+    }
     snprintf(words, sizeof words, "%s", run->methods ? run->methods : "");
     for (char *w = strtok_r(words, ",", &save); w && o.n_method < PAL_STUDY_METHODS; w = strtok_r(NULL, ",", &save))
         method[o.n_method++] = w;
@@ -423,11 +476,30 @@ static pal_err write_scene(study_run *run, pal_note *note)
     return err;
 }
 
+/* the setting of a row of the table, whether on the front or not */
+static pal_err pick_row(study_run *run, pal_note *note)
+{
+    char text[PAL_SETTING_TEXT];
+    int order[PAL_STUDY_POINTS];
+    const pal_study *study = &run->file->study;
+    if (run->row > study->n_point)
+        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: the table of %.200s has rows 1 to %d", run->row,
+                            run->path, study->n_point);
+    pal_study_order(study, order);
+    const pal_study_point *p = &study->point[order[run->row - 1]];
+    if (p->err || !isfinite(p->priced.ms) || !isfinite(p->priced.error_m))
+        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
+                            pal_setting_text(&p->priced.setting, text), p->why[0] ? p->why : pal_err_text(p->err));
+    run->picked = order[run->row - 1];
+    return run->scene ? write_scene(run, note) : PAL_ERR_OK;
+}
+
 static pal_err answer(study_run *run, pal_note *note)
 {
     char text[400];
     const pal_study *study = &run->file->study;
     const char *methods = run->methods ? run->methods : "";
+    if (run->row) return pick_row(run, note);
     if (!(run->wish.within_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
     run->picked = pal_study_serving(study, methods, &run->wish);
     if (run->picked >= 0) return run->scene ? write_scene(run, note) : PAL_ERR_OK;
@@ -457,9 +529,12 @@ static void print(const study_run *run)
     /* of a study that is there already only the answer is news */
     if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
-        const pal_priced_setting *p = &study->point[run->picked].priced;
-        printf("%s: %s, %s in %.3g ms\n", pal_setting_wish_text(&run->wish, asked), pal_setting_text(&p->setting, text),
-               pal_study_off_text(run->file, p->error_m, off), p->ms);
+        const pal_study_point *point = &study->point[run->picked];
+        const pal_priced_setting *p = &point->priced;
+        pal_setting_wish_text(&run->wish, asked);
+        if (run->row) snprintf(asked, sizeof asked, "row %d", run->row);
+        printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_setting_text(&p->setting, text),
+               pal_study_off_text(run->file, p->error_m, off), p->ms, point->why[0] ? "; " : "", point->why);
     }
     int n = n_files(run, file);
     for (int k = 0; k < n; k++)
@@ -479,6 +554,7 @@ static cJSON *as_json(const study_run *run)
         const pal_priced_setting *p = &run->file->study.point[run->picked].priced;
         cJSON *picked = cJSON_AddObjectToObject(o, "picked");
         cJSON_AddNumberToObject(picked, "point", run->picked);
+        if (run->row) cJSON_AddNumberToObject(picked, "row", run->row);
         cJSON_AddStringToObject(picked, "setting", pal_setting_text(&p->setting, text));
         cJSON_AddNumberToObject(picked, "ms", p->ms);
         cJSON_AddNumberToObject(picked, "error_m", p->error_m);
@@ -507,7 +583,6 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
     PAL_TRY(take_kept_loads(run, note));
     PAL_TRY(pal_study_input_open(&run->question, &run->input, note));
-    if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
     pal_study_input_describe(&run->input, &run->question, run->file);
     snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
     pal_machine_name(run->file->study.machine);
@@ -515,6 +590,7 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
     take_command(run->file, argc, argv);
     PAL_TRY(look_before(run, &whole, note));
     if (!whole) {
+        if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
         pal_err err = measure(run, note);
         /* also what was broken off can be looked at */
         pal_note why = {""};
@@ -522,7 +598,10 @@ static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
         if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &why);
         int n = run->file->study.n_point > run->n_before ? run->file->study.n_point : run->n_before;
         if (err && stop_asked && n == 0)
-            return pal_note_set(note, PAL_ERR_STATE, "stopped before the first setting was measured");
+            return pal_note_set(note, PAL_ERR_STATE,
+                                "stopped before the first setting was measured; %d answers of the reference are kept "
+                                "in %.200s.reference; the same command goes on",
+                                run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
         if (err && stop_asked)
             return pal_note_set(note, PAL_ERR_STATE,
                                 "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
@@ -548,6 +627,7 @@ static int start(study_run *run, int argc, char **argv)
                                   : 0;
     if (!err && !run->common.json && !run->common.quiet) print(run);
     pal_study_input_close(&run->input);
+    pal_study_journal_close(run->journal);
     free(run->file);
     free(run->before);
     return code;
@@ -565,6 +645,8 @@ int command_study(int argc, char **argv)
         {"--budget", "TIME", PAL_FLAG_TEXT, &budget, 0, 0,
          "names the most accurate setting whose step takes no more: 4ms; with --within the cheapest that\n"
          "keeps both"},
+        {"--pick", "ROW", PAL_FLAG_COUNT, &run.row, 1, PAL_STUDY_POINTS,
+         "names the setting of that row of the table of a study that is there"},
         {"-o", "SCENE", PAL_FLAG_TEXT, &run.scene, 0, 0,
          "writes that setting as a scene for palpate serve, a folder or FILE.json, and the\nstudy beside it"},
         {"--methods", "WORD[,WORD...]", PAL_FLAG_TEXT, &run.methods, 0, 0,

@@ -61,7 +61,7 @@ static pal_err open_problem(const pal_study_question *q, pal_study_input *out, c
 
 static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal_note *note)
 {
-    if (q->load_case)
+    if (q->load_case && !q->kept_case)
         return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has", q->word);
     PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, note));
     const pal_scene *scene = out->scene = &out->loaded->scene;

@@ -21,6 +21,7 @@ typedef struct pal_study_question {
     const char *load_case; /* of a problem, or one of its references; NULL: the first load case    */
     const char *body;      /* by name; NULL: the first                                             */
     const char *samples;   /* CSV; NULL: none, or that of the reference which load_case names      */
+    bool kept_case;        /* load_case is that of the study which is there: a scene does not look at it */
     double seconds;        /* of the dynamic run                                                   */
     bool quick;
     const pal_surface_scene *options; /* for surfaces and cells */

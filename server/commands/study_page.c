@@ -66,8 +66,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to,
                 "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
                 "used run it without --quick.\n");
-    fprintf(to, "%1s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "ms", "p95", "live", "rest RMS", "most mm",
-            "RMS %", "most %", "way mm", "nodes", "steps", "setting");
+    fprintf(to, "%1s %3s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "row", "ms", "p95", "live", "rest RMS",
+            "most mm", "RMS %", "most %", "way mm", "nodes", "steps", "setting");
     pal_study_order(s, order);
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
@@ -75,7 +75,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
             n_bad++;
             continue;
         }
-        fprintf(to, "%1s", p->priced.front ? "*" : "");
+        fprintf(to, "%1s %3d", p->priced.front ? "*" : "", k + 1);
         print_cell(to, 8, "%.3f", p->priced.ms);
         print_cell(to, 8, "%.3f", p->ms_p95);
         fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
@@ -94,9 +94,9 @@ void pal_study_print(const pal_study_file *file, FILE *to)
             "many of them.\nLive: no more than that. Steps: sub-steps of one.\n",
             1e3 * s->step_s);
     for (int k = 0; k < s->n_point && n_bad > 0; k++) {
-        const pal_study_point *p = &s->point[k];
+        const pal_study_point *p = &s->point[order[k]];
         if (!is_measured(p))
-            fprintf(to, "not measured: %s: %s\n", pal_setting_text(&p->priced.setting, text),
+            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_setting_text(&p->priced.setting, text),
                     p->why[0] ? p->why : pal_err_text(p->err));
     }
 }
@@ -259,34 +259,56 @@ static void put_number(FILE *to, const char *form, double value)
     fputs("</td>", to);
 }
 
-/* the command that writes the scene of a point of the front: within its own time nothing is nearer */
-static void put_order(FILE *to, const pal_study_file *file, const pal_study_point *p)
+/* a word of a command, which may stand in quotes; returns what follows it and the blanks behind it */
+static const char *word_end(const char *at)
 {
-    static const char *const ends[] = {" --within", " --budget", " -o", " --again"};
-    double ms = 1.001 * p->priced.ms;
-    char asked[sizeof file->command];
-    snprintf(asked, sizeof asked, "%s", file->command);
-    for (int k = 0; k < 4; k++) {
-        char *end = strstr(asked, ends[k]);
-        if (end) *end = 0;
-    }
-    fputs("<br><code>", to);
-    put_text(to, asked);
-    fprintf(to, " --budget %.4gms -o NEW</code>", ms);
+    for (bool quoted = false; *at && (quoted || *at != ' '); at++)
+        if (*at == '\'') quoted = !quoted;
+    while (*at == ' ') at++;
+    return at;
 }
 
-static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p)
+/* the command of a study without what asks for a setting, for starting over or for another kind of output */
+static void put_study(FILE *to, const pal_study_file *file)
+{
+    static const char *const apart[] = {"--within", "--budget", "--pick", "-o", "--again", "--json", "--quiet"};
+    char text[sizeof file->command + 2];
+    for (const char *at = file->command, *next; *at; at = next) {
+        next = word_end(at);
+        bool left = false;
+        for (int k = 0; k < 7 && !left; k++) {
+            size_t n = strlen(apart[k]);
+            left = !strncmp(at, apart[k], n) && (at[n] == 0 || at[n] == ' ' || at[n] == '=');
+            /* with its value */
+            if (left && k < 4 && at[n] == ' ') next = word_end(next);
+        }
+        if (left) continue;
+        snprintf(text, sizeof text, "%.*s%s", (int)(next - at), at, *next || next[-1] == ' ' ? "" : " ");
+        put_text(to, text);
+    }
+}
+
+/* the command that writes the scene of a row */
+static void put_order(FILE *to, const pal_study_file *file, int row)
+{
+    fputs("<br><code>", to);
+    put_study(to, file);
+    fprintf(to, "--pick %d -o NEW</code>", row);
+}
+
+static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p, int row)
 {
     const pal_study *s = &file->study;
     char text[PAL_SETTING_TEXT];
     bool measured = is_measured(p);
-    fprintf(to, "<tr%s><td>%s</td><td>",
+    fprintf(to, "<tr%s><td>%s</td><td class=\"n\">",
             p->priced.front ? " class=\"front\""
             : measured      ? ""
                             : " class=\"bad\"",
             p->priced.front ? "&#9733;" : "");
+    fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
     put_text(to, pal_setting_text(&p->priced.setting, text));
-    if (p->priced.front) put_order(to, file, p);
+    if (p->priced.front) put_order(to, file, row);
     if (!measured || p->why[0]) {
         fputs("<br>", to);
         put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
@@ -319,24 +341,34 @@ static const char head[] =
     ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px}\n"
     "th,td{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd;vertical-align:top}\n"
     "th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:#fff}td{white-space:nowrap}\n"
-    "th:nth-child(n+3),td:nth-child(n+3){text-align:right}\n"
+    "th:nth-child(n+4),td:nth-child(n+4){text-align:right}button{font:inherit;min-width:2.6em;cursor:pointer}\n"
+    "#copied{position:sticky;top:0;z-index:1;background:#fff;min-height:1.45em;margin:.5em 0}\n"
     "td.n{text-align:right;font-variant-numeric:tabular-nums}\n"
     "tr.front{background:#fff6dc}tr.bad{color:#888}tr.bad td{white-space:normal}p{color:#555}\n</style>\n<title>";
 
-/* a click on a heading sorts by it, another one the other way; empty cells stay last */
+/* a click on a heading sorts by it, another one the other way; empty cells stay last; a row's button copies its
+ * command, also from a file, where some browsers keep the clipboard to what is selected */
 static const char sorting[] =
     "<script>\ndocument.querySelectorAll('th').forEach((th,c)=>th.addEventListener('click',()=>{\n"
     "const body=document.querySelector('tbody'),way=th.dataset.way==='1'?-1:1;th.dataset.way=String(way);\n"
     "const key=r=>r.cells[c].textContent.trim();\n"
     "const rows=[...body.rows].sort((a,b)=>{const s=key(a),t=key(b);if(!s||!t)return s?-1:t?1:0;\n"
     "const n=Number(s)-Number(t);return way*(Number.isNaN(n)?s.localeCompare(t):n)});\n"
-    "body.append(...rows)}));\n</script>\n";
+    "body.append(...rows)}));\n"
+    "const copied=document.querySelector('#copied');\n"
+    "document.querySelectorAll('button').forEach(b=>b.addEventListener('click',async()=>{\n"
+    "const line=copied.dataset.study+'--pick '+b.textContent+' -o NEW';let done=true;\n"
+    "copied.innerHTML='<span></span> <code></code>';copied.lastChild.textContent=line;\n"
+    "try{await navigator.clipboard.writeText(line)}catch{getSelection().selectAllChildren(copied.lastChild);\n"
+    "done=document.execCommand('copy')}\n"
+    "copied.firstChild.textContent=done?'copied:':'to be copied:'}));\n</script>\n";
 
 static void put_page(FILE *to, const pal_study_file *file, const char *svg)
 {
-    static const char *const column[] = {
-        "",       "setting",    "ms",     "ms p95", "live",      "error mm",  "rest RMS mm", "rest mm",    "rest RMS %",
-        "rest %", "way RMS mm", "way mm", "nodes",  "sub-steps", "made in s", "foreseen ms", "foreseen mm"};
+    static const char *const column[] = {"",          "row",         "setting",     "ms",      "ms p95",
+                                         "live",      "error mm",    "rest RMS mm", "rest mm", "rest RMS %",
+                                         "rest %",    "way RMS mm",  "way mm",      "nodes",   "sub-steps",
+                                         "made in s", "foreseen ms", "foreseen mm"};
     const pal_study *s = &file->study;
     char text[200];
     int order[PAL_STUDY_POINTS];
@@ -362,14 +394,16 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     fprintf(to,
             "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
             "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
-            "at rest or on the way. Point at a mark for its setting; the line under one of the front writes its "
-            "scene.</p>\n",
+            "at rest or on the way. Point at a mark for its setting. A row's button copies the command that writes its "
+            "scene; under one of the front it stands as well.</p>\n",
             1e3 * s->step_s);
-    fputs("<div class=\"wide\"><table><thead><tr>", to);
+    fputs("<p id=\"copied\" data-study=\"", to);
+    put_study(to, file);
+    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr>", to);
     for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
     fputs("</tr></thead><tbody>\n", to);
     pal_study_order(s, order);
-    for (int k = 0; k < s->n_point; k++) put_row(to, file, &s->point[order[k]]);
+    for (int k = 0; k < s->n_point; k++) put_row(to, file, &s->point[order[k]], k + 1);
     fputs("</tbody></table></div>\n", to);
     fputs(sorting, to);
     fputs("</body></html>\n", to);

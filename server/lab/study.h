@@ -30,6 +30,8 @@
 #include "server/sim/problem.h"
 #include "server/sim/setting.h"
 
+#include <stdint.h>
+
 enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_WAY = 512 };
 
 typedef struct pal_study_point {
@@ -58,6 +60,13 @@ typedef struct pal_study {
     pal_study_point point[PAL_STUDY_POINTS];
 } pal_study;
 
+/* where a body rests, or the way it goes, as part of the reference: what is kept of it beside the numbers */
+typedef struct pal_study_answer {
+    pal_err err; /* OK, or NUMERIC and FROZEN: there is none */
+    int n_node;
+    char why[PAL_SETTING_TEXT];
+} pal_study_answer;
+
 typedef struct pal_study_options {
     const char *const
         *method; /* models to sweep [n_method]; 0: all that fit; "tet_springs" is swept calibrated as well */
@@ -68,6 +77,11 @@ typedef struct pal_study_options {
     const pal_samples *samples; /* static reference of the first load; NULL: made here                      */
     /* points that were measured before (a run that was broken off): taken over, not measured again; NULL: none */
     const pal_study *before;
+    /* [load] answers of the reference, under a sum of setting, load and points: those of the same body, loads and
+     * machine that were kept are not worked out again. recall: false when there is none of that sum and of n numbers,
+     * which are then untouched; both may be NULL */
+    bool (*recall)(uint64_t key, pal_study_answer *answer, double *value, int n, void *user);
+    void (*remember)(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user);
     /* [load] after every point: the study so far, to be kept; may be NULL. False stops with STATE */
     bool (*done)(const pal_study *study, int n_all, void *user);
     bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */

@@ -124,7 +124,7 @@ static pal_err scale_load(pal_study_job *job, int index, double size_m)
     pal_scale3(total, guess, total);
     for (int round = 0; round < (job->shell ? 2 : 1); round++) {
         int n_node;
-        PAL_TRY(pal_study_static(job, &s, job->load[index], job->now, &n_node, job->note));
+        PAL_TRY(pal_study_kept_static(job, &s, job->load[index], job->now, &n_node, job->note));
         double moved = 0;
         for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
         if (!(moved > 0) || !isfinite(moved))

@@ -93,6 +93,12 @@ pal_err pal_study_moved(const pal_study_world *world, const double *x, int n, do
 pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
                          int *n_node, pal_note *note);
 
+/* study_keep.c: the same, and the way of the tip, as parts of the reference: taken from what was kept where it is there
+ */
+pal_err pal_study_kept_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
+                              int *n_node, pal_note *note);
+pal_err pal_study_kept_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], pal_note *note);
+
 /* study_loads.c: three presses and, of what is full, a pull, for a scene that has no load cases */
 pal_err pal_study_presses(pal_study_job *job);
 void pal_study_press_less(pal_study_job *job); /* half as strong */

@@ -90,7 +90,7 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     for (int k = 0; k < 2; k++) {
         int n_node;
         pal_setting s = reference_setting(job, size[k]);
-        PAL_TRY(pal_study_static(job, &s, job->load[load], u[k], &n_node, job->note));
+        PAL_TRY(pal_study_kept_static(job, &s, job->load[load], u[k], &n_node, job->note));
     }
     for (int k = 0; k < 3; k++) h[k] = job->shell ? exp2(-size[k]) : 1.0 / size[k];
     double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
@@ -149,7 +149,7 @@ static pal_err made(pal_study_job *job)
         if (!say(job, "reference at rest", (double)k / (job->n_load + 2)))
             return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
         pal_err err;
-        do err = pal_study_static(job, &s, job->load[k], job->still[k], &n_node, job->note);
+        do err = pal_study_kept_static(job, &s, job->load[k], job->still[k], &n_node, job->note);
         while (pal_study_press_again(job, k, err));
         PAL_TRY(err);
     }
@@ -186,5 +186,5 @@ pal_err pal_study_reference(pal_study_job *job)
     if (!say(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
         return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
     pal_setting s = reference_setting(job, job->reference);
-    return pal_study_way(job, &s, job->way, NULL, 0, NULL, NULL, job->note);
+    return pal_study_kept_way(job, &s, job->way, job->note);
 }

@@ -36,6 +36,10 @@ refuse 2 "within: \"nanmm\" is not a length" study "$beam" --within nanmm
 refuse 2 "budget: \"4mm\" is not a time" study "$beam" --budget 4mm
 refuse 2 "budget: \"\" is not a time" study "$beam" --budget ""
 refuse 2 "which setting is to be written" study "$beam" -o x
+refuse 2 "pick: 0 is outside" study "$beam" --pick 0
+refuse 2 "pick: \"x\"" study "$beam" --pick x
+refuse 2 "pick: names the setting of a row, so that --budget has nothing to say" study "$beam" --pick 3 --budget 1ms
+refuse 1 "pick 3: there is no o/study.json yet: run palpate study .*beam.json" study "$beam" --pick 3 --out o
 refuse 2 "methods: \"fem,femur\" has a word that is not" study "$beam" --methods fem,femur
 refuse 2 "methods: \"fem,\" has a word that is not" study "$beam" --methods fem,
 refuse 2 "units: \"ell\" is not m, cm" study "$beam" --units ell
@@ -106,7 +110,8 @@ rows=$(grep -c -E '^[* ] +[0-9]' out)
 bad_rows=$(grep -c "^not measured: " out)
 check "$rows rows and $bad_rows not measured, wanted $all" [ "$((rows + bad_rows))" -eq "$all" ]
 # by ascending milliseconds
-check "not in the order of ms" sh -c "grep -E '^[* ] +[0-9]' out | cut -c 2-10 | sort -c -n"
+check "not in the order of ms" sh -c "grep -E '^[* ] +[0-9]' out | cut -c 7-15 | sort -c -n"
+check "its rows are not counted from 1" sh -c "grep -E '^[* ] +[0-9]' out | cut -c 2-6 | sort -c -n -u"
 end
 
 refuse 1 "other loads" study "$beam" --quick --out o --seconds 0.2
@@ -161,6 +166,58 @@ end
 refuse 1 "is within 1e-06 mm: the nearest is" study "$beam" --quick --out o --within 1e-6mm -o far
 refuse 1 "in at most 1e-06 ms: the nearest is" study "$beam" --quick --out o --budget 1e-6ms
 check "a scene was written" [ ! -e far ]
+
+# ---- a row ----
+setting_of() { sed -n "$(($2 + 1))p" "$1" | cut -d , -f 1-4,7; } # setting_of CSV ROW: model, element, law, solver, size
+begin "a row of the table is written as a scene, from the study that is there, and a row of what was written again"
+for row in 2 "$all"; do
+    run study "$beam" --pick "$row" --out o -o "row_$row" --json
+    check "row $row: exit code $code" code_is 0
+    check "row $row: something was measured" [ "$(number measured out)" = 0 ]
+    check "row $row: does not say which" [ "$(number row out)" = "$row" ]
+    size=$(setting_of o/study.csv "$row" | cut -d , -f 5)
+    model=$(setting_of o/study.csv "$row" | cut -d , -f 1)
+    check "row $row: its setting is not said" has out "\"setting\":\"$(echo "$model" | tr -d '"').* $size voxels"
+    check "row $row: the scene has another model" has "row_$row/scene.json" "$model"
+    check "row $row: the study is not beside it" [ -s "row_$row/study.json" ]
+done
+run study row_2 --pick 1 -o row_1
+check "exit code $code" code_is 0
+check "the row is not said" has out "^row 1: .* mm off"
+check "what to do next is not said" has out "^palpate serve row_1"
+run plan row_1
+check "plan: exit code $code" code_is 0
+check "the page has no button a row" [ "$(count '<button>' o/study.html)" -eq "$rows" ]
+check "the page does not have the command of a row" has o/study.html "beam.json --quick --out o --pick [0-9]* -o NEW</code>"
+end
+refuse 1 "pick $((all + 1)): the table of o/study.json has rows 1 to $all" study "$beam" --pick $((all + 1)) --out o
+sed "s/\"err\":[[:space:]]*\"OK\"/\"err\": \"BUDGET\"/; s/\"front\":.*/\"front\": false,/" whole.json >o/study.json
+refuse 1 "pick .* was not measured" study "$beam" --pick 4 --out o
+cp whole.json o/study.json
+
+# ---- killed anywhere ----
+# what a study says beside its times: settings, codes, nodes, sub-steps and errors of every setting
+errors_of() { cut -d , -f 1-4,6-9,11,17,19-22 "$1" | sort; }
+begin "killed at random moments, also while its reference is made, it ends with the same table"
+errors_of o/study.csv >once.txt
+kills=0
+for try in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16; do
+    setsid "$palpate" study "$beam" --quick --out k --quiet >out 2>err </dev/null &
+    child=$!
+    # from some milliseconds to about two seconds, ever longer so that it ends
+    sleep "$(awk "BEGIN { srand($try); printf \"%.3f\", (0.01 + 0.06 * rand()) * $try }" </dev/null)"
+    if kill -KILL "$child" 2>/dev/null; then kills=$((kills + 1)); fi
+    wait "$child" 2>/dev/null
+    if [ -s k/study.json ] && has k/study.json '"whole":[[:space:]]*true'; then break; fi
+done
+run study "$beam" --quick --out k --json
+check "exit code $code" code_is 0
+check "it was killed $kills times" [ "$kills" -ge 2 ]
+check "no answers of the reference are kept" [ -s k/study.reference ]
+errors_of k/study.csv >killed.txt
+check "another table" cmp -s once.txt killed.txt
+check "another reference" [ "$(number reference_m k/study.json)" = "$(number reference_m o/study.json)" ]
+end
 
 # ---- a scene that asks ----
 ask() { # ask NUMBER: the scene with max_error_mm
