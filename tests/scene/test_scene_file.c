@@ -186,9 +186,7 @@ static void every_bad_body_has_its_sentence(void)
 
 static void every_bad_grid_of_springs_has_its_sentence(void)
 {
-    static const struct {
-        const char *text, *sentence;
-    } bad[] = {
+    static const refusal bad[] = {
         {GRID("7"), "bodies[0].model.grid: is not an object"},
         {GRID("{}"), "bodies[0].model.grid.n: number 1, 0, is not a count"},
         {GRID("{" CELL ", \"k_J\": [1]}"), "bodies[0].model.grid.k_J: unknown key; known are n, low_m"},
