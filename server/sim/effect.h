@@ -68,8 +68,9 @@ typedef struct pal_tangent {
     void (*multiply)(void *self, const pal_body *body, double k, double c, const double *p, double *out);
     /* to += k K + c C, into the pattern made with couple */
     void (*assemble)(void *self, const pal_body *body, double k, double c, pal_blocks *to);
-    /* adds to turn [n_node][9] the rotation of the material around each node, weighted by volume (the solver takes the
-     * polar part of the sum); NULL: no rotations. At the last linearise */
+    /* adds to turn [n_node][9] the rotation of the material around each node, weighted by stiffness or volume (the
+     * solver takes the polar part of the sum; where something hard meets something soft, a factor turned by the soft
+     * one's rotations stretches the hard one); NULL: no rotations. At the last linearise */
     void (*rotate)(void *self, const pal_body *body, double *turn);
     /* CONTACT, after the solve: it moved the nodes by `moved` [n_node][3], m, since the loads were given (held nodes
      * too, as they were led). Brings the forces on the tools to those of the end of the sub-step; a solver of several

@@ -251,12 +251,11 @@ void pal_hex_assemble(pal_hex_row *row, double k, pal_blocks *to)
 
 void pal_hex_rotate(const pal_hex_row *row, double *turn)
 {
-    const double volume = row->h_m * row->h_m * row->h_m;
     for (int e = 0; e < row->n_hex; e++) {
         int lane = row->strips.place[e];
         const double *at = row->turn + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
         double r[9];
-        for (int i = 0; i < 9; i++) r[i] = volume * row->share[lane] * at[i * PAL_LANES];
+        for (int i = 0; i < 9; i++) r[i] = row->mu[lane] * at[i * PAL_LANES];
         for (int c = 0; c < 8; c++) {
             double *to = turn + 9 * row->hexes->node[8 * e + c];
             for (int i = 0; i < 9; i++) to[i] += r[i];

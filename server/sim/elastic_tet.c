@@ -301,11 +301,11 @@ void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_blocks *to)
 void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
 {
     for (int e = 0; e < t->wish.n_tet; e++) {
-        double r[9], volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
+        double r[9], weight = *lane_at(t->stiff, 2, t->place[e], 0);
         pal_elastic_tets_rotation(t, e, r);
         const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
         for (int c = 0; c < t->wish.n_corner; c++)
-            for (int i = 0; i < 9; i++) turn[9 * node[c] + i] += volume * r[i];
+            for (int i = 0; i < 9; i++) turn[9 * node[c] + i] += weight * r[i];
     }
 }
 

@@ -74,7 +74,8 @@ double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d, double *f);
 void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_N_m);
 /* takes the tangent (and the rotations) at d */
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d);
-/* at the last linearise: out += k K p; to += k K; turn [n_node][9] += volume times rotation at each corner */
+/* at the last linearise: out += k K p; to += k K; turn [n_node][9] += mu times volume times rotation at each
+ * corner */
 void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double *p, double *out);
 void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_blocks *to);
 void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn);

@@ -76,14 +76,13 @@ static void materials_that_are_none_are_refused(void)
     beam_free(&b);
 }
 
-/* one half a million times as hard as the other. With the hard half at the support, as one layer on another, every
- * solve takes 30 iterations at most to 1e-6. A hard half at the free end turns as a whole, which a linear step
- * stretches: there backward Euler takes up to 55 (100 are allowed here) and static_newton more than its 50 Newton
- * iterations, which is not asked of it */
+/* one half a million times as hard as the other: at the support, as one layer on another, and at the free end, where it
+ * turns as a whole. Every solve takes 30 iterations at most to 1e-6: nodes between the halves turn with the hard one
+ * (rotations are weighted by stiffness; by volume it was 56). static_newton takes more than its 50 Newton iterations
+ * where the hard half turns, since a linear step stretches it, which is not asked of it */
 static void a_contrast_of_a_million_is_solved(void)
 {
     static const char *const solvers[] = {"implicit_euler", "static_newton"};
-    int free_end = 0;
     for (int k = 0; k < HARD_KINDS; k++)
         for (int s = 0; s < 3; s++) {
             bool hard_first = s < 2, rest = s == 1;
@@ -115,10 +114,10 @@ static void a_contrast_of_a_million_is_solved(void)
                 CHECK(report.converged);
                 CHECK_LE(report.residual, 1e-6);
             }
-            if (hard_first)
-                HARD_CASE("contrast", "fem", "hard half held: iterations to 1e-6", most, 30, "");
-            else
-                free_end = most > free_end ? most : free_end;
+            HARD_CASE("contrast", "fem",
+                      hard_first ? "hard half held: iterations to 1e-6"
+                                 : "hard half at the free end: iterations to 1e-6",
+                      most, 30, "");
             double hard = 0, soft = 0;
             for (int i = 0; i < b.body->n_node; i++) {
                 double *to = (b.body->x_rest[3 * i] < 0.03 + 1e-9) == hard_first ? &hard : &soft;
@@ -130,7 +129,6 @@ static void a_contrast_of_a_million_is_solved(void)
                    solvers[rest], hard_first ? "held" : "free", most, hard / soft);
             beam_free(&b);
         }
-    HARD_CASE_MISSED("contrast", "fem", "hard half at the free end: iterations to 1e-6", free_end, 30, 100, "");
 }
 
 /* a box in its own units of length, stress and mass: where a node is after 20 steps */
