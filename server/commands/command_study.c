@@ -24,7 +24,7 @@ static const char about[] =
     "each\n"
     "with its error against a converged reference and the milliseconds of a live step, and marks those that nothing\n"
     "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
-    "three places; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
+    "three places and pulled at one; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
     "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
     ".svg and a page .html, and the answers of the reference in study.reference. Ctrl-C ends it; the same command\n"
     "goes on after the last answer of the reference, or after the last setting. When all is measured\n"

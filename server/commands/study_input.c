@@ -132,10 +132,7 @@ void pal_study_input_describe(const pal_study_input *in, const pal_study_questio
     pal_setting now;
     pal_setting_of(scene, in->body, &now);
     sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
-    const pal_body_def *def = &scene->body[in->body];
-    bool full = def->cells || def->mesh->tets.n_node > 0;
-    char loads[80];
-    snprintf(loads, sizeof loads, full ? "three presses and a pull" : "three presses");
+    char loads[80] = "three presses and a pull";
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
     for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);
     if (in->has_samples) sum = add_numbers(sum, in->samples.x, 3 * (size_t)in->samples.n);

@@ -4,7 +4,7 @@
  * {
  *   "format": "palpate-study-1",
  *   "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "most_m": .., "size_m": .., "step_s":
- * .., "of": {"body": "liver", "index": 0, "shape": "16 hex digits", "loads": "three presses, 0.5 s",
+ * .., "of": {"body": "liver", "index": 0, "shape": "16 hex digits", "loads": "three presses and a pull, 0.5 s",
  *     "digest": "16 hex digits", "methods": "fem"},
  *   "command": "palpate study liver/scene.json",
  *   "n_all": 48, "whole": true,                    whole: every setting of these methods is there

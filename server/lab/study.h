@@ -3,27 +3,25 @@
  *
  * Loads: those of a problem's load case; or of a scene three presses on patches of its surface far from the supports,
  * each as strong as moves the body by about 2 % of its diagonal (linear estimate, then the reference's own rest, within
- * a factor of 1.5), and of a body that is full a pull at the first of these places, outward and aslant, with what the
- * first tool may (15 N where there is none), or what moves the body by 10 % of its diagonal where that is less; half of
- * that, up to four times, where the reference finds no rest. Static: the rest under every load, at up to 1,000 points
- * of the shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes about as far as
- * the whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's own damping; what
- * would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed.
- * Reference: fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own
- * error is estimated from its last changes (Richardson of an order between 1 and 2; changes that shrink less are
- * scatter of cut voxels, and the larger of them counts 1.25 times); a quick one is made finer, up to 12,000 nodes,
- * until that is 15 % of what moves most. Its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s) or a quarter (a half)
- * of the scene's step where that is shorter;
- * adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of the coarse surface; or
- * samples that the caller has. Deterministic but for the milliseconds and seconds.
- * Swept are the scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to
- * 1/60 s, and 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until
- * they have taken 50 ms together (1,200 steps at most).
- * What is on the front is tortured shortly (study_torture.c); what fails without its guard stopping it says so
- * in its `why` and is not named.
- * Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the reference
- * under all loads but the last (the pull), which judges them unseen; where there is one load only, the point's `why`
- * says that it is judged by what it was fitted to, and it is neither on the front nor picked. */
+ * a factor of 1.5), and a pull as wide as a hand at the first of these places, outward and aslant, with what the
+ * first tool may (15 N where there is none), or what moves the body by 10 % of its diagonal (a wall by 5 %) where that
+ * is less; half of that, up to four times, where the reference finds no rest. Static: the rest under every load, at up
+ * to 1,000 points of the shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes
+ * about as far as the whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's
+ * own damping; what would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed. Reference:
+ * fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own error is
+ * estimated from its last changes (Richardson of an order between 1 and 2; changes that shrink less are scatter of cut
+ * voxels, and the larger of them counts 1.25 times); a quick one is made finer, up to 12,000 nodes, until that is 15 %
+ * of what moves most. Its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s) or a quarter (a half) of the scene's step
+ * where that is shorter; adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of
+ * the coarse surface; or samples that the caller has. Deterministic but for the milliseconds and seconds. Swept are the
+ * scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to 1/60 s, and
+ * 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until they have
+ * taken 50 ms together (1,200 steps at most). What is on the front is tortured shortly (study_torture.c); what fails
+ * without its guard stopping it says so in its `why` and is not named. Calibrated springs keep a tenth of the volume
+ * stiffness that the material gives, and are fitted to the reference under all loads but the last (the pull), which
+ * judges them unseen; where there is one load only, the point's `why` says that it is judged by what it was fitted to,
+ * and it is neither on the front nor picked. */
 #ifndef PAL_LAB_STUDY_H
 #define PAL_LAB_STUDY_H
 #include "server/lab/sample_points.h"

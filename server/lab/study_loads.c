@@ -11,10 +11,16 @@ enum { PRESSES = 3, PULL = PRESSES, COARSE = 10, ROUNDS = 4 };
 static const double coarse_share = 0.6; /* of the reference's size, at least COARSE: a thin tip is stiff in fewer */
 /* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
 static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
-/* the same of the pull: as wide as a hand takes hold, no farther than this by the linear estimate, aslant by so much */
-static const double grip_share = 0.06, pull_share = 0.1, aslant = 0.7, usual_cap_N = 15;
+/* the same of the pull: as wide as a hand takes hold, no farther than this by the linear estimate, of a wall half as
+ * far, as it folds; aslant by so much */
+static const double grip_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
 /* what the reference moves by may be so many times what was wanted, or so little of it */
 static const double wide_of = 1.5;
+
+static double pull_of(const pal_study_job *job)
+{
+    return job->shell ? wall_share : pull_share;
+}
 
 static double diagonal(const pal_surface *s, double low[3])
 {
@@ -133,7 +139,7 @@ static pal_err scale_load(pal_study_job *job, int index, double size_m)
         double wanted = share[round] * size_m / moved, size_N = pal_norm3(total);
         /* a hand pulls with what the tool may, and no farther than a body can be said to bear */
         double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
-        if (index == PULL) wanted = fmin(cap_N / size_N, pull_share * size_m / moved);
+        if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * size_m / moved);
         pal_scale3(total, wanted, total);
     }
     return PAL_ERR_OK;
@@ -147,7 +153,7 @@ bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
     for (int i = 0; i < job->n_probe && !err; i++) moved = fmax(moved, pal_norm3(job->still[index] + 3 * i));
     if (none) times = 0.5;
     if (!err && moved > 0) times = press_share * job->out->size_m / moved;
-    if (!err && index == PULL) times = moved > 0 ? fmin(wide_of * pull_share * job->out->size_m / moved, 1) : 1;
+    if (!err && index == PULL) times = moved > 0 ? fmin(wide_of * pull_of(job) * job->out->size_m / moved, 1) : 1;
     if (!none && times <= wide_of && times >= (index == PULL ? 1 : 1 / wide_of)) return false;
     job->round[index]++;
     pal_scale3(total, times, total);
@@ -158,7 +164,7 @@ pal_err pal_study_presses(pal_study_job *job)
 {
     pal_study_world w;
     pal_setting s = coarse(job);
-    int place[PRESSES], n_held = 0, n_load = job->shell ? PRESSES : PULL + 1;
+    int place[PRESSES], n_held = 0;
     double low[3];
     PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
     for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->held[i] != 0;
@@ -172,10 +178,10 @@ pal_err pal_study_presses(pal_study_job *job)
     for (int k = 0; k < PRESSES && !err; k++)
         place_load(job, k, surface, job->probe + 3 * place[k], patch_share * size_m);
     /* where it moves most: at the place that is farthest from what holds it */
-    if (!err && n_load > PULL) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * size_m);
+    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * size_m);
     pal_study_close(&w);
-    job->n_load = job->n_press = job->problem->n_case = n_load;
-    for (int k = 0; k < n_load && !err; k++) err = scale_load(job, k, size_m);
+    job->n_load = job->n_press = job->problem->n_case = PULL + 1;
+    for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, size_m);
     return err;
 }
 

@@ -99,7 +99,7 @@ pal_err pal_study_kept_static(pal_study_job *job, const pal_setting *setting, co
                               int *n_node, pal_note *note);
 pal_err pal_study_kept_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], pal_note *note);
 
-/* study_loads.c: three presses and, of what is full, a pull, for a scene that has no load cases */
+/* study_loads.c: three presses and a pull, for a scene that has no load cases */
 pal_err pal_study_presses(pal_study_job *job);
 void pal_study_press_less(pal_study_job *job); /* half as strong */
 /* a press whose rest by the reference is far from what was wanted, or which has none (err), is made another strength;

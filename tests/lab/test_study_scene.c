@@ -1,5 +1,5 @@
-/* Studies of scenes, which have no load cases: presses on a full organ, a hollow one and control cells; samples that
- * are given; refusals. */
+/* Studies of scenes, which have no load cases: presses and a pull on a full organ, a hollow one and control cells;
+ * samples that are given; refusals. */
 #include "server/lab/study.h"
 
 #include "server/base/vec3.h"
@@ -118,11 +118,54 @@ static void a_full_organ_is_pressed(void)
     organ_free(&o);
 }
 
-static void a_hollow_organ_is_pressed(void)
+/* rests of the reference itself, the one with most nodes, in the order in which they were found */
+enum { MOST_RESTS = 16, MOST_VALUES = 3000 };
+typedef struct rests {
+    int n, n_node, n_value;
+    double u[MOST_RESTS][MOST_VALUES];
+} rests;
+
+static void take_rest(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
+{
+    rests *r = user;
+    (void)key;
+    if (answer->err || answer->n_node < r->n_node || n > MOST_VALUES) return;
+    if (answer->n_node > r->n_node) r->n = 0;
+    if (r->n == MOST_RESTS) return;
+    r->n_node = answer->n_node, r->n_value = n;
+    memcpy(r->u[r->n++], value, sizeof *value * (size_t)n);
+}
+
+static int most_moved(const double *u, int n_value)
+{
+    int most = 0;
+    for (int i = 0; i < n_value / 3; i++)
+        if (pal_norm3(u + 3 * i) > pal_norm3(u + 3 * most)) most = i;
+    return most;
+}
+
+/* three times in by about 2 % of its diagonal, then out by no more than 7.5 %, at the place of the first press */
+static void check_loads(const rests *r, double size_m)
+{
+    CHECK(r->n >= 4);
+    if (r->n < 4) return;
+    const double *first = r->u[0], *pull = r->u[r->n - 1];
+    for (int k = 0; k < r->n; k++) {
+        double moved = pal_norm3(r->u[k] + 3 * most_moved(r->u[k], r->n_value));
+        printf("  load %d moves it by %.2f %% of its diagonal\n", k, 100 * moved / size_m);
+        if (k == r->n - 1) CHECK(moved > 0.03 * size_m && moved < 0.075 * size_m);
+    }
+    const int at = 3 * most_moved(pull, r->n_value);
+    CHECK(pal_dot3(pull + at, first + at) < 0);
+}
+
+static void a_hollow_organ_is_pressed_and_pulled(void)
 {
     organ o;
     organ_make(&o, false);
-    pal_study_options options = {.quick = 1, .seconds = 0.1};
+    rests *found = calloc(1, sizeof *found);
+    REQUIRE(found);
+    pal_study_options options = {.quick = 1, .seconds = 0.1, .remember = take_rest, .user = found};
     pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
     if (err) CHECK_FAIL("%s", o.note.text);
     show(o.study);
@@ -133,7 +176,8 @@ static void a_hollow_organ_is_pressed(void)
     }
     /* the finest that is swept, wholly refined, is nearer than the coarse surface */
     CHECK(o.study->point[2].static_most_m < o.study->point[0].static_most_m);
-    CHECK(o.study->most_m > 0.005 * o.study->size_m && o.study->most_m < 0.2 * o.study->size_m);
+    check_loads(found, o.study->size_m);
+    free(found);
     organ_free(&o);
 }
 
@@ -217,7 +261,7 @@ int main(void)
 {
     RUN(the_step_of_the_scene_is_the_one_that_is_swept);
     RUN(a_full_organ_is_pressed);
-    RUN(a_hollow_organ_is_pressed);
+    RUN(a_hollow_organ_is_pressed_and_pulled);
     RUN(cells_are_pressed);
     RUN(what_makes_no_sense_is_refused_in_a_sentence);
     return check_report();
