@@ -93,20 +93,22 @@ bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_order *orde
 static void put_jump(const pal_hub *hub, const pal_work *work, double change, pal_wire_answer *a)
 {
     const pal_switch_report *r = &work->report;
-    double bound_m = work->now_m + work->then_m;
-    bool far = r->most_move_m > bound_m + hub->error_m;
+    double bound_m = work->now_m + work->then_m, frame_mm = 1e3 * r->frame_move_m, most_mm = 1e3 * r->most_move_m;
+    bool far = r->frame_move_m > bound_m + hub->error_m;
     size_t n = strlen(a->text), room = sizeof a->text - n;
     if (isnan(bound_m))
-        snprintf(a->text + n, room, "moved %.3g mm (no bound: no error is shown of both settings)",
-                 1e3 * r->most_move_m);
+        snprintf(a->text + n, room,
+                 "moves %.3g mm a frame, %.3g mm in all (no bound: no error is shown of both settings)", frame_mm,
+                 most_mm);
     else
-        snprintf(a->text + n, room, "moved %.3g mm, %s the bound of %.3g mm", 1e3 * r->most_move_m,
-                 far ? "beyond" : "within", 1e3 * bound_m);
+        snprintf(a->text + n, room, "moves %.3g mm a frame, %.3g mm in all, %s the bound of %.3g mm a frame", frame_mm,
+                 most_mm, far ? "beyond" : "within", 1e3 * bound_m);
     pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
     pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
     pal_hub_answer_arg(a, "energy_percent", change);
     pal_hub_answer_arg(a, "most_move_m", r->most_move_m);
     pal_hub_answer_arg(a, "body_move_m", r->body_move_m);
+    pal_hub_answer_arg(a, "frame_move_m", r->frame_move_m);
     if (isnan(bound_m)) return;
     pal_hub_answer_arg(a, "error_before_m", work->now_m);
     pal_hub_answer_arg(a, "error_after_m", work->then_m);

@@ -81,6 +81,7 @@ void pal_switch_report_of(const pal_switch *change, pal_switch_report *out)
                                .energy_after_J = r->energy_after_J,
                                .most_move_m = r->most_move_m,
                                .body_move_m = r->body_move_m,
+                               .frame_move_m = r->frame_move_m,
                                .scale = r->scale};
 }
 

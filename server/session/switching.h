@@ -2,8 +2,9 @@
  * (pal_switch_prepare, slow), and takes over between two steps with pal_session_follow and pal_switch_carry, without a
  * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
  * within 2 % of what it was as far as displacements and velocities PAL_TRANSFER_SCALE and _RATE times as long or short
- * can make it so (the report tells), the mismatch of forces let go over 10 steps (sim/transfer.h).
- * What tools hold they go on holding, lasting loads stay; friction begins anew, brushes are over. Thread: one at a
+ * can make it so (the report tells), the mismatch of forces, and of what is shown, let go over 10 steps
+ * (sim/transfer.h). What tools hold or press they go on holding and pressing, friction too, lasting loads stay; brushes
+ * are over. Thread: one at a
  * time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H
@@ -19,6 +20,7 @@ typedef struct pal_switch pal_switch;
 typedef struct pal_switch_report {
     double energy_before_J, energy_after_J; /* of the whole world: kinetic and elastic */
     double most_move_m, body_move_m;        /* of a shown vertex and of a point of the body (sim/transfer.h) */
+    double frame_move_m;                    /* of a shown vertex from one frame to the next, as it is let in */
     double scale; /* of displacements, for the sake of the energy; 1: none, PAL_TRANSFER_SCALE or
                    * 1 over it: at its bound, the energy is off by more */
 } pal_switch_report;

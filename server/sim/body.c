@@ -123,3 +123,14 @@ bool pal_body_finite(const pal_body *body)
     for (int l = 0; l < 8; l++) sum += lane[l];
     return sum == 0;
 }
+
+void pal_body_add_lag(pal_body *body)
+{
+    float part = (float)body->lag_part;
+    /* of a body that adapts the points in use are written anew each time, the others stay */
+    int n = !body->lag_m ? 0 : body->shell ? body->n_active : body->n_shown;
+    for (int k = 0; k < n; k++) {
+        size_t i = 3 * (size_t)(body->shell ? body->active[k] : k);
+        for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->lag_m[c];
+    }
+}

@@ -102,9 +102,14 @@ typedef struct pal_body {
     const pal_surface *surface; /* shown surface at rest                                       */
     const pal_skin *skin;       /* surface on nodes; NULL: shown vertices are the surface nodes */
     /* what is shown: all of these are set by the OUTPUT row's make; none: n_shown 0 */
-    double *skin_axes;                             /* current frames of skin, kept between calls  [n_frame][9]    */
-    int n_shown;                                   /* shown vertices                                              */
-    float *shown;                                  /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
+    double *skin_axes; /* current frames of skin, kept between calls  [n_frame][9]    */
+    int n_shown;       /* shown vertices                                              */
+    float *shown;      /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
+    /* while a switch is let in (ease.h): how far the surface that was shown before lies from where the OUTPUT rows put
+     * it. lag_part of it is added to what they write and to every point that tools touch, so that what is felt is what
+     * is seen; NULL: no switch is let in */
+    const float *lag_m;                            /* m, body frame [n_shown][3] */
+    double lag_part;                               /* 1 when it takes over, falls to 0 */
     const int32_t *shown_face;                     /* of solids: control face of each shown triangle, -1: an inner one
                                                     * of a cut; NULL: another body              [surface->n_tri] */
     const int32_t *shown_node;                     /* node of each shown vertex when skin is NULL [n_shown]       */
@@ -137,6 +142,8 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node);
 pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows);
 /* d = embed x and dv = embed v, after x and v were set; nothing without embed. [sim] */
 void pal_body_place(pal_body *body);
+/* after the OUTPUT rows: what is shown as it lags (lag_m); nothing without it. [sim] */
+void pal_body_add_lag(pal_body *body);
 /* sums over the body [sim] */
 double pal_body_kinetic_J(const pal_body *body);
 void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3]);

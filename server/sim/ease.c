@@ -1,4 +1,5 @@
-/* Row ease (ease.h): a load that falls from all in the first step to a tenth in the last of PAL_EASE_STEPS. */
+/* Row ease (ease.h): a load that falls from all in the first step to a tenth in the last of PAL_EASE_STEPS, and what is
+ * shown, from all in the frame before it to nothing in that of the last. */
 #include "server/sim/ease.h"
 
 #include "server/base/vec3.h"
@@ -6,8 +7,19 @@
 typedef struct ease {
     int n_done;      /* steps begun; PAL_EASE_STEPS: the last one */
     double *force_N; /* [n_node][3] */
+    float *lag_m;    /* [n_shown][3]; NULL: none */
+    pal_body *body;
     bool gone;
 } ease;
+
+/* what is shown lags less at the end of each sub-step: contact, which comes before this row in the plan, meets the
+ * surface of the frame before and follows it from there */
+static void let_show(const ease *row, double share)
+{
+    if (!row->lag_m) return;
+    row->body->lag_m = share > 0 ? row->lag_m : NULL;
+    row->body->lag_part = share > 0 ? share : 0;
+}
 
 static pal_err run(void *self, pal_step *step)
 {
@@ -20,6 +32,8 @@ static pal_err run(void *self, pal_step *step)
         size_t i = 3 * (size_t)pal_body_point(body, k);
         pal_axpy3(body->load + i, share, row->force_N + i);
     }
+    /* the frame of the change itself has all of it, that of the last step nothing */
+    let_show(row, row->gone ? 0 : share - (double)(step->sub + 1) / (PAL_EASE_STEPS * (double)step->n_sub));
     return PAL_ERR_OK;
 }
 
@@ -29,6 +43,7 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     row->n_done = PAL_EASE_STEPS + 1;
     row->gone = true;
+    let_show(row, 0);
 }
 
 /* while it is there its load falls */
@@ -43,12 +58,18 @@ const pal_effect pal_effect_ease = {
 
 /* ---- rows that come and go ---- */
 
-static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *force_N, void **self)
+static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *force_N, const float *lag_m,
+                       double lag_part, void **self)
 {
-    size_t n = 3 * (size_t)plan->body[b].n_node;
+    pal_body *body = &plan->body[b];
+    size_t n = 3 * (size_t)body->n_node, n_shown = 3 * (size_t)body->n_shown;
     ease *row = PAL_NEW(arena, ease, 1);
     if (!row || !(row->force_N = PAL_NEW(arena, double, n))) return PAL_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) row->force_N[i] = isfinite(force_N[i]) ? force_N[i] : 0;
+    if (lag_m && !(row->lag_m = PAL_NEW(arena, float, n_shown))) return PAL_ERR_MEMORY;
+    for (size_t i = 0; i < n && force_N; i++) row->force_N[i] = isfinite(force_N[i]) ? force_N[i] : 0;
+    for (size_t i = 0; i < n_shown && lag_m; i++)
+        row->lag_m[i] = isfinite(lag_m[i]) ? (float)(lag_part * (double)lag_m[i]) : 0;
+    row->body = body;
     *self = row;
     return pal_plan_insert(plan, b,
                            &(pal_row){.effect = &pal_effect_ease, .self = row, .n_byte = pal_arena_used(arena)});
@@ -56,17 +77,19 @@ static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *fo
 
 static void take_out(pal_ease_rows *rows, pal_plan *plan, int b)
 {
+    let_show(rows->self[b], 0);
     pal_plan_remove(plan, rows->self[b]);
     pal_arena_destroy(rows->arena[b]);
     rows->arena[b] = NULL;
     rows->self[b] = NULL;
 }
 
-pal_err pal_ease_rows_set(pal_ease_rows *rows, pal_plan *plan, int body, const double *force_N)
+static pal_err change(pal_ease_rows *rows, pal_plan *plan, int body, const double *force_N, const float *lag_m,
+                      double lag_part)
 {
     void *self = NULL;
     pal_arena *arena = pal_arena_create(4096, true);
-    pal_err err = arena ? put_row(plan, body, arena, force_N, &self) : PAL_ERR_MEMORY;
+    pal_err err = arena ? put_row(plan, body, arena, force_N, lag_m, lag_part, &self) : PAL_ERR_MEMORY;
     if (err) {
         pal_arena_destroy(arena);
         return err;
@@ -74,7 +97,20 @@ pal_err pal_ease_rows_set(pal_ease_rows *rows, pal_plan *plan, int body, const d
     if (rows->self[body]) take_out(rows, plan, body);
     rows->arena[body] = arena;
     rows->self[body] = self;
+    let_show(self, 1);
     return PAL_ERR_OK;
+}
+
+pal_err pal_ease_rows_set(pal_ease_rows *rows, pal_plan *plan, int body, const double *force_N)
+{
+    const pal_body *b = &plan->body[body];
+    return change(rows, plan, body, force_N, b->lag_m, b->lag_part);
+}
+
+pal_err pal_ease_rows_lag(pal_ease_rows *rows, pal_plan *plan, int body, const float *lag_m)
+{
+    const ease *was = rows->self[body];
+    return change(rows, plan, body, was && was->n_done == 0 ? was->force_N : NULL, lag_m, 1);
 }
 
 void pal_ease_rows_tidy(pal_ease_rows *rows, pal_plan *plan)

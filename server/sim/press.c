@@ -297,6 +297,31 @@ bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blo
     return pal_unit3(blob->normal, sum, 0);
 }
 
+bool pal_press_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                    const pal_blob *earlier, int n_earlier, pal_blob *blob)
+{
+    double least = INFINITY, sum[3] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < n_point; i++) {
+            double out[3];
+            pal_sub3(out, centre, x + 3 * i);
+            double distance = pal_norm3(out);
+            if (distance > radius_m + near_m || (pass == 1 && distance > least + 0.2 * radius_m)) continue;
+            if (!pal_unit3(out, out, 1e-9 * radius_m)) continue;
+            bool seen = false;
+            for (int b = 0; b < n_earlier && !seen; b++)
+                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : PAL_BLOB_COSINE);
+            if (seen) continue;
+            if (pass == 0)
+                least = fmin(least, distance);
+            else
+                pal_axpy3(sum, least + 0.2 * radius_m - distance, out);
+        }
+    if (!(least < INFINITY)) return false;
+    *blob = (pal_blob){.gap_m = fmax(0, least - radius_m)};
+    return pal_unit3(blob->normal, sum, 0);
+}
+
 bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m)
 {
     int i = find_entry(felt, blob);

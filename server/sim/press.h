@@ -71,6 +71,12 @@ typedef struct pal_felt {
  */
 bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blob *blob);
 
+/* the nearest tissue, of points x [n_point][3] within radius + near of a sphere's centre, not in the direction of an
+ * earlier blob (beside a contact: only what faces it, since the tissue around a dent goes along with the tool);
+ * directions of what is about as near are averaged. False: there is none */
+bool pal_press_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                    const pal_blob *earlier, int n_earlier, pal_blob *blob);
+
 /* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
  * more than `least_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
 bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m);

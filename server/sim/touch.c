@@ -125,6 +125,12 @@ void pal_touch_forget(pal_touch *touch)
     touch->sub_step += 2;
 }
 
+/* what is shown, and so what is touched, while a switch is let in */
+static void add_lag(const pal_body *body, int vertex, double x[3])
+{
+    for (size_t c = 0; c < 3 && body->lag_m; c++) x[c] += body->lag_part * (double)body->lag_m[3 * (size_t)vertex + c];
+}
+
 void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s)
 {
     uint32_t before = touch->sub_step++;
@@ -132,6 +138,7 @@ void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s)
         size_t at = 3 * (size_t)touch->live[i];
         pal_copy3(touch->x + at, body->d + at);
         pal_copy3(touch->v + at, body->dv + at);
+        add_lag(body, touch->live[i], touch->x + at);
     }
     if (body->shell) return;
     if (body->skin) pal_skin_frames_of(body->skin, body->d, touch->frame, touch->n_frame, body->skin_axes);
@@ -145,6 +152,7 @@ void pal_touch_update(pal_touch *touch, const pal_body *body, double dt_s)
             pal_skin_vertex(body->skin, body->d, body->skin_axes, vertex, x);
         else
             pal_copy3(x, body->d + 3 * (size_t)body->shown_node[vertex]);
+        add_lag(body, vertex, x);
         bool followed = touch->seen[vertex] == before && before > 0;
         touch->seen[vertex] = touch->sub_step;
         if (followed) {

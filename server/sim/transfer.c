@@ -181,8 +181,7 @@ static pal_err take_room(pal_transfer *t)
     bool all = (t->x = calloc(dof, sizeof(double))) && (t->v = calloc(dof, sizeof(double))) &&
                (t->place = calloc(to, sizeof(double))) && (t->rate = calloc(to, sizeof(double))) &&
                (t->pull = calloc(to, sizeof(double))) && (t->bound = calloc(to, sizeof(double))) &&
-               (t->old = calloc(from, sizeof(double))) && (t->other = calloc(from, sizeof(double))) &&
-               (t->share = calloc(from, sizeof(double)));
+               (t->old = calloc(from, sizeof(double)));
     for (int k = 0; k < 5; k++) all = (t->work[k] = calloc(dof, sizeof(double))) && all;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -232,6 +231,6 @@ void pal_transfer_free(pal_transfer *t)
     pal_point_rows_free(&t->back);
     for (int k = 0; k < 5; k++) free(t->work[k]);
     free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old);
-    free(t->other), free(t->share);
+    pal_point_rows_free(&t->spread);
     free(t);
 }

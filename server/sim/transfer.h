@@ -23,8 +23,13 @@
  * (ease.h). Momentum: a body that nothing holds keeps momentum and spin of before; what they ask for of the kinetic
  * energy they have (equal masses: the same).
  *
+ * Sight and touch. The same nodes as near as they can stand show a skin elsewhere: the way from what the new body would
+ * show to what the old one did is let go with the forces (pal_world_lag), so that nothing is seen to jump, and tools
+ * touch what is seen.
+ *
  * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
- * tool holds (pal_effect.hand). Contact begins anew where it is, brushes are over. Thread: one at a time. */
+ * tool holds (pal_effect.hand) or presses, with what friction holds (holder.h). Brushes are over. Thread: one at a
+ * time. */
 #ifndef PAL_SIM_TRANSFER_H
 #define PAL_SIM_TRANSFER_H
 #include "server/sim/world.h"
@@ -44,6 +49,9 @@ typedef struct pal_transfer_report {
      * point does
      */
     double most_move_m, body_move_m;
+    /* farthest that a shown vertex goes from one frame to the next because of the switch: what is shown begins where it
+     * was and is let go over PAL_EASE_STEPS steps (ease.h). Without memory for that: as far as the body moves */
+    double frame_move_m;
     int n_smooth; /* rounds of smoothing that it took */
     double scale; /* of the displacement, 1: as interpolated and smoothed */
 } pal_transfer_report;

@@ -232,37 +232,66 @@ static bool refines(const pal_world *w, int b)
 
 /* ---- forces ---- */
 
-/* t->share: how much of an old node's force goes to the new nodes that look to it, over their masses as they do; the
- * remainder (of nodes that no new one, or next to none, looks to) in t->other goes by place */
-static void split_forces(const pal_transfer *t, const pal_body *from, const pal_body *to, double *old)
+/* entries of t->in by old nodes: new nodes that look to old node i and by how much, who[first[i]..first[i+1]-1] */
+typedef struct lookers {
+    int32_t *first, *who;
+    double *weight;
+} lookers;
+
+static bool find_lookers(const pal_point_rows *in, int n_from, lookers *out)
 {
-    memset(t->share, 0, sizeof *t->share * (size_t)from->n_node);
-    for (int i = 0; i < to->n_node; i++)
-        for (int32_t k = t->in.start[i]; k < t->in.start[i + 1]; k++)
-            t->share[t->in.point[k]] += t->in.weight[k] * to->node_mass_kg[i];
-    for (int i = 0; i < from->n_node; i++) {
-        double least = LEAST_SHARE * from->node_mass_kg[i], sum = t->share[i];
-        double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
-        pal_scale3(t->other + 3 * i, 1 - part, old + 3 * i);
-        pal_scale3(old + 3 * i, part > 0 ? part / sum : 0, old + 3 * i);
-    }
+    int32_t n = in->start[in->n_row];
+    out->first = calloc((size_t)n_from + 2, sizeof *out->first);
+    out->who = malloc(sizeof *out->who * (size_t)(n + 1));
+    out->weight = malloc(sizeof *out->weight * (size_t)(n + 1));
+    if (!out->first || !out->who || !out->weight) return false;
+    /* first[i + 1] is where the next entry of i goes, until all are there */
+    for (int32_t k = 0; k < n; k++) out->first[in->point[k] + 2]++;
+    for (int i = 0; i < n_from; i++) out->first[i + 2] += out->first[i + 1];
+    for (int32_t j = 0; j < in->n_row; j++)
+        for (int32_t k = in->start[j]; k < in->start[j + 1]; k++) {
+            int32_t at = out->first[in->point[k] + 1]++;
+            out->who[at] = j, out->weight[at] = in->weight[k];
+        }
+    return true;
 }
 
-/* forces at old nodes -> at new ones, no net force is lost. To the new nodes around; where points carry the nodes
- * (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that look to the
- * old one by their masses, so that they do not gather in few: of equal meshes' masses that is as accelerations */
-static void carry_forces(const pal_transfer *t, const pal_body *from, const pal_body *to, double *old, double *out)
+/* old node i's force goes to the new nodes that look to it, over their masses as they do; the remainder (of nodes that
+ * no new one, or next to none, looks to) by place */
+static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const lookers *l, int i,
+                       pal_row_build *rows)
+{
+    double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
+    for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
+    double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
+    for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
+        pal_row_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
+    for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)
+        pal_row_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
+    pal_row_end(rows);
+}
+
+/* t->spread: forces at old nodes -> at new ones, no net force is lost. To the new nodes around; where points carry the
+ * nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that look to
+ * the old one by their masses, so that they do not gather in few: of equal meshes' masses that is as accelerations */
+static void find_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     bool lumped = t->shell || (!from->embed && from->n_node >= to->n_node);
-    memset(out, 0, 3 * sizeof *out * (size_t)to->n_node);
-    if (lumped) {
-        pal_point_rows_pull(&t->back, old, out);
-        return;
+    lookers l = {NULL};
+    pal_row_build rows;
+    if (lumped || t->spread.n_row > 0) return;
+    if (find_lookers(&t->in, from->n_node, &l)) {
+        pal_row_build_begin(&rows, from->n_node, to->n_node, INT32_MAX);
+        for (int i = 0; i < from->n_node && !rows.err; i++) add_spread(t, from, to, &l, i, &rows);
+        (void)pal_row_build_finish(&rows, &t->spread);
     }
-    split_forces(t, from, to, old);
-    pal_point_rows_place(&t->in, old, out);
-    for (int i = 0; i < to->n_node; i++) pal_scale3(out + 3 * i, to->node_mass_kg[i], out + 3 * i);
-    pal_point_rows_pull(&t->back, t->other, out);
+    free(l.first), free(l.who), free(l.weight);
+}
+
+/* how forces at old nodes go to new ones; without memory for a better way by place */
+static const pal_point_rows *force_rows(const pal_transfer *t)
+{
+    return t->spread.n_row > 0 ? &t->spread : &t->back;
 }
 
 /* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be */
@@ -283,7 +312,7 @@ static void find_pull(pal_transfer *t, pal_world *before, const pal_body *to)
         for (int i = 0; i < from->n_node; i++)
             if (from->held[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
     }
-    carry_forces(t, from, to, t->old, t->pull);
+    pal_point_rows_pull(force_rows(t), t->old, t->pull);
 }
 
 /* lasting loads */
@@ -481,51 +510,8 @@ static void hand_over(const pal_transfer *t, pal_world *next, const pal_world *b
         bool known = b == t->body ? t->back.n_row > 0 : next->plan.body[b].n_node == before->plan.body[b].n_node;
         if (from && known)
             row->effect->hand(row->self, &next->plan.body[b], from->self, &before->plan.body[b],
-                              b == t->body ? &t->back : NULL);
+                              b == t->body ? force_rows(t) : NULL);
     }
-}
-
-/* farthest that a shown vertex is from where it was; NaN: other vertices are shown */
-static double shown_move(const pal_body *from, const pal_body *to)
-{
-    double most = 0;
-    if (from->n_shown != to->n_shown) return NAN;
-    for (int i = 0; i < from->n_shown; i++) {
-        double move[3];
-        for (int c = 0; c < 3; c++) move[c] = (double)to->shown[3 * i + c] - (double)from->shown[3 * i + c];
-        most = fmax(most, pal_norm3(move));
-    }
-    return most;
-}
-
-/* does a point lie within the element whose nodes have these weights? Quadratic shape functions are as low as -1/8 */
-static bool is_inside(const pal_point_rows *rows, int i)
-{
-    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
-        if (rows->weight[k] < -0.13) return false;
-    return true;
-}
-
-/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
- */
-static double body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    double most = 0;
-    int n_common = from->n_node < to->n_node ? from->n_node : to->n_node;
-    for (int i = 0; i < n_common && t->shell; i++)
-        if (pal_shell_uses(from->shell, i) && pal_shell_uses(to->shell, i))
-            most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
-    for (int i = 0; i < from->n_node && !t->shell; i++) {
-        double move[3] = {0, 0, 0};
-        if (!is_inside(&t->back, i)) continue;
-        for (int32_t k = t->back.start[i]; k < t->back.start[i + 1]; k++) {
-            const size_t j = 3 * (size_t)t->back.point[k];
-            for (size_t c = 0; c < 3; c++) move[c] += t->back.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
-        }
-        for (int c = 0; c < 3; c++) move[c] -= from->d[3 * i + c] - from->node_rest[3 * i + c];
-        most = fmax(most, pal_norm3(move));
-    }
-    return most;
 }
 
 static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
@@ -554,6 +540,7 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     pal_world_follow(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_J(next);
     if (t->back.n_row > 0) {
+        find_spread(t, from, to);
         carry_loads(t, from, next);
         find_pull(t, old, to);
         out->n_smooth = smooth(t, next, elastic_before_J);
@@ -569,7 +556,6 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     if (t->back.n_row > 0) ease(t, next);
     hand_over(t, next, before);
     out->energy_after_J = world_J(next);
-    out->body_move_m = body_move(t, from, to);
-    double shown_m = t->shell ? NAN : shown_move(from, to);
-    out->most_move_m = isnan(shown_m) ? out->body_move_m : shown_m;
+    out->body_move_m = pal_transfer_body_move(t, from, to);
+    pal_transfer_show(t, next, before, out);
 }

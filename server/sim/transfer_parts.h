@@ -5,18 +5,24 @@
 
 struct pal_transfer {
     int body;
-    bool shell;           /* both adapt: rows are made when the new state is known    */
-    bool same_points;     /* both are solids of the same control cells                */
-    pal_point_rows in;    /* nodes of the new body by those of the old one            */
-    pal_point_rows back;  /* nodes of the old body by those of the new one            */
-    int n_from, n_to;     /* nodes                                                    */
-    int n_dof;            /* points of the new body                                   */
-    double *x, *v;        /* new points                                 [n_dof][3]    */
-    double *place, *rate; /* new nodes                                  [n_to][3]     */
-    double *pull;         /* what shall pull on them, N                 [n_to][3]     */
-    double *bound;        /* of stiffness; work                         [n_to]        */
-    double *work[5];      /* of least squares                           [n_dof][3]    */
-    double *old, *other;  /* work                                       [n_from][3]   */
-    double *share;        /* work                                       [n_from]      */
+    bool shell;            /* both adapt: rows are made when the new state is known    */
+    bool same_points;      /* both are solids of the same control cells                */
+    pal_point_rows in;     /* nodes of the new body by those of the old one            */
+    pal_point_rows back;   /* nodes of the old body by those of the new one            */
+    pal_point_rows spread; /* how forces on old nodes go to new ones; none: as back   */
+    int n_from, n_to;      /* nodes                                                    */
+    int n_dof;             /* points of the new body                                   */
+    double *x, *v;         /* new points                                 [n_dof][3]    */
+    double *place, *rate;  /* new nodes                                  [n_to][3]     */
+    double *pull;          /* what shall pull on them, N                 [n_to][3]     */
+    double *bound;         /* of stiffness; work                         [n_to]        */
+    double *work[5];       /* of least squares                           [n_dof][3]    */
+    double *old;           /* work                                       [n_from][3]   */
 };
+
+/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+ */
+double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);
+/* the new body is shown where the old one was, and how far it is to be let go from there; body_move_m is known */
+void pal_transfer_show(pal_transfer *t, pal_world *next, const pal_world *before, pal_transfer_report *out);
 #endif

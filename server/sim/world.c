@@ -168,6 +168,7 @@ static void show(pal_world *w, int b)
         row->n_run++;
         (void)row->effect->run(row->self, &step);
     }
+    pal_body_add_lag(step.body);
     pal_arena_reset(w->scratch);
     step.body->n_output++;
     step.body->stale = false;
@@ -392,6 +393,15 @@ pal_err pal_world_ease(pal_world *world, int body, const double *force_N)
     return pal_ease_rows_set(&world->eases, &world->plan, body, force_N);
 }
 
+pal_err pal_world_lag(pal_world *world, int body, const float *lag_m)
+{
+    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
+    world->plan.body[body].asleep = false;
+    PAL_TRY(pal_ease_rows_lag(&world->eases, &world->plan, body, lag_m));
+    show(world, body);
+    return PAL_ERR_OK;
+}
+
 void pal_world_tidy(pal_world *world)
 {
     pal_brush_rows_tidy(&world->brushes, &world->plan);
@@ -509,6 +519,7 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
              skips = output ? w->unwatched && !step.body->asleep : step.body->asleep;
         /* a body that fell asleep in this step is shown where it lies: that is how tools are seen to come near */
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
+        int n_run = 0;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
             pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];
             /* a frozen body is shown where it stopped, as long as that is somewhere; its guard may put it back */
@@ -518,9 +529,12 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
             row->n_run++;
             if (fails(w, step.body, row, row->effect->run(row->self, &step))) break;
             row->spent_ns += pal_clock_ns() - before;
+            n_run++;
         }
         pal_arena_reset(w->scratch);
-        if (output) step.body->n_output++, step.body->stale = false;
+        if (!output) continue;
+        if (n_run > 0) pal_body_add_lag(step.body);
+        step.body->n_output++, step.body->stale = false;
     }
 }
 

@@ -81,6 +81,11 @@ pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *b
  * makes up for a change between two steps. Replaces one that still acts; reset ends it. REFUSED: no such body; MEMORY.
  * Between steps; takes heap memory. [sim] */
 pal_err pal_world_ease(pal_world *world, int body, const double *force_N);
+/* The way from where a body is shown by its nodes to where it is shown now, m, body frame [n_shown][3]: added to what
+ * is shown and touched, and let go with that load over as many steps (body.lag_m), so that a change between two steps
+ * moves no shown vertex by more than a tenth of it in a frame. Shows the body at once. REFUSED: no such body; MEMORY.
+ * Between steps; takes heap memory. [sim] */
+pal_err pal_world_lag(pal_world *world, int body, const float *lag_m);
 /* rows of brushes and loads that have gone out are taken out of the plan. After every step of a world that shall be
  * repeatable to the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
 void pal_world_tidy(pal_world *world);

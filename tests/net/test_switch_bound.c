@@ -1,6 +1,6 @@
 /* What a switch promises, over the wire: a ball under its weight that a client presses goes from point to point of its
- * study and along its knobs, the energy within 2 %, no shown vertex farther than the errors that were shown of both
- * settings allow, and the answer says so. The carry is made beside the loop, not by it. */
+ * study and along its knobs, the energy within 2 %, no shown vertex farther in a frame than the errors that were shown
+ * of both settings allow, and the answer says so. The carry is made beside the loop, not by it. */
 #include "server/session/switching.h"
 #include "tests/net/order_room.h"
 #include "tests/session/small_scene.h"
@@ -91,7 +91,9 @@ static void check_jump(const mem_client *c)
     CHECK_LE(fabs(told(c, "energy_percent")), 2);
     CHECK(told(c, "energy_before_J") > 1e-4);
     CHECK(told(c, "most_move_m") > 0 && told(c, "body_move_m") > 0);
-    CHECK(strstr(text, told(c, "most_move_m") <= bound_m ? "within the bound" : "beyond the bound") != NULL);
+    /* what goes from one frame to the next: nobody sees more of a switch at once */
+    CHECK_LE(told(c, "frame_move_m"), bound_m);
+    CHECK(strstr(text, "within the bound") != NULL);
     CHECK(!strstr(text, "beyond 2 %"));
 }
 
@@ -127,7 +129,8 @@ static const pal_wire_neighbour *next_size(const pal_wire_estimate *e)
 }
 
 /* while somebody looks the bound is that of the estimate and of the neighbour on the knob. At rest under its weight a
- * point of the body goes by a part of it; its skin, which hangs on other nodes then, by about all of it */
+ * point of the body goes by a part of it; its skin, which hangs on other nodes then, by about all of it, and under a
+ * press by more, but that is let go over ten frames */
 static void a_knob_keeps_the_errors_foreseen(bool pressed)
 {
     mem_client c;
@@ -148,9 +151,9 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     CHECK(order(&c, "knob", args));
     check_jump(&c);
     if (!pressed) CHECK_LE(told(&c, "body_move_m"), told(&c, "bound_m"));
-    printf("  %s: moved %.3f mm, a point of the body %.3f mm, bound %.3f mm\n",
-           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "most_move_m"), 1e3 * told(&c, "body_move_m"),
-           1e3 * told(&c, "bound_m"));
+    printf("  %s: moves %.3f mm, %.3f mm a frame, a point of the body %.3f mm, bound %.3f mm\n",
+           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "most_move_m"), 1e3 * told(&c, "frame_move_m"),
+           1e3 * told(&c, "body_move_m"), 1e3 * told(&c, "bound_m"));
     CHECK_NEAR(told(&c, "error_before_m"), now_m, 0.2 * now_m);
     CHECK_NEAR(told(&c, "error_after_m"), then_m, 0.2 * then_m);
     mem_end(&c);
@@ -162,8 +165,8 @@ static void a_knob_at_rest_keeps_the_errors_foreseen(void)
     a_knob_keeps_the_errors_foreseen(false);
 }
 
-/* right under the ball of a tool one vertex may go farther than an estimate of the whole body says: then it is told */
-static void a_knob_under_a_press_tells_what_it_keeps(void)
+/* right under the ball of a tool one vertex hangs on other nodes by more than an estimate of the whole body says */
+static void a_knob_under_a_press_keeps_them_too(void)
 {
     a_knob_keeps_the_errors_foreseen(true);
 }
@@ -187,7 +190,7 @@ int main(void)
     make_study();
     RUN(every_pair_keeps_the_errors_shown);
     RUN(a_knob_at_rest_keeps_the_errors_foreseen);
-    RUN(a_knob_under_a_press_tells_what_it_keeps);
+    RUN(a_knob_under_a_press_keeps_them_too);
     RUN(without_errors_shown_there_is_no_bound);
     pal_prepared_free(&mesh);
     return check_report();

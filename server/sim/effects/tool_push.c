@@ -34,11 +34,7 @@
  * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
-#include "server/sim/effect.h"
-#include "server/sim/patch.h"
-#include "server/sim/press.h"
-#include "server/sim/proxy.h"
-#include "server/sim/touch.h"
+#include "server/sim/holder.h"
 
 #include <math.h>
 #include <string.h>
@@ -69,38 +65,8 @@
 #define LEAST_EASE    0.01
 enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10, FELT_A_STEP = 2, NEAR_MAX = 256 };
 
-/* what a tool needs beside with an implicit solver */
-typedef struct firm {
-    pal_press press;
-    pal_felt felt;
-    pal_patches patches_before; /* published anew when the solver asks again */
-    int n_patch_before;
-    double side_before[3], back_before_m;
-    bool published;
-    double back_m, last_m[3]; /* the proxy keeps so far back from its tool for the sake of caps; tool a sub-step ago */
-} firm;
-
-/* one tool as this body feels it */
-typedef struct holder {
-    bool active; /* the proxy is somewhere */
-    pal_proxy proxy;
-    double ease;     /* 0..1: rises after the proxy was seated */
-    double behind_s; /* for how long it has been far behind    */
-    int32_t *list;   /* contact points near in this step [most_point] */
-    int n_list;
-    double nearest_m; /* from the tool's way to the nearest point at the start of the step */
-    pal_proxy_limits limits;
-    pal_contact *contact; /* [CONTACT_MAX] */
-    int n_contact;
-    double slip[3];  /* sideways way of the tool over tissue that friction still holds, m */
-    double raw_N;    /* normal force of the last sub-step before caps */
-    bool renewed;    /* other triangles are drawn since the step before */
-    double told;     /* the bound that `wanted` gave */
-    double share;    /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
-    double total[3]; /* on the tool, this sub-step, this body */
-    pal_patches patches;
-    struct firm *firm; /* implicit solvers only */
-} holder;
+typedef pal_firm firm;
+typedef pal_holder holder;
 
 typedef struct tool_push {
     pal_touch touch;
@@ -165,6 +131,7 @@ static void reset(void *self, const pal_body *body)
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].active = false;
         push->holder[t].share = 1;
+        pal_holder_end_hold(&push->holder[t]);
         firm *f = push->holder[t].firm;
         if (f) pal_press_reset(&f->press);
         if (f) f->felt = (pal_felt){0};
@@ -269,6 +236,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     h->nearest_m = INFINITY;
     if ((!tool->present && tool->ramp <= 0) || tool->gripping) {
         h->active = false;
+        pal_holder_end_hold(h);
         pal_patches_reset(&h->patches, push->body_index * 1024);
         return;
     }
@@ -285,6 +253,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->behind_s > push->slip_s) {
         seat(push, h, body, next, tool->radius_m);
+        pal_holder_end_hold(h);
         h->ease = 0, body->rescue.n_slipped++;
     }
     if (!body->shell) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
@@ -346,13 +315,15 @@ static void find_back(const tool_push *push, holder *h, const pal_tool *tool)
 }
 
 /* proxy and contacts of one tool in this sub-step */
-static void approach(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
+static void approach(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     h->n_contact = 0;
     pal_set3(h->total, 0, 0, 0);
     if (!h->active) return;
     double here[3];
     pal_sub3(here, tool->here_m, step->body->offset_m);
+    pal_holder_hold(h, step, tool, here);
+    pal_copy3(h->total, h->hold.now_N);
     h->limits.rise_m = push->clamp_S * step->body->size_m / step->n_sub;
     h->limits.stroke_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     if (step->body->implicit) hold_back(h, here);
@@ -389,7 +360,7 @@ static void add_friction(tool_push *push, holder *h, const double sum[3], double
         pal_touch_velocity(&push->touch, h->contact[i].point, v);
         pal_axpy3(drift, -pal_norm3(h->contact[i].force) / total, v);
     }
-    pal_axpy3(h->slip, dt_s, drift);
+    if (!pal_holder_side(h, along, stiffness, h->slip)) pal_axpy3(h->slip, dt_s, drift);
     pal_axpy3(h->slip, -pal_dot3(h->slip, along), along);
     double most = push->friction * size / stiffness, slip = pal_norm3(h->slip);
     if (slip > most) pal_scale3(h->slip, most / slip, h->slip);
@@ -464,7 +435,7 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
     if (body->shell) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
-    double soft = tool->ramp * h->ease * h->share, sum[3] = {0}, stiffness = 0;
+    double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), sum[3] = {0}, stiffness = 0;
     double damping_s = step->dt_s * (body->shell ? GAMMA_HELD : GAMMA);
     if (h->n_contact == 0 || soft <= 0) {
         pal_set3(h->slip, 0, 0, 0);
@@ -491,6 +462,7 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     pal_scale3(h->total, room, h->total);
     for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
     pal_add3(tool->force_N, tool->force_N, h->total);
+    pal_add3(h->total, h->total, h->hold.now_N);
     tool->touching = true;
     follow_side(h, h->proxy.normal);
 }
@@ -512,44 +484,21 @@ static void find_stiffening(holder *h, const pal_tool *tool, const pal_body *bod
 static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
 {
     find_stiffening(h, tool, step->body);
-    double soft = tool->ramp * h->ease * h->share, move[3];
+    double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), move[3], stiffness = 0;
     pal_copy3(h->firm->side_before, h->proxy.normal);
     h->firm->back_before_m = h->firm->back_m;
     h->firm->published = false;
     if (step->sub == step->n_sub - 1) h->firm->patches_before = h->patches;
     h->n_contact = soft > 0 ? pal_press_thin(h->contact, h->n_contact) : 0;
-    for (int i = 0; i < h->n_contact; i++) h->contact[i].k_N_m *= soft;
+    for (int i = 0; i < h->n_contact; i++) {
+        h->contact[i].k_N_m *= soft;
+        if (h->contact[i].depth_m > 0) stiffness += h->contact[i].k_N_m;
+    }
+    (void)pal_holder_side(h, h->proxy.normal, stiffness, h->firm->press.next_slip_m);
     pal_scale3(move, step->dt_s, h->proxy.v);
     pal_press_begin(&h->firm->press, push->ties, &push->touch, step->body, h->contact, h->n_contact, push->friction,
                     move);
     h->n_contact = h->firm->press.n_contact;
-}
-
-/* the nearest tissue not in the direction of an earlier blob (beside a contact: only what faces it, since the tissue
- * around a dent goes along with the tool); directions of what is about as near are averaged */
-static bool near_blob(const holder *h, const double *x, double near, const pal_blob *earlier, int n_earlier,
-                      pal_blob *blob)
-{
-    double radius = h->limits.radius_m, least = INFINITY, sum[3] = {0};
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < h->n_list; i++) {
-            double out[3];
-            pal_sub3(out, h->proxy.x, x + 3 * i);
-            double distance = pal_norm3(out);
-            if (distance > radius + near || (pass == 1 && distance > least + 0.2 * radius)) continue;
-            if (!pal_unit3(out, out, 1e-9 * radius)) continue;
-            bool seen = false;
-            for (int b = 0; b < n_earlier && !seen; b++)
-                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : PAL_BLOB_COSINE);
-            if (seen) continue;
-            if (pass == 0)
-                least = fmin(least, distance);
-            else
-                pal_axpy3(sum, least + 0.2 * radius - distance, out);
-        }
-    if (!(least < INFINITY)) return false;
-    *blob = (pal_blob){.gap_m = fmax(0, least - radius)};
-    return pal_unit3(blob->normal, sum, 0);
 }
 
 /* k1 of a blob from the solver's compliance: as it is known, found again when it has changed and the step's budget
@@ -598,9 +547,17 @@ static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, h->n_contact);
     if (x && grouped) {
         while (n < PAL_PATCH_MAX && pal_press_blob(h->contact, h->n_contact, grouped, &blob[n])) n++;
+        /* while the force of before is let go it is all of one patch */
+        if (h->hold.share > 0 && pal_unit3(blob[0].normal, h->total, 0)) {
+            blob[0].force_N = pal_norm3(h->total), blob[0].gap_m = 0;
+            n = 1;
+        }
         for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
-        while (n < PAL_PATCH_MAX && near_blob(h, x, near_m(push, tool->radius_m), blob, n, &blob[n])) n++;
-        for (int b = 0; b < n && step->body->compliance; b++) feel(push, h, tool, step, x, &blob[b]);
+        double near = near_m(push, tool->radius_m);
+        while (n < PAL_PATCH_MAX && pal_press_near(h->proxy.x, tool->radius_m, near, x, h->n_list, blob, n, &blob[n]))
+            n++;
+        for (int b = 0; b < n && step->body->compliance && h->hold.share == 0; b++)
+            feel(push, h, tool, step, x, &blob[b]);
     }
     pal_arena_return(step->scratch, used);
     double radius = tool->radius_m;
@@ -662,7 +619,7 @@ static bool settle(void *self, pal_step *step, const double *moved)
         pal_tool *tool = &tools->tool[t];
         if (!h->active) continue;
         again |= pal_press_settle(&h->firm->press, push->ties, step->body, tool, h->contact, push->friction);
-        pal_copy3(h->total, h->firm->press.total_N);
+        pal_add3(h->total, h->firm->press.total_N, h->hold.now_N);
         follow_side(h, h->firm->side_before);
         find_back(push, h, tool);
     }
@@ -682,6 +639,22 @@ static bool settle(void *self, pal_step *step, const double *moved)
     return again;
 }
 
+static void hand(void *self, const pal_body *body, const void *before, const pal_body *from,
+                 const pal_point_rows *place)
+{
+    tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its touch gathers forces, which is work room */
+    for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
+        double k_N_m = push->young_Pa * old->holder[t].limits.radius_m / (1 - push->poisson * push->poisson);
+        pal_holder_hand(&push->holder[t], body, &old->holder[t], from, &old->touch, place, k_N_m);
+    }
+}
+
+static void destroy(void *self)
+{
+    tool_push *push = self;
+    for (int t = 0; t < push->n_tool; t++) pal_holder_free(&push->holder[t]);
+}
+
 static double how_far_m(const void *self, const pal_tool *tool)
 {
     return tool->radius_m + near_m(self, tool->radius_m);
@@ -695,6 +668,8 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
+                                         .hand = hand,
+                                         .destroy = destroy,
                                          .wanted = wanted,
                                          .reach_m = how_far_m,
                                          .tangent = &tangent};

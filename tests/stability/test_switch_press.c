@@ -1,0 +1,100 @@
+/* A live switch (sim/transfer.h) while a tool presses: what is seen does not jump, and what is felt goes from the force
+ * of before to that of after without a swing. Every pair of settings. --table prints what every pair does. */
+#include "tests/stability/hard_case.h"
+#include "tests/stability/switch_press.h"
+
+static double farthest(const float *a, const float *b, int n)
+{
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double far = 0;
+        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
+        most = fmax(most, sqrt(far));
+    }
+    return most;
+}
+
+typedef struct seen {
+    double frame_m, least_N, most_N, is_N;
+} seen;
+
+/* steps after the switch: the farthest that a vertex goes in a frame, the forces felt, the last of them at rest again
+ */
+static void watch(pal_world *next, double step_s, double from_m, seen *out)
+{
+    const pal_body *to = pal_world_body(next, 0);
+    const pal_tool *tool = &pal_world_tools(next)->tool[0];
+    const size_t n_byte = 3 * sizeof(float) * (size_t)to->n_shown;
+    float *last = malloc(n_byte);
+    if (!last) abort();
+    *out = (seen){.frame_m = from_m, .least_N = INFINITY};
+    for (int k = 0; k < AFTER; k++) {
+        memcpy(last, to->shown, n_byte);
+        step(next, step_s, 1);
+        out->frame_m = fmax(out->frame_m, farthest(last, to->shown, to->n_shown));
+        double now_N = pal_norm3(tool->mean_force_N);
+        out->least_N = fmin(out->least_N, now_N), out->most_N = fmax(out->most_N, now_N);
+        if (table) printf(k < 16 ? " %.2f" : "", now_N);
+    }
+    step(next, step_s, LATER);
+    out->is_N = pal_norm3(tool->mean_force_N);
+    free(last);
+}
+
+/* bound_m: the errors of both, as both stand beside the right one */
+static void check_pair(int i, int j, pal_world *before, double bound_m)
+{
+    pal_transfer_report r;
+    pal_world *next = open_world(&set[j]->scene);
+    const pal_body *from = pal_world_body(before, 0), *to = pal_world_body(next, 0);
+    const double was_N = pal_norm3(pal_world_tools(before)->tool[0].mean_force_N);
+    pal_transfer *x = carry(i, j, before, next, &r);
+    seen s;
+    /* the frame of the switch shows what was shown */
+    double first_m = farthest(from->shown, to->shown, to->n_shown);
+    CHECK_LE(first_m, 1e-7);
+    CHECK(to->lag_m != NULL && r.frame_move_m > 0);
+    CHECK_NEAR(r.frame_move_m, r.most_move_m / 10, 1e-12);
+    if (table) printf("  %d -> %d: N", i, j);
+    watch(next, set[j]->scene.step_s, first_m, &s);
+    if (table)
+        printf("; lag %.3f mm, of a frame at most %.3f, bound %.3f; force %.3f, then %.3f to %.3f, %.3f\n",
+               1e3 * r.most_move_m, 1e3 * s.frame_m, 1e3 * bound_m, was_N, s.least_N, s.most_N, s.is_N);
+    HARD_CASE("switch", list[j].model,
+              "under a press: farthest move of the surface in a frame, over the errors of both", s.frame_m / bound_m, 1,
+              "");
+    HARD_CASE("switch", list[j].model, "under a press: force beyond those at rest before and after",
+              100 * fmax(s.most_N / fmax(was_N, s.is_N) - 1, 1 - s.least_N / fmin(was_N, s.is_N)), 20, "%");
+    CHECK(to->lag_m == NULL && pal_body_finite(to) && !to->frozen);
+    pal_world_destroy(next);
+    pal_transfer_free(x);
+}
+
+/* finite: what is seen is one surface, and it comes to rest where the new method has it rest */
+static void every_pair_under_a_press(void)
+{
+    pal_world *w[N + 1];
+    make(0);
+    for (int i = 0; i <= N; i++) {
+        w[i] = open_world(&set[i]->scene);
+        press(w[i], 0);
+    }
+    const pal_body *best = pal_world_body(w[N], 0);
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            const pal_body *a = pal_world_body(w[i], 0), *b = pal_world_body(w[j], 0);
+            if (i == j) continue;
+            REQUIRE(a->n_shown == best->n_shown && b->n_shown == best->n_shown);
+            check_pair(i, j, w[i],
+                       farthest(a->shown, best->shown, best->n_shown) + farthest(b->shown, best->shown, best->n_shown));
+        }
+    for (int i = 0; i <= N; i++) pal_world_destroy(w[i]);
+    unmake();
+}
+
+int main(int argc, char **argv)
+{
+    table = argc > 1 && !strcmp(argv[1], "--table");
+    RUN(every_pair_under_a_press);
+    return check_report();
+}
