@@ -124,11 +124,13 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     /* a body at rest has no energy but rounding */
     bool any = r->energy_before_J > 1e-15;
     double change = any ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
-    double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns);
+    int n_rehearsed;
+    double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns),
+           stood_ms = 1e3 * pal_session_stood_s(c->room->session, &n_rehearsed);
     pal_setting_of(pal_session_scene(c->room->session), work->body, &now);
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
-    snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms; energy %+.2f %%%s, ", verb,
-             pal_setting_text(&now, text), made_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
+    snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms, stood still for %.0f ms; energy %+.2f %%%s, ", verb,
+             pal_setting_text(&now, text), made_ms, stood_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
     put_jump(hub, work, change, a);
     if (hub->works->n_brush_over > 0) {
         size_t n = strlen(a->text);
@@ -136,6 +138,7 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     }
     pal_hub_answer_arg(a, "brushes_over", hub->works->n_brush_over);
     pal_hub_answer_arg(a, "made_ms", made_ms);
+    pal_hub_answer_arg(a, "stood_ms", stood_ms);
     pal_hub_say(hub, c, hub->control);
 }
 

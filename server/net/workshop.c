@@ -34,6 +34,7 @@ static void make(pal_work *w)
     }
     if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->note, &w->stream);
     if (!w->err && w->change) {
+        pal_session_rehearse(w->next, w->session, pal_switch_look, pal_switch_rehearse, w->change);
         pal_session_carry_over(w->next, w->session, pal_switch_carry, w->change);
         pal_switch_report_of(w->change, &w->report);
     } else if (!w->err) {

@@ -1,7 +1,7 @@
 /* One thread beside the loop that makes what a command of sculpting, or one for another setting, leads to: scene, world
- * and stream, slow and with memory, while the session runs on; that stops the session then and carries its state over,
- * while other sessions and the loop go on; and that frees what has been replaced. One piece of work at a time: the next
- * one is given when the last has been taken. Thread: [net] unless said otherwise. */
+ * and stream, slow and with memory, while the session runs on, and rehearses the carry; that stops the session then and
+ * carries its state over, while other sessions and the loop go on; and that frees what has been replaced. One piece of
+ * work at a time: the next one is given when the last has been taken. Thread: [net] unless said otherwise. */
 #ifndef PAL_NET_WORKSHOP_H
 #define PAL_NET_WORKSHOP_H
 #include "server/net/stream.h"

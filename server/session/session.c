@@ -4,91 +4,20 @@
  * frozen, never in an ordinary step.
  *
  * Slowdown is real over simulated time since a mark that is between 1 and 1 + 1/16 s old. */
-#include "server/session/session.h"
+#include "server/session/session_parts.h"
 
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/base/ring.h"
-#include "server/base/trio.h"
-#include "server/session/input_log.h"
-#include "server/session/rows_off.h"
-#include "server/session/watch.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_COMMAND = 64, N_MARK = 16, SECOND_NS = 1000000000 };
 static const double reach_sizes = 100;    /* a pose may be this many body sizes from the origin */
 static const double late_part = 0.1;      /* a step is late when it begins this part of a step after its time */
 static const double young_most_Pa = 1e12; /* beyond any solid */
-
-typedef struct pose_slot {
-    pal_pose pose;
-    uint64_t arrived_ns;
-    bool present;
-} pose_slot;
-
-typedef struct tool_place {
-    pal_trio trio;
-    pose_slot slot[3];
-    /* the rest is the simulation thread's */
-    pal_pose pose;
-    uint64_t arrived_ns;
-    bool present, brushes; /* brushes: a brush began since it was let go */
-} tool_place;
-
-/* a moment and the steps taken until then */
-typedef struct mark {
-    uint64_t ns, step;
-} mark;
-
-struct pal_session {
-    const pal_scene *scene;
-    pal_session_options options; /* record_path is ours */
-    pal_world *world;
-    double reach_m;
-    uint64_t step_ns, lease_ns;
-    pal_row_info *row;
-    int n_row;
-    pal_rows_off off; /* since sessions before this one */
-    pal_shown part[PAL_BODY_MAX];
-    bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
-    int n_part;
-    pthread_t thread;
-    bool running; /* there is a thread: of who opens, follows and closes */
-
-    /* crossing points */
-    tool_place tool[PAL_TOOL_MAX];
-    pal_ring *command;
-    pal_frame *frame[3];
-    pal_trio frames;
-    _Atomic bool stop;
-    _Atomic bool replaced; /* another one is about to go on where it stands */
-    _Atomic uint64_t beat_ns, n_refused;
-    _Atomic int n_watch; /* who looks at frames; only_watched alone asks */
-    pthread_mutex_t note_lock;
-    pal_note note;
-    pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
-    pal_watch watch;                     /* who looks at estimates */
-
-    /* the simulation thread's own */
-    pal_input_log *log;
-    bool paused, watched;
-    int single;          /* steps asked for while paused        */
-    uint64_t step;       /* taken since open: resets do not count */
-    uint64_t n_late;     /* began late                          */
-    uint64_t work_ns;    /* processor time of the last step     */
-    uint64_t carried_ns; /* of one that follows: when the other one stopped */
-    uint64_t end_ns;
-    uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* who looks at a field */
-    mark marks[N_MARK + 2];                         /* a ring, oldest at first              */
-    int first, n_marks;
-};
 
 /* ---- what the thread does ---- */
 
@@ -424,7 +353,7 @@ static pal_err prepare(pal_session *s, pal_note *note)
     return PAL_ERR_OK;
 }
 
-static pal_err start(pal_session *s, pal_note *note)
+pal_err pal_session_start(pal_session *s, pal_note *note)
 {
     /* signals belong to the thread that waits for them */
     sigset_t all, old;
@@ -435,7 +364,7 @@ static pal_err start(pal_session *s, pal_note *note)
     return s->running ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
 }
 
-static void stop(pal_session *s)
+void pal_session_stop(pal_session *s)
 {
     atomic_store_explicit(&s->stop, true, memory_order_release);
     if (s->running) pthread_join(s->thread, NULL);
@@ -470,7 +399,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->watched = true;
     atomic_init(&s->beat_ns, pal_clock_ns());
     pal_err err = prepare(s, note);
-    if (!err && !s->options.hold) err = start(s, note);
+    if (!err && !s->options.hold) err = pal_session_start(s, note);
     if (err) {
         if (s->log) pal_input_log_close(s->log, 0, 0);
         release(s);
@@ -491,7 +420,7 @@ pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene
 void pal_session_close(pal_session *s)
 {
     if (!s) return;
-    stop(s);
+    pal_session_stop(s);
     if (s->log) {
         uint64_t n_dropped = pal_input_log_dropped(s->log);
         if (pal_input_log_close(s->log, s->step, pal_world_hash(s->world)))
@@ -501,86 +430,6 @@ void pal_session_close(pal_session *s)
                     s->options.record_path, (unsigned long long)n_dropped);
     }
     release(s);
-}
-
-static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t most_ns)
-{
-    return ns + by_ns < most_ns ? ns + by_ns : most_ns;
-}
-
-/* Tools as they are held, and poses that had not been taken yet. Nobody could take one while neither thread ran, for
- * away_ns: that time counts for no lease */
-static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
-{
-    uint64_t away_ns = now_ns - to->carried_ns;
-    for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
-        tool_place *a = &to->tool[t], *b = &from->tool[t];
-        const pose_slot *slot = pal_trio_take(&b->trio);
-        if (slot) {
-            pose_slot *kept = pal_trio_slot(&a->trio);
-            *kept = *slot;
-            kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
-            pal_trio_publish(&a->trio);
-        }
-        b->arrived_ns = later(b->arrived_ns, away_ns, now_ns);
-        a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
-    }
-}
-
-/* what the thread of `from` knew and that of `to` goes on with, before the carry */
-static void hand_over(pal_session *to, pal_session *from)
-{
-    to->paused = from->paused, to->single = from->single;
-    to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
-    pal_rows_off_hand(&to->off, &from->off, from->row, from->n_row, from->world, to->world, to->scene);
-    memcpy(to->n_look, from->n_look, sizeof to->n_look);
-    memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
-    for (int b = 0; b < to->scene->n_body; b++)
-        for (int k = 0; k < PAL_FIELD_COUNT; k++)
-            if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
-}
-
-/* what others may have changed meanwhile, and orders that nobody has taken yet */
-static void hand_orders(pal_session *to, pal_session *from)
-{
-    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
-                          memory_order_relaxed);
-    atomic_store_explicit(&to->n_watch, atomic_load_explicit(&from->n_watch, memory_order_relaxed),
-                          memory_order_relaxed);
-    pal_watch_hand_over(&to->watch, &from->watch);
-    pal_command command;
-    for (int k = 0; k < N_COMMAND && pal_ring_get(from->command, &command); k++)
-        (void)pal_ring_put(to->command, &command);
-}
-
-void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_carry *carry, void *user)
-{
-    next->carried_ns = pal_clock_ns();
-    atomic_store_explicit(&before->replaced, true, memory_order_relaxed);
-    stop(before);
-    hand_over(next, before);
-    carry(user, next->world, before->world);
-}
-
-pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note)
-{
-    hand_orders(next, before);
-    hand_tools(next, before, pal_clock_ns());
-    pal_err err = start(next, note);
-    if (!err && before->log)
-        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
-                before->options.record_path, (unsigned long long)before->step);
-    if (!err) return PAL_ERR_OK;
-    atomic_store_explicit(&before->stop, false, memory_order_release);
-    atomic_store_explicit(&before->replaced, false, memory_order_relaxed);
-    (void)start(before, NULL);
-    return err;
-}
-
-pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
-{
-    pal_session_carry_over(next, before, carry, user);
-    return pal_session_go_on(next, before, note);
 }
 
 /* ---- any thread ---- */

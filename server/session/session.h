@@ -76,6 +76,17 @@ void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_
 pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note);
 pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user,
                            pal_note *note);
+/* Before the carry, so that it is short: the thread of before stops between two steps for `look`, which takes from its
+ * world what it needs, and goes on while `rehearse` brings the world of next as near as it can. Over again, at most
+ * PAL_SESSION_REHEARSALS times, as long as look says that it is worth it (the first says whether there is anything to
+ * rehearse). [any] but go_on's, while others use before as they do, and nobody uses next */
+enum { PAL_SESSION_REHEARSALS = 3 };
+typedef bool pal_session_look(void *user, const pal_world *before);
+typedef void pal_session_rehearsal(void *user, pal_world *next);
+void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_look *look,
+                          pal_session_rehearsal *rehearse, void *user);
+/* of one that has gone on: the longest time that its forerunner stood still for it, s, and rehearsals */
+double pal_session_stood_s(const pal_session *session, int *n_rehearsed);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
 
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */

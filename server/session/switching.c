@@ -4,6 +4,8 @@
 #include <stdlib.h>
 
 struct pal_switch {
+    int body;
+    bool rehearsed;
     pal_scene from; /* what the new scene is made of */
     pal_set_scene *set;
     pal_transfer *transfer;
@@ -25,6 +27,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
     pal_setting now, next;
     if (body < 0 || body >= scene->n_body)
         return pal_note_set(note, PAL_ERR_REFUSED, "there is no body %d to be switched", body);
+    s->body = body;
     s->from = *scene;
     if (base) {
         s->from.body[body] = *base;
@@ -58,6 +61,21 @@ pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int
 const pal_scene *pal_switch_scene(const pal_switch *change)
 {
     return &change->set->scene;
+}
+
+bool pal_switch_look(void *change, const pal_world *before)
+{
+    pal_switch *s = change;
+    const double near_m = PAL_SWITCH_GONE * pal_world_look(before, s->body)->size_m;
+    if (s->rehearsed && pal_transfer_gone_m(s->transfer, before) <= near_m) return false;
+    return pal_transfer_look(s->transfer, before);
+}
+
+void pal_switch_rehearse(void *change, pal_world *next)
+{
+    pal_switch *s = change;
+    pal_transfer_rehearse(s->transfer, next);
+    s->rehearsed = true;
 }
 
 static _Thread_local uint64_t n_carried;

@@ -36,6 +36,11 @@ pal_err pal_switch_check(const pal_scene *scene, int body, const pal_setting *to
 pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
                            pal_note *note, pal_switch **out);
 const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */
+/* pal_session_look and pal_session_rehearsal with user a pal_switch: worth it again while the body has gone on by more
+ * than PAL_SWITCH_GONE of its size since it was looked at */
+#define PAL_SWITCH_GONE 0.005
+bool pal_switch_look(void *change, const pal_world *before);
+void pal_switch_rehearse(void *change, pal_world *next);
 /* pal_session_carry with user a pal_switch */
 void pal_switch_carry(void *change, pal_world *next, const pal_world *before);
 uint64_t pal_switch_carried_here(void); /* carries that the calling thread has made, for tests [any] */

@@ -231,6 +231,7 @@ void pal_transfer_free(pal_transfer *t)
     pal_point_rows_free(&t->back);
     for (int k = 0; k < 5; k++) free(t->work[k]);
     free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old);
+    free(t->fix), free(t->seen_room);
     pal_point_rows_free(&t->spread);
     free(t);
 }

@@ -65,4 +65,16 @@ void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
  * worked out anew, its state is as it was. Deterministic. Heap memory for row `ease`; where there is none, the forces
  * change at once. [sim] */
 void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
+
+/* Most of a carry's time goes into smoothing what was interpolated. That part can be rehearsed while the old world goes
+ * on: look takes copies of the old body and of what pulls on it (one evaluation of its forces, hash and state as they
+ * were; heap memory the first time), rehearse smooths the new body and keeps what had to be added to interpolated
+ * places, and the carry, and each later rehearsal, begins with it. A body that has gone on far since costs the carry
+ * more rounds, never another result than within its bounds. look: false: there is nothing to rehearse (a body that
+ * adapts, that is frozen), or no memory. [sim of before] rehearse: after look; the old world may go on meanwhile. [any]
+ */
+bool pal_transfer_look(pal_transfer *transfer, const pal_world *before);
+void pal_transfer_rehearse(pal_transfer *transfer, pal_world *next);
+/* farthest that a node of the old body has gone since it was looked at, m; between two of its steps. [sim of before] */
+double pal_transfer_gone_m(const pal_transfer *transfer, const pal_world *before);
 #endif

@@ -10,9 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* rounds of smoothing, near enough in energy, most that a displacement or velocity is lengthened or shortened, pull to
- * rest of the least squares in parts of their largest weight */
-enum { N_SMOOTH = 40, N_SMOOTH_FAR = 200, N_SCALE = 8 };
+/* rounds of smoothing (AGAIN: where a rehearsal has done most of it), near enough in energy, most that a displacement
+ * or velocity is lengthened or shortened, pull to rest of the least squares in parts of their largest weight */
+enum { N_SMOOTH = 40, N_SMOOTH_AGAIN = 10, N_SMOOTH_FAR = 200, N_SCALE = 8 };
 #define FAR        1.5 /* times the energy wanted: more rounds than usual */
 #define SAME       1e-4
 #define MOST_SCALE PAL_TRANSFER_SCALE
@@ -294,13 +294,12 @@ static const pal_point_rows *force_rows(const pal_transfer *t)
     return t->spread.n_row > 0 ? &t->spread : &t->back;
 }
 
-/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be */
-static void find_pull(pal_transfer *t, pal_world *before, const pal_body *to)
+/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
+ * before as it stands, whose g goes */
+static void find_pull(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    pal_body *from = &before->plan.body[t->body];
     size_t n = 3 * (size_t)from->n_node;
     memset(t->pull, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    if (pal_world_pull(before, t->body)) return;
     if (from->embed) {
         double *a = from->g;
         for (int i = 0; i < from->n_dof; i++)
@@ -373,7 +372,8 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     int n = 0;
     if (to->embed || to->shell || !find_bound(next, t->body, t->bound)) return 0;
     memset(way, 0, 3 * sizeof *way * (size_t)to->n_dof);
-    for (; n < (now_J > FAR * want_J ? N_SMOOTH_FAR : N_SMOOTH) && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
+    int n_most = now_J > FAR * want_J ? N_SMOOTH_FAR : t->rehearsed ? N_SMOOTH_AGAIN : N_SMOOTH;
+    for (; n < n_most && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
         for (int i = 0; i < to->n_node; i++) {
             if (to->held[i] || !(t->bound[i] > 0)) continue;
             for (int c = 3 * i; c < 3 * i + 3; c++) {
@@ -527,6 +527,31 @@ static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
     (void)make_back(t, from, to);
 }
 
+/* the new body at t->x, t->v as pal_world_follow would have it */
+static void put(const pal_transfer *t, pal_world *next)
+{
+    pal_body *to = &next->plan.body[t->body];
+    size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
+    memcpy(to->x, t->x, n_byte);
+    memcpy(to->v, t->v, n_byte);
+    for (int i = 0; i < to->n_dof; i++)
+        if (to->held[i] == 1) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
+    pal_body_place(to);
+}
+
+/* from places by interpolation, with what a rehearsal added to them, to smooth ones; from->f and g are known. Rounds */
+static int approach(pal_transfer *t, pal_world *next, const pal_body *from, double want_J)
+{
+    pal_body *to = &next->plan.body[t->body];
+    for (int i = 0; i < 3 * to->n_dof && t->rehearsed; i++) to->x[i] += t->fix[i];
+    if (t->rehearsed) pal_body_place(to);
+    if (t->back.n_row == 0) return 0;
+    find_spread(t, from, to);
+    carry_loads(t, from, next);
+    find_pull(t, from, to);
+    return smooth(t, next, want_J);
+}
+
 void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out)
 {
     pal_transfer *t = transfer;
@@ -539,12 +564,7 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     place_points(t, from, next);
     pal_world_follow(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_J(next);
-    if (t->back.n_row > 0) {
-        find_spread(t, from, to);
-        carry_loads(t, from, next);
-        find_pull(t, old, to);
-        out->n_smooth = smooth(t, next, elastic_before_J);
-    }
+    out->n_smooth = approach(t, next, from, elastic_before_J);
     out->scale = scale_displacement(t, next, elastic_before_J);
     if (is_free(to)) keep_momentum(from, to);
     /* the velocity makes up for what the displacement could not */
@@ -558,4 +578,66 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     out->energy_after_J = world_J(next);
     out->body_move_m = pal_transfer_body_move(t, from, to);
     pal_transfer_show(t, next, before, out);
+}
+
+/* ---- while the old world goes on ---- */
+
+/* room for what of a body changes while it runs: x, v, g, masses, what is held; d, dv, f, outer, masses of nodes */
+static bool make_seen(pal_transfer *t, const pal_body *from)
+{
+    size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
+    if (t->seen_room) return true;
+    t->seen_room = malloc(sizeof(double) * (3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node) +
+                          (size_t)from->n_dof);
+    return t->seen_room != NULL;
+}
+
+static double *keep(double **room, const double *from, size_t n)
+{
+    double *to = *room;
+    *room += n;
+    memcpy(to, from, n * sizeof *to);
+    return to;
+}
+
+bool pal_transfer_look(pal_transfer *t, const pal_world *before)
+{
+    pal_world *old = (pal_world *)(uintptr_t)before; /* its forces are worked out again */
+    const pal_body *from = &old->plan.body[t->body];
+    if (t->shell || from->frozen || !make_seen(t, from)) return false;
+    size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
+    double *room = t->seen_room;
+    t->seen_J = elastic_J(old, t->body);
+    t->seen = *from;
+    t->seen.x = keep(&room, from->x, dof), t->seen.v = keep(&room, from->v, dof);
+    t->seen.g = keep(&room, from->g, dof), t->seen.f = keep(&room, from->f, node);
+    t->seen.d = keep(&room, from->d, node), t->seen.dv = keep(&room, from->dv, node);
+    t->seen.mass_kg = keep(&room, from->mass_kg, (size_t)from->n_dof);
+    t->seen.node_mass_kg = keep(&room, from->node_mass_kg, (size_t)from->n_node);
+    if (from->outer) t->seen.outer = keep(&room, from->outer, node);
+    t->seen.held = (uint8_t *)(t->seen_room + 3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node);
+    memcpy(t->seen.held, from->held, (size_t)from->n_dof);
+    return isfinite(t->seen_J);
+}
+
+void pal_transfer_rehearse(pal_transfer *t, pal_world *next)
+{
+    pal_body *to = &next->plan.body[t->body];
+    size_t n = 3 * (size_t)to->n_dof;
+    if (!t->fix) t->fix = calloc(n + 1, sizeof *t->fix);
+    if (!t->fix) return;
+    place_points(t, &t->seen, next);
+    put(t, next);
+    (void)approach(t, next, &t->seen, t->seen_J);
+    for (size_t i = 0; i < n; i++) t->fix[i] = to->x[i] - t->x[i];
+    t->rehearsed = true;
+}
+
+double pal_transfer_gone_m(const pal_transfer *t, const pal_world *before)
+{
+    const pal_body *from = &before->plan.body[t->body];
+    double most = 0;
+    for (int i = 0; i < from->n_node; i++)
+        most = fmax(most, pal_dist3(from->d + 3 * (size_t)i, t->seen.d + 3 * (size_t)i));
+    return most;
 }

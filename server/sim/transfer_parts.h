@@ -18,6 +18,12 @@ struct pal_transfer {
     double *bound;         /* of stiffness; work                         [n_to]        */
     double *work[5];       /* of least squares                           [n_dof][3]    */
     double *old;           /* work                                       [n_from][3]   */
+    /* while the old world goes on */
+    bool rehearsed;
+    double *fix;       /* what smoothing added to places by interpolation, NULL: none yet [n_dof][3] */
+    pal_body seen;     /* the old body as it was looked at; what changes of it is in seen_room */
+    double *seen_room; /* NULL: it never was */
+    double seen_J;     /* its elastic energy then */
 };
 
 /* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both

@@ -189,6 +189,52 @@ static void a_tool_is_held_on_however_long_it_takes(void)
     if (starved) printf("  the machine is too slow for a lease of 0.25 s\n");
 }
 
+static _Atomic uint64_t stepped;
+
+/* the session runs on meanwhile: a rehearsal that waits for it to take ten steps comes to its end */
+static void rehearse_slowly(void *change, pal_world *next)
+{
+    uint64_t from = stepped;
+    for (int i = 0; i < 20000 && stepped < from + 10; i++) nanosleep(&(struct timespec){0, 500000}, NULL);
+    CHECK(stepped >= from + 10);
+    pal_switch_rehearse(change, next);
+}
+
+static void count_steps(void *user)
+{
+    (void)user;
+    stepped++;
+}
+
+static void a_switch_is_rehearsed_while_the_session_runs_on(void)
+{
+    const pal_setting to = {.model = "fem", .element = "hex8_bbar", .size = 8};
+    const pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
+    pal_session *s = NULL, *next = NULL;
+    pal_switch *change = NULL;
+    pal_switch_report r;
+    pal_note note = {""};
+    int n_rehearsed = 0;
+    pal_session_options options = {.lease_s = 60, .wake = count_steps};
+    REQUIRE(!pal_session_open(&scene, &options, &note, &s));
+    CHECK(!pal_session_put_pose(s, 0, &pose));
+    wait_tick(s, 20);
+    REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &to, &note, &change));
+    REQUIRE(!pal_session_open_after(s, pal_switch_scene(change), &note, &next));
+    pal_session_rehearse(next, s, pal_switch_look, rehearse_slowly, change);
+    pal_session_carry_over(next, s, pal_switch_carry, change);
+    CHECK(!pal_session_go_on(next, s, &note));
+    double stood_s = pal_session_stood_s(next, &n_rehearsed);
+    CHECK(stood_s > 0 && n_rehearsed >= 1 && n_rehearsed <= PAL_SESSION_REHEARSALS);
+    pal_switch_report_of(change, &r);
+    CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+    CHECK(wait_tick(next, 35)->tool[0].present);
+    printf("  %d rehearsals, stood still for %.1f ms\n", n_rehearsed, 1e3 * stood_s);
+    pal_session_close(s);
+    pal_session_close(next);
+    pal_switch_free(change);
+}
+
 static bool has_row(const pal_frame *f, const char *name)
 {
     for (int i = 0; i < f->n_row; i++)
@@ -310,6 +356,7 @@ int main(void)
     RUN(step_by_step_the_energy_is_kept);
     RUN(beyond_the_bound_of_displacements_the_velocity_makes_up);
     RUN(a_tool_is_held_on_however_long_it_takes);
+    RUN(a_switch_is_rehearsed_while_the_session_runs_on);
     RUN(a_row_that_is_off_stays_off_through_a_method_without_it);
     RUN(what_cannot_be_made_is_refused_with_a_sentence);
     RUN(what_is_not_taken_changes_nothing);

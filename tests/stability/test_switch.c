@@ -355,6 +355,44 @@ static void what_does_not_fit_is_refused(void)
     end(&b);
 }
 
+/* a carry that was rehearsed while the old world went on takes a few rounds where it took many, and ends as well */
+static void a_rehearsed_carry_takes_few_rounds(void)
+{
+    const int pair[3][2] = {{6, 1}, {3, 0}, {1, 4}};
+    for (int n = 0; n < 3; n++) {
+        beam b;
+        pal_transfer_report cold, warm;
+        double first[3], then[3], speed[3];
+        begin(&b, false, true, 2);
+        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1), *y = make_transfer(&b, 0, 1);
+        (void)disturb(w, 1.0 / 60);
+        uint64_t hash = pal_world_hash(w);
+        CHECK(pal_transfer_look(x, w) && pal_world_hash(w) == hash);
+        CHECK(pal_transfer_gone_m(x, w) == 0);
+        pal_transfer_rehearse(x, next);
+        step(w, 1.0 / 60, 3); /* it goes on */
+        CHECK(pal_transfer_gone_m(x, w) > 1e-5);
+        pal_transfer_carry(x, next, w, &warm);
+        tip_of(next, then, speed);
+        pal_transfer_carry(y, next, w, &cold);
+        tip_of(next, first, speed);
+        if (table)
+            printf("  rounds %d, rehearsed %d; energy %+.3f %%, %+.3f %%; tip %.4f, %.4f mm\n", cold.n_smooth,
+                   warm.n_smooth, 100 * (cold.energy_after_J / cold.energy_before_J - 1),
+                   100 * (warm.energy_after_J / warm.energy_before_J - 1), 1e3 * first[2], 1e3 * then[2]);
+        CHECK_LE(warm.n_smooth, 10);
+        if (cold.n_smooth > 10) CHECK_LE(2 * warm.n_smooth, cold.n_smooth);
+        CHECK_NEAR(warm.energy_after_J / warm.energy_before_J, 1, 0.02);
+        CHECK_LE(pal_dist3(first, then), 0.02 * pal_norm3(first));
+        CHECK(warm.body_move_m <= 2 * cold.body_move_m);
+        pal_transfer_free(x), pal_transfer_free(y);
+        pal_world_destroy(w), pal_world_destroy(next);
+        end(&b);
+    }
+}
+
 int main(int argc, char **argv)
 {
     table = argc > 1 && !strcmp(argv[1], "--table");
@@ -365,6 +403,7 @@ int main(int argc, char **argv)
     RUN(tools_hold_on);
     RUN(friction_holds_on);
     RUN(lasting_loads_stay);
+    RUN(a_rehearsed_carry_takes_few_rounds);
     RUN(surfaces_go_between_levels);
     RUN(what_does_not_fit_is_refused);
     return check_report();
