@@ -182,6 +182,7 @@ static void unload_all(pal_rig *rig)
         pal_body *body = pal_world_body(rig->world, b);
         if (body->outer) memset(body->outer, 0, 3 * sizeof(double) * (size_t)body->n_node);
     }
+    pal_world_wake(rig->world);
     pal_rig_rebase(rig);
 }
 

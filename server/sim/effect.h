@@ -140,7 +140,8 @@ typedef struct pal_effect {
     bool keeps_rows; /* SOLVE: holds pointers or patterns of the body's rows, so it is made anew when they change */
     /* time from which the row's force no longer changes with time by itself, s; INFINITY: never. NULL: it never does */
     double (*settled_s)(const void *self);
-    /* CONTACT: how far from the tool's centre the row acts or looks; NULL: it knows no tools */
+    /* CONTACT: how far from the tool's centre the row acts or looks, INFINITY while some tool holds or presses the body
+     * by it; NULL: it knows no tools */
     double (*reach_m)(const void *self, const pal_tool *tool);
     /* GUARD, of a body that it put to sleep (body->asleep): shall it wake in the step that begins? step as of that
      * step's first sub-step, tools with where they go in it */

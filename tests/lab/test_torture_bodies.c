@@ -3,6 +3,7 @@
  * more, the others go on in longer ones, near what they were. Bodies do not touch. */
 #include "server/lab/torture.h"
 #include "tests/sim/fem_beam.h"
+#include "tests/sim/shells.h"
 
 enum { STEPS = 12, AT = 4 };
 
@@ -137,10 +138,34 @@ static void tortured_together_each_is_judged(void)
     beam_free(&b);
 }
 
+/* under its capped load an adaptive ball comes to rest and falls asleep: let go, it has to be awake to come back */
+static void what_sleeps_under_a_meganewton_is_let_go(void)
+{
+    shell_scene s;
+    pal_surface ball;
+    pal_torture_options options;
+    static pal_torture_report report;
+    REQUIRE(!pal_sphere_make(0.05, &ball));
+    shell_scene_take(&s, &ball);
+    shell_scene_hold(&s, (const double[3]){-1, -1, -1}, (const double[3]){1, 1, -0.04});
+    s.scene->body[0].material.damping_1_s = 20;
+    pal_item_put_number(shell_scene_effect(&s, "sleep"), "still_s", 0.1, NULL);
+    pal_torture_default(&options);
+    options.only = "meganewton";
+    REQUIRE(!pal_torture(s.scene, &options, &report, &note));
+    const pal_torture_result *r = &report.result[0];
+    printf("  %s, %s\n", pal_verdict_name(r->verdict), r->note);
+    CHECK_INT(report.n_passed, 1);
+    CHECK_LE(r->left_S, 1e-3);
+    CHECK(strstr(r->note, "S away in RMS"));
+    shell_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(a_poisoned_body_stops_alone);
     RUN(a_body_out_of_bounds_stops_alone);
     RUN(tortured_together_each_is_judged);
+    RUN(what_sleeps_under_a_meganewton_is_let_go);
     return check_report();
 }

@@ -1,6 +1,7 @@
 /* Bodies that sleep: at rest nothing of them is run, positions stay to the bit, a tool wakes them before it touches,
  * and so does all that the world does to them; runs repeat; a scene without the row knows nothing of it. */
 #include "server/base/vec3.h"
+#include "server/sim/shell.h"
 #include "tests/heap_calls.h"
 #include "tests/sim/model_scenes.h"
 
@@ -271,6 +272,55 @@ static void does_not_sleep_while_something_goes_on(void)
     model_scene_close(&m);
 }
 
+/* Tissue follows a tool no farther than its cap pulls or presses: the tool is then far from everything that is shown.
+ * For a second nothing moves, then the hand is taken away: the body has been awake and comes back */
+static void what_a_far_tool_holds_or_presses_stays_awake(void)
+{
+    for (int k = 0; k < 2 * MODEL_KINDS; k++) {
+        model_scene m;
+        const bool grab = k < MODEL_KINDS;
+        if (k % MODEL_KINDS == SOLID && !grab) continue; /* fem presses implicitly as well */
+        sleepy(&m, k % MODEL_KINDS, 12);
+        m.scene->tool[0].force_cap_N = 0.05;
+        pal_item_put_number(&m.def->effect[1], "slip_S", 100, NULL); /* never through the body */
+        REQUIRE(model_scene_open(&m));
+        REQUIRE(steps_to_sleep(&m, 1200) > 0);
+        double *x = malloc(3 * sizeof(double) * (size_t)m.body->n_dof), held_m = 0, left_m = 0;
+        const int n_x = 3 * (m.body->shell ? m.body->shell->levels.n_vertex[0] : m.body->n_dof);
+        const float *high = m.body->shown;
+        REQUIRE(x);
+        memcpy(x, m.body->x, 3 * sizeof(double) * (size_t)m.body->n_dof);
+        for (int i = 0; i < m.body->n_shown; i++)
+            if (m.body->shown[3 * i + 2] > high[2]) high = m.body->shown + 3 * (size_t)i;
+        const bool box = m.kind == SPRINGS || m.kind == FEM;
+        const double at[3] = {box ? 0.04 : (double)high[0], box ? 0.03 : (double)high[1],
+                              (double)high[2] + (grab ? 0.002 : 0.02)};
+        int n_asleep = 0, n = (int)(1.6 / m.scene->step_s);
+        for (int i = 0; i < n; i++) {
+            /* up to 15 cm above it; or as far down, in half a second */
+            const double way = 0.15 * fmin(1, fmax(0, i * m.scene->step_s - 0.1) / 0.4);
+            const pal_pose pose = {.position_m = {at[0], at[1], at[2] + (grab ? way : -way)},
+                                   .quat = {1, 0, 0, 0},
+                                   .buttons = grab && i > 2};
+            CHECK_INT(pal_world_pose(m.world, 0, &pose), 0);
+            REQUIRE(!pal_world_step(m.world, m.scene->step_s));
+            const pal_tool *tool = &pal_world_tools(m.world)->tool[0];
+            n_asleep += i > 12 && m.body->asleep && (tool->holding || tool->touching);
+        }
+        for (int i = 0; i < n_x; i++) held_m = fmax(held_m, fabs(m.body->x[i] - x[i]));
+        CHECK_INT(n_asleep, 0);
+        CHECK_INT(pal_world_pose(m.world, 0, NULL), 0);
+        CHECK(steps_to_sleep(&m, 1200) > 0);
+        for (int i = 0; i < n_x; i++) left_m = fmax(left_m, fabs(m.body->x[i] - x[i]));
+        printf("  %s: %s by %.2f mm, %.2g mm left\n", model_kind_name[m.kind], grab ? "held" : "pressed", 1e3 * held_m,
+               1e3 * left_m);
+        CHECK(held_m > 1e-4);
+        CHECK_LE(left_m, 5e-4 * m.body->size_m);
+        free(x);
+        model_scene_close(&m);
+    }
+}
+
 static void refuses_what_is_no_threshold(void)
 {
     model_scene m;
@@ -291,6 +341,7 @@ int main(void)
     RUN(frames_say_so_and_keep_their_positions);
     RUN(sleeping_runs_repeat);
     RUN(does_not_sleep_while_something_goes_on);
+    RUN(what_a_far_tool_holds_or_presses_stays_awake);
     RUN(refuses_what_is_no_threshold);
     return check_report();
 }

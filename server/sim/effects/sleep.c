@@ -10,7 +10,8 @@
  * It wakes in the step in which a tool comes as near as the CONTACT rows reach (their hook reach_m), swept along the
  * tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
  * reset. A tool that is near where the shown surface is farther away than one triangle's edge keeps it awake, so that
- * nearness is a matter of vertices alone.
+ * nearness is a matter of vertices alone; so does one that holds or presses the body, wherever it is by now: tissue
+ * follows no farther than the tool's cap pulls, and has to come back when it is let go.
  *
  * Departure: numerics.md asks for a threshold of speed alone; a body that creeps against a drag of 1e6 times the
  * critical one is slow and not at rest, hence the forces.

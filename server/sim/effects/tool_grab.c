@@ -243,8 +243,7 @@ static bool close_on(tool_grab *grab, const pal_body *body, const double p[3], d
 /* y and its velocity */
 static void patch_place(const grip *g, const pal_body *body, double y[3], double v[3])
 {
-    pal_set3(y, 0, 0, 0);
-    pal_set3(v, 0, 0, 0);
+    pal_set3(y, 0, 0, 0), pal_set3(v, 0, 0, 0);
     for (int i = 0; i < g->n_node; i++) {
         pal_axpy3(y, g->weight[i], body->d + 3 * (size_t)g->node[i]);
         pal_axpy3(v, g->weight[i], body->dv + 3 * (size_t)g->node[i]);
@@ -470,8 +469,7 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     double k = spring_N_m(grab, g, tool);
     hold_on(grab, g, tool, body, tool->ramp * k);
     pal_quat_rotate(goal, tool->next.quat, g->offset);
-    pal_add3(goal, goal, tool->here_m);
-    pal_sub3(goal, goal, body->offset_m);
+    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, body->offset_m);
     if (g->live) keep_force(g, tool, y, v, k, step->dt_s, goal);
     double c = fmin(k * grab->damping_s, g->c_most_Ns_m);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
@@ -504,8 +502,7 @@ static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *
     g->firm->k_N_m = tool->ramp * stiffness_N_m(grab, reach_m(grab, tool));
     hold_on(grab, g, tool, body, g->firm->k_N_m);
     pal_quat_rotate(goal, tool->next.quat, g->offset);
-    pal_add3(goal, goal, tool->here_m);
-    pal_sub3(goal, goal, body->offset_m);
+    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, body->offset_m);
     pal_sub3(goal, goal, y);
     double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), most = g->firm->stretch_m + rise, weight = 0;
     for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);
@@ -680,10 +677,13 @@ static bool settle(void *self, pal_step *step, const double *moved)
     return again;
 }
 
-/* the nearest vertex is taken within one and a half of the reach (close_on) */
+/* the nearest vertex is taken within one and a half of the reach (close_on); what is held is, from however far */
 static double how_far_m(const void *self, const pal_tool *tool)
 {
-    return 1.5 * reach_m(self, tool);
+    const tool_grab *grab = self;
+    for (int t = 0; t < grab->n_tool; t++)
+        if (grab->grip[t].held) return INFINITY;
+    return 1.5 * reach_m(grab, tool);
 }
 
 static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply, .settle = settle};

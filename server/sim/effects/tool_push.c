@@ -213,10 +213,8 @@ static void seat(tool_push *push, holder *h, const pal_body *body, const double 
     double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
     pal_copy3(h->proxy.x, at);
-    h->active = true;
-    h->behind_s = 0;
-    if (h->firm) h->firm->back_m = 0;
-    if (h->firm) pal_copy3(h->firm->last_m, at);
+    h->active = true, h->behind_s = 0;
+    if (h->firm) h->firm->back_m = 0, pal_copy3(h->firm->last_m, at);
     if (!pal_touch_nearest(&push->touch, body, at, p, normal)) return;
     pal_sub3(out, at, p);
     if (pal_dot3(out, normal) > 0) {
@@ -258,8 +256,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     }
     if (!body->shell) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);
-    pal_copy3(h->limits.a, h->proxy.x);
-    pal_copy3(h->limits.b, next);
+    pal_copy3(h->limits.a, h->proxy.x), pal_copy3(h->limits.b, next);
     h->limits.radius_m = tool->radius_m;
     h->limits.deepest_m = DEEPEST_RADII * tool->radius_m;
     h->limits.slack_m = 0.5 * (reach - tool->radius_m);
@@ -584,8 +581,7 @@ static pal_err run(void *self, pal_step *step)
     pal_touch_update(&push->touch, step->body, step->dt_s);
     for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
     if (step->body->implicit) {
-        push->n_step += step->sub == 0;
-        push->n_felt = 0;
+        push->n_step += step->sub == 0, push->n_felt = 0;
         pal_ties_begin(push->ties);
         for (int t = 0; t < n_tool; t++) tie(push, &push->holder[t], &tools->tool[t], step);
         return PAL_ERR_OK;
@@ -655,9 +651,13 @@ static void destroy(void *self)
     for (int t = 0; t < push->n_tool; t++) pal_holder_free(&push->holder[t]);
 }
 
+/* what is pressed stays so, however far the tool goes beyond */
 static double how_far_m(const void *self, const pal_tool *tool)
 {
-    return tool->radius_m + near_m(self, tool->radius_m);
+    const tool_push *push = self;
+    for (int t = 0; t < push->n_tool; t++)
+        if (push->holder[t].active && push->holder[t].n_contact > 0) return INFINITY;
+    return tool->radius_m + near_m(push, tool->radius_m);
 }
 
 static const pal_tangent tangent = {.multiply = multiply, .settle = settle};
