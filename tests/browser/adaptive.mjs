@@ -119,7 +119,7 @@ try {
   await ada.mouse.move(pixel.x, pixel.y);
   await ada.mouse.down();
   for (let i = 1; i <= 10; i++) {
-    await ada.mouse.move(pixel.x - 4 * i, pixel.y - i); // 2 cm: of 4 and more a dent may stay, which is stable too
+    await ada.mouse.move(pixel.x - 8 * i, pixel.y - 2 * i);
     await new Promise((r) => setTimeout(r, 60));
   }
   const pulled = await until(async () => ({ ...(await shown(ada)), far: await moved(ada) }), (s) => s.far > 0.01 && s.triangles > rest.triangles && agrees(s));
