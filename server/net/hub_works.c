@@ -106,8 +106,8 @@ static void keep_works(pal_hub_place *at, pal_work *work, pal_waste *waste)
     work->turn = NULL;
 }
 
-/* Rows of brushes went with the session of before. A pressure begins anew in another setting, where it can be; handles,
- * which pull from where they began, and brushes on cells that were edited are over. How many */
+/* Rows of brushes went with the session of before, or go on in another setting of a solid (sim/transfer.h), where they
+ * are asked for again as they are; those on cells that were edited are over. How many */
 static int begin_brushes(pal_hub_hand *hand, pal_hub_room *room, pal_work_kind kind)
 {
     int n_over = 0;
@@ -116,10 +116,12 @@ static int begin_brushes(pal_hub_hand *hand, pal_hub_room *room, pal_work_kind k
         const pal_member_entry *m =
             h->brush.kind == PAL_BRUSH_NONE ? NULL : pal_members_find(&room->members, h->member);
         pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = t, .brush = h->brush};
-        bool acts = m && m->tool == t, stays = acts && kind == PAL_WORK_SWITCH && h->brush.kind == PAL_BRUSH_INFLATE &&
-                                               room->stream->part[h->body].info.sculpts;
+        bool acts = m && m->tool == t,
+             stays = acts && kind == PAL_WORK_SWITCH && room->stream->part[h->body].info.sculpts;
         if (stays && pal_session_command(room->session, &command) == PAL_ERR_OK) continue;
         n_over += acts;
+        command.brush.kind = PAL_BRUSH_NONE;
+        if (h->brush.kind != PAL_BRUSH_NONE) (void)pal_session_command(room->session, &command);
         *h = (pal_hub_hand){.member = 0};
     }
     return n_over;

@@ -27,7 +27,7 @@ typedef enum pal_command_kind {
     PAL_COMMAND_MATERIAL, /* body, material        */
     PAL_COMMAND_FIELD,    /* body, field, wanted: one more or one less who looks; the row is there while anybody does */
     PAL_COMMAND_BRUSH,    /* body, slot, brush: what the hand of tool `slot` does (world.h); letting the tool go or its
-                             lease ends it, a reset or a session that follows as well */
+                             lease ends it, a reset as well, and a session that follows unless its carry hands it on */
     PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimate.h), a
                              thread and worlds of its own, is there while anybody does */
     PAL_COMMAND_RESET_BODY, /* body: that one alone back to rest and unfrozen (pal_world_reset_body) */

@@ -3,8 +3,8 @@
  * jump (numerics.md part 3, last row): displacement and velocity by interpolation in the old body's elements, energy
  * within 2 % of what it was as far as displacements and velocities PAL_TRANSFER_SCALE and _RATE times as long or short
  * can make it so (the report tells), the mismatch of forces, and of what is shown, let go over 10 steps
- * (sim/transfer.h). What tools hold or press they go on holding and pressing, friction too, lasting loads stay; brushes
- * are over. Thread: one at a
+ * (sim/transfer.h). What tools hold or press they go on holding and pressing, friction too, lasting loads stay, and
+ * brushes where the new body has some. Thread: one at a
  * time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H

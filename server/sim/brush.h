@@ -37,6 +37,10 @@ pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, v
  * REFUSED: a number, nothing of the body within reach, a handle stiffer than the body's nodes take, a pressure above
  * 10 E; MEMORY. Nothing has changed then */
 pal_err pal_brush_set(void *self, const pal_body *body, int slot, const pal_brush *brush, pal_note *note);
+/* The brushes of `before`, of another body with the same rest frame that stands in this one's place, go on here, as far
+ * as they have come in: a pressure on the triangles within its reach; a handle pulls each of its nodes by what it
+ * pulled the old ones near it by. A brush that this body does not take, or without memory, is over. Both stand still */
+void pal_brush_hand(void *self, const pal_body *body, const void *before, const pal_body *from);
 void pal_brush_end(void *self, int slot); /* goes out from now on; nothing when there is none */
 bool pal_brush_gone(const void *self);    /* no brush acts any more */
 size_t pal_brush_bytes(const void *self); /* memory of the slots    */

@@ -1,13 +1,19 @@
 /* Rows `brush` that come and go. */
 #include "server/sim/brush_rows.h"
 
-/* the row with its first brush, put behind the body's other CONTACT rows */
-static pal_err make_row(pal_plan *plan, int b, int slot, const pal_brush *brush, pal_arena *arena, pal_note *note,
-                        void **self)
+typedef struct handed {
+    const void *self;
+    const pal_body *body;
+} handed;
+
+/* the row with its first brush, or those of another row, put behind the body's other CONTACT rows */
+static pal_err make_row(pal_plan *plan, int b, int slot, const pal_brush *brush, const handed *before, pal_arena *arena,
+                        pal_note *note, void **self)
 {
     pal_row row = {.effect = &pal_effect_brush};
     PAL_TRY(pal_brush_make(&plan->body[b], arena, note, &row.self));
-    pal_err err = pal_brush_set(row.self, &plan->body[b], slot, brush, note);
+    pal_err err = before ? PAL_ERR_OK : pal_brush_set(row.self, &plan->body[b], slot, brush, note);
+    if (before) pal_brush_hand(row.self, &plan->body[b], before->self, before->body);
     row.n_byte = pal_arena_used(arena) + pal_brush_bytes(row.self);
     if (!err) err = pal_plan_insert(plan, b, &row);
     if (err) row.effect->destroy(row.self);
@@ -27,7 +33,7 @@ pal_err pal_brush_rows_set(pal_brush_rows *rows, pal_plan *plan, int body, int s
     if (rows->self[body]) return pal_brush_set(rows->self[body], &plan->body[body], slot, brush, note);
     pal_arena *arena = pal_arena_create(4096, true);
     void *self = NULL;
-    pal_err err = arena ? make_row(plan, body, slot, brush, arena, note, &self) : PAL_ERR_MEMORY;
+    pal_err err = arena ? make_row(plan, body, slot, brush, NULL, arena, note, &self) : PAL_ERR_MEMORY;
     if (err) {
         pal_arena_destroy(arena);
         if (err != PAL_ERR_MEMORY) return err;
@@ -36,6 +42,22 @@ pal_err pal_brush_rows_set(pal_brush_rows *rows, pal_plan *plan, int body, int s
     rows->arena[body] = arena;
     rows->self[body] = self;
     return PAL_ERR_OK;
+}
+
+void pal_brush_rows_hand(pal_brush_rows *rows, pal_plan *plan, const pal_brush_rows *before, const pal_plan *from)
+{
+    for (int b = 0; b < plan->n_body && b < from->n_body; b++) {
+        const handed was = {before->self[b], &from->body[b]};
+        if (!was.self || pal_brush_gone(was.self) || rows->self[b]) continue;
+        pal_arena *arena = pal_arena_create(4096, true);
+        void *self = NULL;
+        if (!arena || make_row(plan, b, 0, NULL, &was, arena, NULL, &self)) {
+            pal_arena_destroy(arena);
+            continue;
+        }
+        rows->arena[b] = arena;
+        rows->self[b] = self;
+    }
 }
 
 void pal_brush_rows_end(pal_brush_rows *rows, int slot)

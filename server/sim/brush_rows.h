@@ -14,6 +14,8 @@ typedef struct pal_brush_rows {
 /* brush of kind NONE or NULL: the slot's ends. Errors as of pal_brush_make and pal_brush_set; no such body or slot */
 pal_err pal_brush_rows_set(pal_brush_rows *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
                            pal_note *note);
+/* brushes of another world go on in this one (pal_brush_hand), those on bodies that have none are over */
+void pal_brush_rows_hand(pal_brush_rows *rows, pal_plan *plan, const pal_brush_rows *before, const pal_plan *from);
 void pal_brush_rows_end(pal_brush_rows *rows, int slot);        /* on all bodies; no heap call */
 void pal_brush_rows_tidy(pal_brush_rows *rows, pal_plan *plan); /* rows that do nothing any more go */
 void pal_brush_rows_free(pal_brush_rows *rows);                 /* memory only: after pal_plan_free */

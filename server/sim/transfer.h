@@ -28,7 +28,8 @@
  * touch what is seen.
  *
  * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
- * tool holds (pal_effect.hand) or presses, with what friction holds (holder.h). Brushes are over. Thread: one at a
+ * tool holds (pal_effect.hand) or presses, with what friction holds (holder.h), and brushes on bodies
+ * that have some. Thread: one at a
  * time. */
 #ifndef PAL_SIM_TRANSFER_H
 #define PAL_SIM_TRANSFER_H

@@ -575,6 +575,7 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     pal_world_follow(next, before, t->body, t->x, t->v);
     if (t->back.n_row > 0) ease(t, next);
     hand_over(t, next, before);
+    pal_brush_rows_hand(&next->brushes, &next->plan, &before->brushes, &before->plan);
     out->energy_after_J = world_J(next);
     out->body_move_m = pal_transfer_body_move(t, from, to);
     pal_transfer_show(t, next, before, out);

@@ -131,6 +131,34 @@ static void a_pressure_goes_on(void)
     end();
 }
 
+/* a handle as well: it goes on pulling to where it pulled, and its hand ends it */
+static void a_handle_goes_on(void)
+{
+    mem_client c;
+    uint32_t seq = 0;
+    const double away[3] = {0, 0, 0.2};
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_pose(&c, 0, ++seq, away);
+    double rest = highest(&c);
+    CHECK(order(&c, "curve",
+                "\"x_m\":-0.03,\"y_m\":0.0,\"z_m\":0.05,\"x2_m\":0.03,\"y2_m\":0.0,\"z2_m\":0.05,"
+                "\"radius_m\":0.03,\"stiffness_N_m\":200,\"dx_m\":0,\"dy_m\":0,\"dz_m\":0.02"));
+    wait_frames(&c, 60);
+    double lifted = highest(&c) - rest;
+    CHECK(lifted > 0.001);
+    CHECK(order(&c, "point", "\"index\":2"));
+    CHECK_INT((int)told(&c, "brushes_over"), 0);
+    until_frame(&c);
+    wait_frames(&c, 60);
+    CHECK_NEAR(highest(&c) - rest, lifted, 0.3 * lifted);
+    CHECK(order(&c, "release", ""));
+    wait_frames(&c, 90);
+    CHECK_LE(highest(&c) - rest, 0.3 * lifted);
+    mem_end(&c);
+    end();
+}
+
 static void what_cannot_be_is_refused_with_a_sentence(void)
 {
     static const struct {
@@ -188,6 +216,7 @@ int main(void)
     RUN(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
     RUN(a_pressure_goes_on);
+    RUN(a_handle_goes_on);
     RUN(what_cannot_be_is_refused_with_a_sentence);
     RUN(a_server_that_ends_in_the_middle_ends);
     clay_free(&clay);

@@ -355,6 +355,58 @@ static void what_does_not_fit_is_refused(void)
     end(&b);
 }
 
+/* a handle that lifts the end of a solid goes on lifting it: as far, and with as much energy in it */
+static void handles_hold_on(void)
+{
+    const pal_setting s[] = {{.model = "subdivision_fem", .size = 1},
+                             {.model = "subdivision_fem", .size = 2},
+                             {.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"}};
+    const int pair[3][2] = {{0, 1}, {1, 0}, {0, 2}};
+    for (int n = 0; n < 3; n++) {
+        const pal_brush handle = {.kind = PAL_BRUSH_CURVE,
+                                  .at_m = {0.13, 0.025, WIDTH},
+                                  .to_m = {0.19, 0.025, WIDTH},
+                                  .radius_m = 0.02,
+                                  .soft = 0.5,
+                                  .lift_m = {0, 0, 0.02},
+                                  .stiffness_N_m = 60};
+        beam b;
+        pal_transfer_report r;
+        pal_note note = {""};
+        double tip[3], u[3], v[3];
+        begin(&b, true, false, 20);
+        b.scene->body[0].n_support = 1;
+        for (int k = 0; k < 2; k++) add_setting(&b, &s[pair[n][k]]);
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1);
+        if (pal_world_brush(w, 0, 0, &handle, &note)) CHECK_FAIL("%s", note.text);
+        step(w, 1.0 / 60, 60);
+        tip_of(w, tip, v);
+        CHECK(tip[2] > 0.003);
+        int n_row = pal_world_rows(next);
+        pal_transfer_carry(x, next, w, &r);
+        CHECK_INT(pal_world_rows(next), n_row + 2); /* ease and brush */
+        double least = INFINITY, most = -INFINITY;
+        for (int k = 0; k < 60; k++) {
+            step(next, 1.0 / 60, 1);
+            tip_of(next, u, v);
+            least = fmin(least, u[2]), most = fmax(most, u[2]);
+        }
+        if (table) printf("  handle: tip %.2f, then %.2f to %.2f mm\n", 1e3 * tip[2], 1e3 * least, 1e3 * most);
+        CHECK_LE(fabs(least - tip[2]), 0.2 * tip[2]);
+        CHECK_LE(fabs(most - tip[2]), 0.2 * tip[2]);
+        /* and lets go */
+        CHECK(!pal_world_brush(next, 0, 0, NULL, &note));
+        step(next, 1.0 / 60, 90);
+        tip_of(next, u, v);
+        CHECK_LE(fabs(u[2]), 0.2 * tip[2]);
+        CHECK_INT(pal_world_rows(next), n_row);
+        pal_transfer_free(x);
+        pal_world_destroy(w), pal_world_destroy(next);
+        end(&b);
+    }
+}
+
 /* a carry that was rehearsed while the old world went on takes a few rounds where it took many, and ends as well */
 static void a_rehearsed_carry_takes_few_rounds(void)
 {
@@ -403,6 +455,7 @@ int main(int argc, char **argv)
     RUN(tools_hold_on);
     RUN(friction_holds_on);
     RUN(lasting_loads_stay);
+    RUN(handles_hold_on);
     RUN(a_rehearsed_carry_takes_few_rounds);
     RUN(surfaces_go_between_levels);
     RUN(what_does_not_fit_is_refused);

@@ -145,6 +145,11 @@ static void goal(const pal_brush *b, double out[3])
     if (b->kind == PAL_BRUSH_CURVE) pal_copy3(out, b->lift_m);
 }
 
+static bool acts(const slot *s)
+{
+    return s->arena && !(s->ending && s->n_in == 0);
+}
+
 static bool goes_on(const slot *s, const pal_brush *b)
 {
     if (!s->arena || s->ending || s->brush.kind != b->kind || !same3(s->brush.at_m, b->at_m)) return false;
@@ -197,14 +202,49 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     return PAL_ERR_OK;
 }
 
+/* ---- another body in this one's place ---- */
+
+/* how far nodes of a handle were from where it began, at a place at rest: the mean of those near, by distance */
+static void way_back(const slot *s, const pal_body *from, const double x[3], double out[3])
+{
+    double sum = 0, near2 = 1e-6 * s->brush.radius_m * s->brush.radius_m;
+    pal_set3(out, 0, 0, 0);
+    for (int k = 0; k < s->n; k++) {
+        const size_t i = 3 * (size_t)s->item[k];
+        double way[3], far = pal_dist3(from->node_rest + i, x), weight = 1 / pow(far * far + near2, 2);
+        pal_sub3(way, s->begin + 3 * (size_t)k, from->d + i);
+        pal_axpy3(out, weight, way);
+        sum += weight;
+    }
+    pal_scale3(out, 1 / sum, out);
+}
+
+void pal_brush_hand(void *self, const pal_body *body, const void *before, const pal_body *from)
+{
+    for (int i = 0; i < PAL_TOOL_MAX; i++) {
+        const slot *was = &((const brush_row *)before)->slot[i];
+        slot *s = &((brush_row *)self)->slot[i], fresh = {.brush = was->brush};
+        double way[3];
+        if (!acts(was) || !(fresh.arena = pal_arena_create(4096, true))) continue;
+        if (fill(body, &was->brush, &fresh, NULL)) {
+            pal_arena_destroy(fresh.arena);
+            continue;
+        }
+        for (int k = 0; k < fresh.n && was->brush.kind == PAL_BRUSH_CURVE; k++) {
+            const size_t node = 3 * (size_t)fresh.item[k];
+            way_back(was, from, body->node_rest + node, way);
+            pal_add3(fresh.begin + 3 * (size_t)k, body->d + node, way);
+        }
+        pal_copy3(fresh.now, was->now);
+        fresh.n_left = was->n_left, fresh.n_in = was->n_in, fresh.ending = was->ending;
+        pal_arena_destroy(s->arena);
+        *s = fresh;
+    }
+}
+
 void pal_brush_end(void *self, int slot_index)
 {
     ((brush_row *)self)->slot[slot_index].ending = true;
-}
-
-static bool acts(const slot *s)
-{
-    return s->arena && !(s->ending && s->n_in == 0);
 }
 
 bool pal_brush_gone(const void *self)
