@@ -23,9 +23,11 @@ static const double least_s = 60,
 static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
-static const char rule_back[] = "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S";
+#define PATIENCE    "10 s or ten of its slowest periods"
+static const char rule_back[] =
+    "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE;
 static const char rule_shape[] =
-    "finite, energy never above the insult's " ENERGY_RULE ", rest within 0.1 % S in 10 s; "
+    "finite, energy never above the insult's " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE "; "
     "springs: bounded, that rest after a reset";
 static const char rule_blown[] =
     "the same in 25 s, or stopped by finite_guard beyond its reach and at rest after a reset";
@@ -50,7 +52,7 @@ static const pal_insult insults[] = {
     {"poisoned", "a NaN in the state of one body", "that body alone stops, says which node, and is reset alone",
      pal_insult_poisoned},
     {"supports", "what is held is let go and held elsewhere while deformed, then back",
-     "energy rises by at most 1 % at a switch, stands still within 10 s", pal_insult_supports},
+     "energy rises by at most 1 % at a switch, stands still within " PATIENCE, pal_insult_supports},
     {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
      pal_insult_stiffer},
     {"random", "300 steps of random poses, grabs, loads, materials and brushes, good and bad",
@@ -394,7 +396,7 @@ void pal_rig_relax(pal_rig *rig, double seconds)
 {
     pal_torture_result *out = rig->out;
     double begin = out->simulated_s, hold_s = 0.25, still_s = 0;
-    int n = (int)ceil(seconds / rig->scene->step_s);
+    int n = (int)ceil((seconds < 10 ? seconds : fmax(seconds, rig->patience_s)) / rig->scene->step_s);
     out->back_s = INFINITY;
     rig->needs_rest = true, rig->asked_back = false;
     for (int i = 0; i < n && out->finite && !halted(rig) && !rig->late; i++) {
@@ -634,6 +636,7 @@ static pal_err run_all(pal_rig *rig, pal_torture_report *out)
     out->rests = rig->rests = pal_rig_settle(rig, &out->settle_s);
     if (!rig->rests && !rig->late) out->led = pal_rig_lead(rig);
     pal_rig_keep(rig, rig->rest);
+    rig->patience_s = pal_rig_patience(rig);
     const double most_s = o->most_s > 0 ? o->most_s : enough_s(rig);
     for (int k = 0; k < N_INSULT; k++) {
         if (o->only && strcmp(o->only, insults[k].name)) continue;

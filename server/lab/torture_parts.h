@@ -11,6 +11,7 @@ typedef struct pal_rig {
     double *rest[PAL_BODY_MAX];  /* where the bodies rest          [n_dof][3] */
     double *start[PAL_BODY_MAX]; /* room for where they are        [n_dof][3] */
     double rest_J;
+    double patience_s; /* that bodies have to come back */
     bool anew;         /* rest cannot be put back as positions: it is found again for every insult */
     bool touches;      /* a body has a row that tools push                                         */
     int body;          /* the first such body, else 0                                              */
@@ -32,9 +33,11 @@ typedef struct pal_rig {
 /* one step, watched; false: stop (a number that is none, frozen, late, a step refused) */
 bool pal_rig_step(pal_rig *rig, double dt_s);
 bool pal_rig_run(pal_rig *rig, double seconds); /* steps of the scene */
-/* runs until all bodies have been within 0.1 % S of rest for half a second, at most seconds; sets left_S and back_s */
+/* runs until all bodies have been within 0.1 % S of rest for half a second, at most seconds (where 10 or more are
+ * given, patience_s if that is more); sets left_S and back_s */
 void pal_rig_relax(pal_rig *rig, double seconds);
 /* torture_rest.c */
+double pal_rig_patience(const pal_rig *rig);
 double pal_rig_speed_S_s(const pal_rig *rig);
 bool pal_rig_settle(pal_rig *rig, double *took_s);
 void pal_rig_keep(pal_rig *rig, double **to);

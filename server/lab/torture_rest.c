@@ -1,13 +1,16 @@
 /* Where the rig's scene rests, and where it would be untouched when it never does. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/lab/preflight.h"
 #include "server/lab/torture_parts.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
 static const double settle_most_s = 30;
+static const double back_s = 10, longest_s = 60, n_period = 10;
 static const double lead_s = 0.5; /* that a led scene is on its way before an insult */
 
 /* RMS speed of the fastest body over its S, 1/s */
@@ -28,6 +31,18 @@ double pal_rig_speed_S_s(const pal_rig *rig)
 }
 
 /* ---- rest ---- */
+
+/* how long bodies have to come back, s: ten of the slowest periods (numerics.md part 3), no less than 10 s, no more
+ * than a minute */
+double pal_rig_patience(const pal_rig *rig)
+{
+    double most = 0;
+    pal_preflight *look = malloc(sizeof *look);
+    if (look && !pal_preflight_look(rig->scene, PAL_PREFLIGHT_QUICK, look, NULL))
+        for (int b = 0; b < look->n_body; b++) most = fmax(most, look->body[b].slow_s); /* of NaN the other */
+    free(look);
+    return fmax(back_s, fmin(longest_s, n_period * most));
+}
 
 /* runs until nothing moves; false: it still does */
 bool pal_rig_settle(pal_rig *rig, double *took_s)

@@ -10,8 +10,9 @@
 static const double back_s = 10, clamp_S = 0.02;
 /* RMS speed that counts as standing still after supports were switched */
 static const double still_S_s = 1e-3;
-/* of a node's cap (or the weight): bends a body, and crushes no element as a tenth of the cap, E h^2, does */
-static const double bend_share = 0.02;
+/* of a node's cap (or the weight): bends a body, and crushes no element as a tenth of the cap, E h^2, does (in a liver
+ * of 6 voxels; a beam and one of 8 bear a fifth) */
+static const double bend_share = 0.05;
 
 /* ---- tools ---- */
 
@@ -305,7 +306,7 @@ void pal_insult_supports(pal_rig *rig)
     /* where it is held is another place now: it has to come to rest, not to come back */
     const double begin = rig->out->simulated_s, hold_s = 0.25;
     double since_s = 0;
-    while (good && since_s < hold_s && rig->out->simulated_s - begin < back_s) {
+    while (good && since_s < hold_s && rig->out->simulated_s - begin < rig->patience_s) {
         good = pal_rig_step(rig, rig->scene->step_s);
         since_s = speed_S_s(rig) <= still_S_s ? since_s + rig->scene->step_s : 0;
     }

@@ -16,6 +16,8 @@ static const double floor_share = 1e-7;
 static const double still_share = 1e-11;
 /* most iterations of a step that began with one and gained energy */
 enum { rescue_newton = 8 };
+/* a stage whose equations are solved may gain a little by its own error of time; more than this share counts */
+static const double gain_share = 0.01;
 /* sub-steps that may gain energy in spite of all iterations before the body has to stand still in such; so many without
  * one in between and they are counted anew */
 enum { patience = 30, calm_steps = 30 };
@@ -400,11 +402,12 @@ static bool is_led(const pal_body *body)
     return false;
 }
 
-/* was one iteration not enough? */
-static bool rises(pal_implicit *core)
+/* was one iteration not enough? share: of the energy that may be gained */
+static bool rises(pal_implicit *core, double share)
 {
     double slack;
-    return core->guarded && total_energy(core, core->system.body->v, true, &slack) > core->energy0_J + slack;
+    return core->guarded && total_energy(core, core->system.body->v, true, &slack) >
+                                core->energy0_J + share * fabs(core->energy0_J) + slack;
 }
 
 /* of all loads on points, Euclidean, N */
@@ -446,6 +449,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
         if (to->converged || k == most || !isfinite(left)) {
+            core->risen |= k > 0 && rises(core, gain_share);
             if (again_ns) body->rescue.ns += pal_clock_ns() - again_ns;
             return PAL_ERR_OK;
         }
@@ -459,7 +463,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         to->converged = core->cg.residual <= best;
         /* from here on all is a rescue: the search, and the iterations that follow it */
         if (most > core->wish.newton) body->rescue.ns += pal_clock_ns() - again_ns;
-        if (!rises(core)) return PAL_ERR_OK;
+        if (!rises(core, 0)) return PAL_ERR_OK;
         core->risen = most == rescue_newton;
         if (core->risen) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
@@ -474,6 +478,20 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 static bool sound(const pal_body *body)
 {
     return pal_body_finite(body);
+}
+
+/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across.
+ * Where something holds the body it does not matter: what they do not add costs nothing to leave in */
+static bool contact_acts(pal_implicit *core)
+{
+    double *p = core->cg.p, *q = core->cg.q;
+    if (core->system.n_free < core->system.body->n_dof) return true;
+    for (int i = 0; i < core->cg.n; i++) p[i] = (const double[]){1, M_SQRT2, M_PI}[i % 3];
+    memset(q, 0, bytes3(core));
+    pal_system_contact(&core->system, 1, 1, p, q);
+    for (int i = 0; i < core->cg.n; i++)
+        if (q[i] != 0) return true;
+    return false;
 }
 
 bool pal_implicit_begin(pal_implicit *core, pal_step *step)
@@ -494,6 +512,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
     core->risen = false;
     pal_system_touch(&core->system, step);
+    if (core->system.has_contact) core->system.has_contact = contact_acts(core);
     step->drag_apart = true;
     double slack;
     core->guarded = core->wish.watch && core->wish.newton == 1 && core->system.has_energy && !is_led(body);

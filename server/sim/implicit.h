@@ -57,7 +57,7 @@ typedef struct pal_implicit {
     double energy0_J;    /* at the sub-step's begin             */
     bool guarded;        /* energy is watched: see above        */
     bool risen;          /* ... and was not kept in this sub-step ... */
-    int n_risen, n_calm; /* ... nor in so many; sub-steps since then */
+    int n_risen, n_calm; /* ... nor in so many (0 after half a second of peace); sub-steps since then */
     int most_cg, round;  /* in one solve of this sub-step; rounds of settle */
     uint64_t sampled;    /* of body->solid, at the factor       */
     bool probing;        /* an embedded body's matrices are being found anew */

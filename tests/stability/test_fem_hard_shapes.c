@@ -149,6 +149,35 @@ static void free_bodies_come_back_to_their_shape(void)
         }
 }
 
+/* Voxels that are hardly filled are light and turn over at a touch. There the second stage of sdirk2 gained energy for
+ * long (9.7 s until rest here, for ever in a liver of 6 voxels); after gains it goes on by backward Euler until there
+ * is peace */
+static void hardly_filled_voxels_come_to_rest_under_sdirk2(void)
+{
+    for (int fill = 0; fill < CHECK_REPEATS(3, 1); fill++) {
+        fem_beam b;
+        uint64_t seed = 11 + (uint64_t)fill;
+        beam_make(&b, 4, 3, 2, 0.034, true);
+        b.def->material = (pal_material){.young_Pa = 5e3, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
+        beam_solver(&b, "sdirk2");
+        for (int h = 0; h < b.mesh.hexes.n_hex; h++) b.mesh.hexes.fill[h] = hard_random(&seed) < 0.5 ? 0.02F : 1;
+        REQUIRE(!beam_open(&b, &note));
+        for (int insult = HARD_PLANE; insult < HARD_INSULTS; insult++) {
+            if (insult == HARD_BLOWN) continue;
+            pal_world_reset(b.world);
+            hard_insult(&b, insult, (uint64_t)fill);
+            hard_run run;
+            hard_steps(&b, 10, 1.0 / 60, &run);
+            printf("  %s: back after %.2f s, energy up to %.3f\n", insult_names[insult], run.back_s, run.most);
+            CHECK(run.finite);
+            CHECK_LE(run.most, 1.01);
+            HARD_CASE(insult < HARD_SHUFFLE ? insult_cases[insult] : "shuffle", "fem",
+                      "sdirk2, every second voxel hardly filled: within 0.1 % S of rest after", run.back_s, 5, "s");
+        }
+        beam_free(&b);
+    }
+}
+
 int main(void)
 {
     RUN(an_element_that_is_turned_over_turns_back);
@@ -156,5 +185,6 @@ int main(void)
     RUN(shuffled_bodies_come_back_for_every_seed);
     RUN(mirrored_hexahedra_are_found_untangled_and_counted);
     RUN(free_bodies_come_back_to_their_shape);
+    RUN(hardly_filled_voxels_come_to_rest_under_sdirk2);
     return check_report();
 }

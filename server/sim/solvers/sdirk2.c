@@ -6,6 +6,10 @@
  * serves both; the second is linearised where the first ended. Order 2 shows with newton > 1 (a single iteration drops
  * what the rotations' derivative adds to the tangent).
  *
+ * The second stage goes 2.4 times as far as the first one's acceleration led, which is stable where forces are smooth.
+ * Elements that turn over and back are not: the energy rose in one sub-step of thirty, for ever. After a sub-step that
+ * gained energy in spite of all iterations the body goes on by backward Euler until half a second of peace.
+ *
  * Keys: as implicit_euler. */
 #include "server/sim/effect_list.h"
 #include "server/sim/implicit.h"
@@ -44,6 +48,10 @@ static pal_err run(void *self, pal_step *step)
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
+        if (core->n_risen > 0) { /* one stage of the whole step: see above */
+            PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
+            continue;
+        }
         PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
         open_second(core, body, step->dt_s);
         PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
