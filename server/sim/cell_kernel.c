@@ -75,8 +75,12 @@ static pal_err allocate(pal_cell_group *g, pal_arena *arena)
     g->q = PAL_NEW(arena, double, n_lane * 4);
     g->turn = PAL_NEW(arena, double, n_lane * 9);
     g->volume = PAL_NEW(arena, double, n_lane);
+    g->corner = PAL_NEW(arena, double, n_lane * 8);
+    g->here = PAL_NEW(arena, double, n_lane);
+    g->energy_J = PAL_NEW(arena, double, n_lane);
     g->middle = (double(*)[3])PAL_NEW(arena, double, 3 * n_node);
-    bool all = g->node && g->rest && g->frame && g->q && g->turn && g->volume && g->middle;
+    bool all = g->node && g->rest && g->frame && g->q && g->turn && g->volume && g->middle && g->corner && g->here &&
+               g->energy_J;
     if (g->n_node == PAL_CUBIC_NODES) {
         g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 9);
         g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 2);
@@ -273,11 +277,13 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
     const bool mean = c->op == PAL_CELL_POLAR;
     fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean);
     fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean);
+    pal_cell_tangle_refresh(&c->tangle, c);
 }
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)
 {
     pal_kept_forget(&c->kept);
+    pal_cell_tangle_reset(&c->tangle, c);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
         for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;
@@ -293,6 +299,8 @@ pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal
     make_line(&out->line);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         PAL_TRY(make_group(solid, kind, arena, &out->group[kind], note));
+    PAL_TRY(pal_cell_tangle_make(solid, arena, &out->tangle));
+    pal_cells_corners_make(out);
     pal_cells_elastic_reset(out);
     pal_cells_elastic_refresh(out);
     return PAL_ERR_OK;

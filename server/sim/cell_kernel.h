@@ -15,6 +15,7 @@
  * All memory from the arena. Thread: make [load], else [sim]; energy and force move the rotations' warm start. */
 #ifndef PAL_SIM_CELL_KERNEL_H
 #define PAL_SIM_CELL_KERNEL_H
+#include "server/sim/cell_tangle.h"
 #include "server/sim/kept.h"
 #include "server/sim/solid.h"
 
@@ -43,6 +44,9 @@ typedef struct pal_cell_group {
     float *stiff;        /* cubic: mu, lambda, Pa             [n_block][64][2][8] */
     float *k;            /* others: blocks K_ab, b <= a, of nodes 1.., N/m
                                                   [n_block][pairs][9][8] */
+    double *corner;      /* 1 / volume at rest at the 8 points that look for turned over elements [n_block][8][8] */
+    double *here;        /* 1: an element, 0: part of a patch (cell_tangle.h)      [n_block][8] */
+    double *energy_J;    /* of each element when energy was asked for last         [n_block][8] */
     int n_slow;          /* rotations of the last call that vectors did not settle */
 } pal_cell_group;
 
@@ -51,6 +55,7 @@ typedef struct pal_cells_elastic {
     pal_cell_operator op;
     uint64_t sampled; /* of the solid, what the constants were made for */
     pal_kept kept;    /* made by the row, of PAL_CELL_POLAR under an implicit solver */
+    pal_cell_tangle tangle;
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
 } pal_cells_elastic;
@@ -75,6 +80,10 @@ double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f
 /* takes Q at d, then out += k sum Q K Q' p: the tangent with rotations held (of both operators) */
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d);
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out);
+/* least and largest volume of every element over that at rest, at the 2 x 2 x 2 Gauss points of its cell, to
+ * tangle.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
+void pal_cells_corners_make(pal_cells_elastic *c);
+void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
 /* turn [n][9] += Q by the elements' volumes at their nodes */
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn);
 

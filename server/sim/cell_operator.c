@@ -200,6 +200,12 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     cell_rotation(group, block, lane, y, n_node, r, s);
     displaced(rest, n_node, r, y, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, f ? NULL : &energy);
+    if (!f) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
+    if (c->tangle.n_away > 0) {
+        const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
+        energy *= here;
+        for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
+    }
     if (!f) return cell_sum(energy, n_live);
     for (int i = 0; i < 9; i++) r[i] = -r[i];
     cell_turn(r, n_node, u, u);

@@ -129,6 +129,9 @@ typedef struct pal_effect {
     /* live edit: constants that the scene did not give are derived again. REFUSED: nothing changed */
     pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note);
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
+    /* FORCE: looks for elements that are turned over and chooses what they run on from now on; true: forces and
+     * stiffness are others than before. Solvers ask between sub-steps, never within one */
+    bool (*untangle)(void *self, const pal_body *body);
     /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h):
      * `place` has the nodes of `from` as weighted sums of this body's; NULL: they are the same nodes. Both bodies stand
      * still */

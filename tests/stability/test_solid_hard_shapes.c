@@ -1,10 +1,9 @@
 /* Hard cases of numerics.md part 3 for model subdivision_fem: shapes. Whatever the control points are put to (a corner
  * through its cell, all in a plane, on a point, mirrored, blown up, shuffled, swapped), the solid comes back to rest
  * with no element turned over, and its energy does not rise above what the insult put in. No point moves more than 0.2
- * S in a step of the implicit solver, so that the way back from x 100 alone takes 9 s, at nu 0.499 23 s. Operator edges
- * is no gradient of an energy: it stays finite, comes back up to nu 0.45 with the implicit solver, and is not asked for
- * more.
- */
+ * S in a step of the implicit solver, so that the way back from x 100 alone takes 8 s. Operator edges is no gradient of
+ * an energy: it comes back up to nu 0.45, with the implicit solver from any shape, with the explicit one from a corner
+ * turned over. */
 #include "server/num/polar.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/solid_hard.h"
@@ -41,23 +40,14 @@ static void a_corner_that_is_turned_over_turns_back(void)
         solid_steps(&s, 2, solid_step_s, &run);
         printf("  %s: back after %.2f s, energy up to %.3f\n", solid_kinds[k].shown, run.back_s, run.most);
         CHECK(run.finite);
-        /* explicit edges: the torque of its forces feeds the motion, which stays bounded by the clamp alone */
-        if (k == SOLID_KINDS - 1) CHECK_LE(solid_rms(s.body), s.body->size_m);
-        if (k < SOLID_KINDS - 1) {
-            HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.most, 1.01, "");
-            HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 2, "s");
-        } else
-            HARD_CASE_MISSED("inverted", "subdivision_fem",
-                             "explicit, operator edges: stays bounded, energy over the insult's", run.most, 1.01, 60,
-                             "");
+        HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.most, 1.01, "");
+        HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 2, "s");
+        CHECK(s.body->rescue.n_tangled > 0);
         solid_scene_close(&s);
     }
 }
 
 static const char *const solid_cases[] = {"plane", "point", "mirror", "blown_up", "shuffle", "shuffle"};
-
-/* of those blown up whose volume hardly changes */
-static double blown_late;
 
 /* returns after how long all were back; INFINITY: one was not */
 static double insult_all(int kind, double poisson, int n_seed, double *most)
@@ -73,19 +63,15 @@ static double insult_all(int kind, double poisson, int n_seed, double *most)
             solid_run run;
             pal_world_reset(s.world);
             solid_insult(&s, insult, (uint64_t)seed);
-            solid_steps(&s, insult == SOLID_BLOWN ? 25 : 10, solid_step_s, &run);
+            solid_steps(&s, 10, solid_step_s, &run);
             CHECK(run.finite);
-            back += run.back_s <= (insult == SOLID_BLOWN ? 25 : 10);
+            back += run.back_s <= 10;
             late = fmax(late, run.back_s), *most = fmax(*most, run.most);
         }
         const char *id = solid_cases[insult];
         if (n > 1) HARD_CASE_ALL(id, "subdivision_fem", "shuffled or exchanged: back within 10 s", back, n);
         HARD_CASE(id, "subdivision_fem", "energy over the insult's", *most, 1.01, "");
-        /* no more than 0.2 S in a step of the implicit solver */
-        if (insult == SOLID_BLOWN && poisson > 0.49)
-            blown_late = fmax(blown_late, late);
-        else
-            HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
+        HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
         printf(" %s %d of %d (%.2f s)", solid_insults[insult], back, n, late);
         last = fmax(last, late);
     }
@@ -99,7 +85,7 @@ static void flat_collapsed_mirrored_blown_up_and_shuffled_solids_come_back(void)
     static const double poisson[] = {0.45, 0.499, 0.3};
     for (int q = 0; q < CHECK_REPEATS(3, 1); q++) {
         double most = 0;
-        CHECK_LE(insult_all(SOLID_IMPLICIT, poisson[q], CHECK_REPEATS(10, 1), &most), 25);
+        CHECK_LE(insult_all(SOLID_IMPLICIT, poisson[q], CHECK_REPEATS(10, 1), &most), 10);
         CHECK_LE(most, 1.01);
     }
     for (int q = 0; q < CHECK_REPEATS(2, 0); q++) {
@@ -107,13 +93,12 @@ static void flat_collapsed_mirrored_blown_up_and_shuffled_solids_come_back(void)
         CHECK_LE(insult_all(SOLID_EXPLICIT, poisson[q], 3, &most), 10);
         CHECK_LE(most, 1.01);
     }
-    HARD_CASE_MISSED("blown_up", "subdivision_fem", "nu 0.499: within 0.1 % S of rest after", blown_late, 10, 25, "s");
 }
 
 static void operator_edges_comes_back_with_the_implicit_solver(void)
 {
     double most = 0;
-    CHECK_LE(insult_all(SOLID_IMPLICIT + 2, 0.45, CHECK_REPEATS(4, 1), &most), 25);
+    CHECK_LE(insult_all(SOLID_IMPLICIT + 2, 0.45, CHECK_REPEATS(4, 1), &most), 10);
     CHECK_LE(most, 1.01);
 }
 

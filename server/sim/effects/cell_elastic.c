@@ -8,6 +8,7 @@
  * has taken others (painting, a live edit of the material), the constants are made anew before they are used next.
  * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
  * of forces. For the same reason the tangent is given by products only. */
+#include "server/base/clock.h"
 #include "server/sim/cell_kernel.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_law.h"
@@ -37,11 +38,17 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 static pal_err run(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
+    pal_body *body = step->body;
+    const bool tangled = row->tangle.n_patch > 0;
     pal_cells_elastic_refresh(row);
-    if (pal_kept_at(&row->kept, step->body->d))
-        pal_kept_add(&row->kept, step->body->f);
+    body->rescue.n_tangled += row->tangle.n_tangled, body->rescue.n_split += row->tangle.n_change;
+    row->tangle.n_tangled = row->tangle.n_change = 0;
+    const uint64_t before = tangled ? pal_clock_ns() : 0;
+    if (pal_kept_at(&row->kept, body->d))
+        pal_kept_add(&row->kept, body->f);
     else
-        pal_cells_elastic_force(row, step->body->d, step->body->f);
+        pal_cells_elastic_force(row, body->d, body->f);
+    if (tangled) body->rescue.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 
@@ -66,10 +73,22 @@ static bool couple(void *self, pal_cliques *out)
     return false;
 }
 
+static bool untangle(void *self, const pal_body *body)
+{
+    pal_cells_elastic *row = self;
+    pal_cells_elastic_refresh(row);
+    if (!pal_cell_tangle_look(&row->tangle, row, body)) return false;
+    pal_kept_forget(&row->kept);
+    return true;
+}
+
+/* at rest, which solvers ask for between steps, there are no patches */
 static void linearise(void *self, const pal_body *body)
 {
-    pal_cells_elastic_refresh(self);
-    pal_cells_elastic_linearise(self, body->d);
+    pal_cells_elastic *row = self;
+    pal_cells_elastic_refresh(row);
+    row->tangle.off = body->d == body->node_rest;
+    pal_cells_elastic_linearise(row, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
@@ -120,6 +139,7 @@ const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
                                             .run = run,
                                             .energy = energy,
                                             .reset = reset,
+                                            .untangle = untangle,
                                             .tangent = &tangent,
                                             .measure = measure,
                                             .fields = PAL_ELASTIC_FIELDS};

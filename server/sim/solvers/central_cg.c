@@ -54,6 +54,7 @@ typedef struct central {
     double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
     double cell_m;                /* edge of a control cell, about */
     double way_m;                 /* no point has moved farther against the others since it was taken */
+    int n_unseen;                 /* sub-steps since turned over elements were looked for */
     int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
     double wild;                  /* divides the limit: 1, more after points were clamped */
@@ -71,6 +72,8 @@ static const double most_wild = 8, calm = 0.98;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
 enum { PAUSE = 12, MOST_PAUSE = 96 };
+/* sub-steps between looks for elements that are turned over, about */
+enum { UNSEEN = 16 };
 /* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
 enum { MOST = 300, FIRST = 24, AGAIN = 6, MOST_ENTRY = 1 << 22 };
 
@@ -126,6 +129,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     central *row = PAL_NEW(build->arena, central, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->solid = body->solid, row->mass = body->solid_mass;
+    row->n_unseen = UNSEEN;
     row->safety = safety, row->tolerance = tolerance, row->wild = 1;
     row->cell_m = cbrt(pal_solid_volume_m3(body->solid) / build->def->cells->n_cell);
     PAL_TRY(allocate(row, body, build->arena));
@@ -340,13 +344,28 @@ static void look(central *row, pal_step *step)
     row->n_since = 0;
 }
 
+/* true: elements were found that run on something else from now on */
+static bool untangle(central *row, pal_step *step)
+{
+    bool changed = false;
+    if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
+    row->n_unseen = 0;
+    pal_body_place(step->body);
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->untangle)
+            changed |= step->force[i].effect->untangle(step->force[i].self, step->body);
+    /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
+    if (changed) row->dt_s = 0;
+    return changed;
+}
+
 /* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */
 static double limit(void *self, pal_step *step)
 {
     central *row = self;
     const pal_body *body = step->body;
     if (!finite_state(body)) return NAN;
-    if (renew(row, body)) row->known = false;
+    if (renew(row, body) || untangle(row, step)) row->known = false;
     if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
     if (step->sub == 0) find_contact(row, step);
     const double lambda = row->rows2 + row->contact2, c = row->contact_1_s;
@@ -462,6 +481,7 @@ static pal_err run(void *self, pal_step *step)
     row->way_m += move(row, step->body, step->dt_s);
     row->dt_s = step->dt_s;
     row->n_since += row->n_since < MOST_PAUSE;
+    row->n_unseen++;
     return PAL_ERR_OK;
 }
 
@@ -472,6 +492,7 @@ static void reset(void *self, const pal_body *body)
     row->dt_s = 0;
     row->wild = 1;
     row->known = false;
+    row->n_unseen = UNSEEN;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
