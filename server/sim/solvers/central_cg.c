@@ -347,13 +347,16 @@ static void look(central *row, pal_step *step)
 /* true: elements were found that run on something else from now on */
 static bool untangle(central *row, pal_step *step)
 {
+    pal_body *body = step->body;
+    double *d = body->d;
     bool changed = false;
     if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
     row->n_unseen = 0;
-    pal_body_place(step->body);
+    pal_point_rows_place(body->embed, body->x, row->d);
+    body->d = row->d;
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->untangle)
-            changed |= step->force[i].effect->untangle(step->force[i].self, step->body);
+        if (step->force[i].effect->untangle) changed |= step->force[i].effect->untangle(step->force[i].self, body);
+    body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
     if (changed) row->dt_s = 0;
     return changed;
