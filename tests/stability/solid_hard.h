@@ -32,6 +32,13 @@ static inline void solid_make(solid_scene *s, const solid_kind *kind, int nx, in
     if (held) solid_scene_hold(s, 2, 1e-6);
 }
 
+/* velocities of any direction for what is not held */
+static inline void solid_kick(solid_scene *s, double speed_m_s, uint64_t seed)
+{
+    for (int i = 0; i < 3 * s->body->n_dof; i++)
+        if (!s->body->held[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
+}
+
 /* elements that are turned over or flat in their middle */
 static inline int solid_inverted(const solid_scene *s)
 {
