@@ -83,8 +83,10 @@ typedef struct pal_body {
     double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
     double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
     double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
-    pal_rescues rescue;      /* since reset: what kept it within its bounds, and what that took         */
-    char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
+    double brake_1_s,
+        brake_s;        /* extra drag and for how long yet, after a change that puts work in (brake.h); 0: none */
+    pal_rescues rescue; /* since reset: what kept it within its bounds, and what that took         */
+    char why[PAL_WHY];  /* one sentence while frozen, else empty                                   */
 
     bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
     bool wants_compliance; /* a CONTACT row asks for it: set in its make; the SOLVE row is made after all others */

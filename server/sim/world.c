@@ -3,6 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/brake.h"
 #include "server/sim/field.h"
 #include "server/sim/plan.h"
 #include "server/sim/shell.h"
@@ -267,6 +268,7 @@ static void rest_body(pal_world *w, int b)
     if (body->outer) memset(body->outer, 0, n_load);
     pal_body_place(body);
     body->frozen = body->asleep = false;
+    body->brake_1_s = body->brake_s = 0;
     body->why[0] = 0;
     body->rescue = (pal_rescues){0};
     for (int i = 0; i < w->plan.n_row; i++) {
@@ -318,6 +320,17 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_n
     return PAL_ERR_OK;
 }
 
+/* stored in the rows of a body */
+static double row_energy_J(const pal_world *w, int b)
+{
+    double sum = 0;
+    for (int i = 0; i < w->plan.n_row; i++) {
+        const pal_row *row = &w->plan.row[i];
+        if (w->plan.row_body[i] == b && row->effect->energy) sum += row->effect->energy(row->self, &w->plan.body[b]);
+    }
+    return sum;
+}
+
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note)
 {
     if (body < 0 || body >= world->plan.n_body)
@@ -325,8 +338,12 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
     pal_material to = *material, was = world->material[body];
     PAL_TRY(pal_material_check(&to, note));
     world->plan.body[body].asleep = false;
+    /* asking rows for their energy may change what they keep: only where it may matter */
+    bool brakes = !world->plan.body[body].implicit && !world->plan.body[body].embed && to.young_Pa > 10 * was.young_Pa;
+    double before_J = brakes ? row_energy_J(world, body) : 0;
     pal_err err = apply_material(world, body, &to, note);
     if (!err) err = check_budget(world, note);
+    if (!err && brakes) pal_brake_begin(&world->plan.body[body], before_J, row_energy_J(world, body));
     /* constants are functions of the material, so putting the old one back puts everything back */
     if (err) (void)apply_material(world, body, &was, NULL);
     find_limit(world, 0);
@@ -603,6 +620,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     pal_tools_finish(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;
+    for (int b = 0; b < w->plan.n_body; b++) pal_brake_pass(&w->plan.body[b], dt_s);
     run_stage(w, PAL_STAGE_ADAPT, dt_s);
     run_stage(w, PAL_STAGE_GUARD, dt_s);
     run_stage(w, PAL_STAGE_OUTPUT, dt_s);
@@ -626,11 +644,8 @@ int pal_world_substeps(const pal_world *world)
 double pal_world_energy_J(const pal_world *world)
 {
     double sum = 0;
-    for (int b = 0; b < world->plan.n_body; b++) sum += pal_body_kinetic_J(&world->plan.body[b]);
-    for (int i = 0; i < world->plan.n_row; i++) {
-        const pal_row *row = &world->plan.row[i];
-        if (row->effect->energy) sum += row->effect->energy(row->self, &world->plan.body[world->plan.row_body[i]]);
-    }
+    for (int b = 0; b < world->plan.n_body; b++)
+        sum += pal_body_kinetic_J(&world->plan.body[b]) + row_energy_J(world, b);
     return sum;
 }
 

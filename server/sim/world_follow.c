@@ -81,6 +81,7 @@ static void follow_body(pal_world *w, int b, const pal_body *from, const double 
     to->frozen = from->frozen;
     memcpy(to->why, from->why, sizeof to->why);
     to->rescue = from->rescue;
+    to->brake_1_s = from->brake_1_s, to->brake_s = from->brake_s;
     pal_world_moved(w, b);
 }
 

@@ -1,12 +1,12 @@
 /* Solver verlet: v += dt f/m, x += dt v (paper B 4.1's Verlet in its velocity form, numerics.md 1 B).
  *
- * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks. The
- * sub-step is `safety` (key, 0.5) of the stability limit that Gershgorin's bound gives: with K and C the row sums of
- * stiffness and explicit damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node.
- * The bound is taken again at the current state whenever a node may have moved a fifth of an element since the last
- * time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a sub-step (numerics.md part 3).
- * Where the world cannot afford the sub-steps (step->heavy), the same inequality is met by adding mass to the nodes
- * that break it. */
+ * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks
+ * and of the body's brake (brake.h). The sub-step is `safety` (key, 0.5) of the stability limit that Gershgorin's bound
+ * gives: with K and C the row sums of stiffness and explicit damping, dt = safety * 2 t where t is the largest with t^2
+ * K + t C <= m at every free node. The bound is taken again at the current state whenever a node may have moved a fifth
+ * of an element since the last time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a
+ * sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality is met
+ * by adding mass to the nodes that break it. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
@@ -110,7 +110,7 @@ static pal_err run(void *self, pal_step *step)
 {
     verlet *row = self;
     pal_body *body = step->body;
-    double dt = step->dt_s, keep = 1 / (1 + dt * drag_rate(step)), most2 = 0, poison = 0;
+    double dt = step->dt_s, keep = 1 / (1 + dt * (drag_rate(step) + body->brake_1_s)), most2 = 0, poison = 0;
     double root = dt / (2 * row->safety);
     step->drag_apart = true;
     PAL_TRY(pal_gather(step));

@@ -1,0 +1,27 @@
+/* When a change of stiffness is braked, and how much. */
+#include "server/sim/brake.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+
+static const double least_speed_S_s = 1, least_rise = 10, still_periods = 8;
+
+void pal_brake_begin(pal_body *body, double before_J, double after_J)
+{
+    double mass = 0, way = 0, u[3];
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        if (body->held[i]) continue;
+        pal_sub3(u, body->x + 3 * i, body->x_rest + 3 * i);
+        mass += body->mass_kg[i];
+        way += body->mass_kg[i] * pal_dot3(u, u);
+    }
+    double most = least_speed_S_s * body->size_m, work = after_J - before_J;
+    if (!(after_J > least_rise * before_J * (1 + 1e-9))) return;
+    if (!(2 * work > most * most * mass) || !(way > 0) || !isfinite(work)) return;
+    double w = sqrt(2 * after_J / way);
+    /* one that is still at work goes on for as long as the stronger of both asks */
+    body->brake_1_s = fmax(body->brake_1_s, 2 * w);
+    body->brake_s = fmax(body->brake_s, still_periods / w);
+}
