@@ -113,6 +113,17 @@ pal_err pal_ease_rows_lag(pal_ease_rows *rows, pal_plan *plan, int body, const f
     return change(rows, plan, body, was && was->n_done == 0 ? was->force_N : NULL, lag_m, 1);
 }
 
+void pal_ease_rows_add(const pal_ease_rows *rows, int body, double scale, double *load)
+{
+    const ease *row = rows->self[body];
+    if (!row || row->n_done >= PAL_EASE_STEPS) return;
+    double share = scale * (double)(PAL_EASE_STEPS - row->n_done) / PAL_EASE_STEPS;
+    for (int k = 0; k < pal_body_nodes(row->body); k++) {
+        size_t i = 3 * (size_t)pal_body_point(row->body, k);
+        pal_axpy3(load + i, share, row->force_N + i);
+    }
+}
+
 void pal_ease_rows_tidy(pal_ease_rows *rows, pal_plan *plan)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++)

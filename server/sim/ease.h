@@ -26,6 +26,8 @@ pal_err pal_ease_rows_set(pal_ease_rows *rows, pal_plan *plan, int body, const d
 /* the way of what is shown [n_shown][3], m, copied; replaces one that is still being let go, begins together with the
  * load where that was set since the last step, else without one. MEMORY: what is shown jumps */
 pal_err pal_ease_rows_lag(pal_ease_rows *rows, pal_plan *plan, int body, const float *lag_m);
+/* scale times the load that acts in the next step, if one does: load [n_node][3] += it */
+void pal_ease_rows_add(const pal_ease_rows *rows, int body, double scale, double *load);
 void pal_ease_rows_tidy(pal_ease_rows *rows, pal_plan *plan); /* rows that have let go are taken out */
 void pal_ease_rows_free(pal_ease_rows *rows);                 /* memory only: after pal_plan_free */
 size_t pal_ease_rows_bytes(const pal_ease_rows *rows);

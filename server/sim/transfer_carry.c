@@ -44,6 +44,24 @@ static double elastic_J(pal_world *w, int body)
     return sum;
 }
 
+/* the same, and f and g are then those of all that pulls but tools: of what an earlier switch still lets go as well, so
+ * that one switch after the other takes nothing away at once */
+static double pulled_J(pal_world *w, int body)
+{
+    double sum = elastic_J(w, body);
+    pal_body *b = &w->plan.body[body];
+    if (!b->embed) {
+        pal_ease_rows_add(&w->eases, body, 1, b->f);
+        return sum;
+    }
+    double *eased = calloc(3 * (size_t)b->n_node + 1, sizeof *eased);
+    if (!eased) return sum;
+    pal_ease_rows_add(&w->eases, body, 1, eased);
+    pal_point_rows_pull(b->embed, eased, b->g);
+    free(eased);
+    return sum;
+}
+
 static double world_J(pal_world *w)
 {
     double sum = 0;
@@ -559,7 +577,7 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     pal_body *from = &old->plan.body[t->body], *to = &next->plan.body[t->body];
     size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
     *out = (pal_transfer_report){.energy_before_J = world_J(old), .scale = 1};
-    double elastic_before_J = elastic_J(old, t->body), kinetic_J = pal_body_kinetic_J(from);
+    double elastic_before_J = pulled_J(old, t->body), kinetic_J = pal_body_kinetic_J(from);
     double spare_J = SPARE * (elastic_before_J + kinetic_J);
     place_points(t, from, next);
     pal_world_follow(next, before, t->body, t->x, t->v);
@@ -608,7 +626,7 @@ bool pal_transfer_look(pal_transfer *t, const pal_world *before)
     if (t->shell || from->frozen || !make_seen(t, from)) return false;
     size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
     double *room = t->seen_room;
-    t->seen_J = elastic_J(old, t->body);
+    t->seen_J = pulled_J(old, t->body);
     t->seen = *from;
     t->seen.x = keep(&room, from->x, dof), t->seen.v = keep(&room, from->v, dof);
     t->seen.g = keep(&room, from->g, dof), t->seen.f = keep(&room, from->f, node);
