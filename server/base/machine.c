@@ -1,12 +1,17 @@
 /* The processor's name from the kernel's list, else the kind of machine. */
 #include "server/base/machine.h"
 
+#include "server/base/clock.h"
+
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
-enum { NAME = 96, LINE = 512 };
+enum { NAME = 96, LINE = 512, LANES = 16, READS = 3, MOST_READS = 400 };
+static const double least_byte = 1 << 16, most_byte = 32 << 20, read_for_ms = 2;
 
 /* shown characters, runs of blanks as one */
 static void take_name(const char *from, char out[NAME])
@@ -44,4 +49,25 @@ const char *pal_machine_name(char text[PAL_MACHINE_TEXT])
     else
         snprintf(text, PAL_MACHINE_TEXT, "%s", name);
     return text;
+}
+
+double pal_machine_read_ms(double n_byte)
+{
+    size_t n = (size_t)(fmin(fmax(n_byte, least_byte), most_byte) / sizeof(float)) / LANES * LANES;
+    float *value = malloc(n * sizeof *value), sum[LANES] = {0};
+    double least = INFINITY, all = 0;
+    if (!value) return 0;
+    for (size_t i = 0; i < n; i++) value[i] = (float)(i & 7);
+    for (int k = 0; k < READS || (k < MOST_READS && all < read_for_ms); k++) {
+        uint64_t began = pal_clock_thread_ns();
+        for (size_t i = 0; i < n; i += LANES)
+            for (int l = 0; l < LANES; l++) sum[l] += value[i + (size_t)l];
+        double ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
+        all += ms;
+        /* the first fetches it */
+        if (k > 0) least = fmin(least, ms);
+    }
+    free(value);
+    /* the sums are of use, so that they are made */
+    return sum[1] > 0 ? least / ((double)n * sizeof(float)) * n_byte : 0;
 }

@@ -20,24 +20,26 @@ typedef struct number_key {
     size_t at;
     double low, high;
     bool hole;
+    bool late; /* studies that were kept before it was there have 0 */
 } number_key;
 #define AT(field) offsetof(pal_study_point, field)
 static const number_key number[] = {
-    {"step_s", AT(priced.setting.step_s), 0, 0.1, false},
-    {"tolerance", AT(priced.setting.tolerance), 0, 1, false},
-    {"k_distance_J", AT(priced.setting.k_distance_J), 0, 1e300, false},
-    {"k_area_J", AT(priced.setting.k_area_J), -1, 1e300, false},
-    {"k_volume_J", AT(priced.setting.k_volume_J), 0, 1e300, false},
-    {"ms", AT(priced.ms), 0, 1e12, true},
-    {"error_m", AT(priced.error_m), 0, 1e300, true},
-    {"ms_p95", AT(ms_p95), 0, 1e12, true},
-    {"static_rms_m", AT(static_rms_m), 0, 1e300, true},
-    {"static_most_m", AT(static_most_m), 0, 1e300, true},
-    {"way_rms_m", AT(way_rms_m), 0, 1e300, true},
-    {"way_most_m", AT(way_most_m), 0, 1e300, true},
-    {"prepare_s", AT(prepare_s), 0, 1e12, true},
-    {"predicted_ms", AT(predicted_ms), 0, 1e300, true},
-    {"predicted_m", AT(predicted_m), 0, 1e300, true},
+    {"step_s", AT(priced.setting.step_s), 0, 0.1, false, false},
+    {"tolerance", AT(priced.setting.tolerance), 0, 1, false, false},
+    {"k_distance_J", AT(priced.setting.k_distance_J), 0, 1e300, false, false},
+    {"k_area_J", AT(priced.setting.k_area_J), -1, 1e300, false, false},
+    {"k_volume_J", AT(priced.setting.k_volume_J), 0, 1e300, false, false},
+    {"ms", AT(priced.ms), 0, 1e12, true, false},
+    {"error_m", AT(priced.error_m), 0, 1e300, true, false},
+    {"ms_p95", AT(ms_p95), 0, 1e12, true, false},
+    {"static_rms_m", AT(static_rms_m), 0, 1e300, true, false},
+    {"static_most_m", AT(static_most_m), 0, 1e300, true, false},
+    {"way_rms_m", AT(way_rms_m), 0, 1e300, true, false},
+    {"way_most_m", AT(way_most_m), 0, 1e300, true, false},
+    {"prepare_s", AT(prepare_s), 0, 1e12, true, false},
+    {"read_ms", AT(read_ms), 0, 1e12, false, true},
+    {"predicted_ms", AT(predicted_ms), 0, 1e300, true, false},
+    {"predicted_m", AT(predicted_m), 0, 1e300, true, false},
 };
 typedef struct text_key {
     const char *key;
@@ -278,8 +280,8 @@ static pal_err need(const pal_json *json, const cJSON *object, const char *path,
 /* null is NaN where that may be */
 static pal_err get_number(const pal_json *json, const cJSON *object, const char *path, const number_key *k, void *out)
 {
-    double value = NAN;
-    PAL_TRY(need(json, object, path, k->key));
+    double value = k->late ? 0 : (double)NAN;
+    if (!k->late) PAL_TRY(need(json, object, path, k->key));
     if (!k->hole || !cJSON_IsNull(cJSON_GetObjectItemCaseSensitive(object, k->key)))
         PAL_TRY(pal_json_number(json, object, path, k->key, k->low, k->high, &value));
     memcpy(out, &value, sizeof value);
@@ -369,10 +371,10 @@ static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file 
 {
     static const char *const known[] = {"format", "name", "machine", "reference", "reference_m", "most_m", "size_m",
                                         "step_s", "of",   "command", "n_all",     "whole",       "points", NULL};
-    static const number_key own[] = {{"reference_m", offsetof(pal_study, reference_m), 0, 1e300, true},
-                                     {"most_m", offsetof(pal_study, most_m), 0, 1e300, true},
-                                     {"size_m", offsetof(pal_study, size_m), 0, 1e300, true},
-                                     {"step_s", offsetof(pal_study, step_s), 0, 0.1, false}};
+    static const number_key own[] = {{"reference_m", offsetof(pal_study, reference_m), 0, 1e300, true, false},
+                                     {"most_m", offsetof(pal_study, most_m), 0, 1e300, true, false},
+                                     {"size_m", offsetof(pal_study, size_m), 0, 1e300, true, false},
+                                     {"step_s", offsetof(pal_study, step_s), 0, 0.1, false, false}};
     pal_study *s = &file->study;
     char word[32] = "";
     PAL_TRY(pal_json_object(json, root, "", known));

@@ -146,12 +146,14 @@ static pal_err study(pal_study_job *job)
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
     int n = err ? 0 : pal_study_list(job, wish);
-    bool whole = !err && all_known(job, wish, n);
+    /* with nothing left to measure the reference is asked for only where it costs nothing */
+    bool whole = !err && !job->options->recall && all_known(job, wish, n);
     if (!err && n == 0) err = pal_note_set(job->note, PAL_ERR_REFUSED, "no method of those asked for fits the body");
     if (whole) take_over(job->out, before);
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, wish, n);
+    if (!err && !whole) err = pal_study_time_again(job);
     /* also where nothing was left to measure: the one that was broken off may have been there */
     if (!err) err = pal_study_torture(job);
     pal_study_predict(job->out);

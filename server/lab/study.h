@@ -17,11 +17,12 @@
  * the coarse surface; or samples that the caller has. Deterministic but for the milliseconds and seconds. Swept are the
  * scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to 1/60 s, and
  * 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until they have
- * taken 50 ms together (1,200 steps at most). What is on the front is tortured shortly (study_torture.c); what fails
- * without its guard stopping it says so in its `why` and is not named. Calibrated springs keep a tenth of the volume
- * stiffness that the material gives, and are fitted to the reference under all loads but the last (the pull), which
- * judges them unseen; where there is one load only, the point's `why` says that it is judged by what it was fitted to,
- * and it is neither on the front nor picked. */
+ * taken 50 ms together (1,200 steps at most); when all is measured every way is gone twice more (quick: once), one
+ * setting after the other, and the least median counts, as other work on the machine only adds to it. What is on the
+ * front is tortured shortly (study_torture.c); what fails without its guard stopping it says so in its `why` and is not
+ * named. Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the
+ * reference under all loads but the last (the pull), which judges them unseen; where there is one load only, the
+ * point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor picked. */
 #ifndef PAL_LAB_STUDY_H
 #define PAL_LAB_STUDY_H
 #include "server/lab/sample_points.h"
@@ -41,6 +42,8 @@ typedef struct pal_study_point {
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
+    double read_ms; /* reading its solver's factor forwards and backwards, as fast as this machine reads as much as its
+                       world holds: known before it runs; 0: there is none */
     double predicted_ms, predicted_m; /* by the models of cost and error fitted to the OTHER points of its method, once
                                          all are there, and to what is counted before it runs (pal_study_foresee_cost);
                                          NaN: too few of them */
@@ -114,12 +117,12 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
  * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
 bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
 /* Cost foreseen for a setting that is made and has not run: of n_node nodes and n_substep sub-steps in a step of its
- * own at rest (body.h, pal_world_substeps). Known for that: what the other points of its model took, leave_out (-1:
- * none) being no part of them, with their knobs, nodes and sub-steps; of the setting its own knobs and these two
- * counts; no time of it. A step of its own is a + n_substep n_node r (study_cost.c). Of a surface that adapts
- * neither count is looked at, as how much of it is refined is not known before it runs: the share is that of what the
- * other levels refined, sub-steps are those of its finest level. false: fewer than three points of the model, none with
- * such an element, law or solver, or none that adapts */
+ * own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known for that: what
+ * the other points of its model took, leave_out (-1: none) being no part of them, with their knobs, nodes and
+ * sub-steps; of the setting its own knobs and these; no time of it. A step of its own is a + n_substep (n_node + c
+ * read_ms) r (study_cost.c). Of a surface that adapts neither count is looked at, as how much of it is refined is not
+ * known before it runs: the share is that of what the other levels refined, sub-steps are those of its finest level.
+ * false: fewer than three points of the model, none with such an element, law or solver, or none that adapts */
 bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, int n_substep,
-                            int leave_out, double *ms);
+                            double read_ms, int leave_out, double *ms);
 #endif

@@ -1,16 +1,17 @@
 /* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
  * it runs.
  *
- * A step of its own takes a + sub-steps nodes r: a is what a step takes whatever is solved (the skin above all), r what
- * a node takes in a sub-step, whose logarithm is a sum of what each knob adds and of what grows with the nodes (the
- * factor of an implicit solver, what no longer fits into caches). a and the sum are fitted to the others by least
- * squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
+ * A step of its own takes a + sub-steps (nodes + c q) r: a is what a step takes whatever is solved (the skin above
+ * all), q the time of reading its solver's factor on this machine (what no longer fits into caches is read
+ * slower), r what a node takes in a sub-step, whose logarithm is a sum of what each knob adds and of what grows with
+ * the nodes. a, c and the sum are fitted to the others by least squares of logarithms; what the sum misses at those
+ * that are near in knobs and nodes is taken off. */
 #include "server/lab/study_parts.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40 };
+enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40, RATES = 16 };
 /* weight of "no effect" for each knob; of "off by nothing" beside settings that are near */
 static const double ridge = 3e-2, trust = 0.1;
 /* so many knobs that stand otherwise are as far as e times the nodes */
@@ -19,11 +20,12 @@ static const double knobs_per_e = 4, whole_nodes = 1000;
 typedef struct seen {
     const pal_setting *setting;
     double n_node, n_substep, ms; /* of a step of its own */
+    double read_ms;
     double f[FEATURES];
 } seen;
 
 typedef struct cost_law {
-    double a, w[FEATURES], misfit;
+    double a, c, w[FEATURES], misfit; /* c: nodes a ms of reading */
 } cost_law;
 
 static void features(const pal_setting *s, double n_node, double f[FEATURES])
@@ -65,26 +67,32 @@ static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
     }
 }
 
-static double node_ms(const seen *p, double a)
+/* sub-steps times what stands for its nodes */
+static double work_of(const seen *p, double c)
 {
-    return (p->ms - a) / (p->n_substep * p->n_node);
+    return p->n_substep * (p->n_node + c * p->read_ms);
 }
 
-/* the best sum for an a below all costs */
-static cost_law fit(const seen *p, int n, double a)
+static double node_ms(const seen *p, double a, double c)
+{
+    return (p->ms - a) / work_of(p, c);
+}
+
+/* the best sum for an a below all costs and a rate */
+static cost_law fit(const seen *p, int n, double a, double c)
 {
     double A[FEATURES][FEATURES + 1] = {{0}};
-    cost_law law = {.a = a};
+    cost_law law = {.a = a, .c = c};
     for (int i = 0; i < n; i++) {
-        double y = log(node_ms(&p[i], a));
+        double y = log(node_ms(&p[i], a, c));
         for (int r = 0; r < FEATURES; r++) {
-            for (int c = 0; c < FEATURES; c++) A[r][c] += p[i].f[r] * p[i].f[c];
+            for (int k = 0; k < FEATURES; k++) A[r][k] += p[i].f[r] * p[i].f[k];
             A[r][FEATURES] += p[i].f[r] * y;
         }
     }
     solve(A, law.w);
     for (int i = 0; i < n; i++) {
-        double off = log((a + p[i].n_substep * p[i].n_node * exp(sum_of(law.w, p[i].f))) / p[i].ms);
+        double off = log((a + work_of(&p[i], c) * exp(sum_of(law.w, p[i].f))) / p[i].ms);
         law.misfit += off * off;
     }
     for (int r = 1; r < FEATURES; r++) law.misfit += ridge * law.w[r] * law.w[r];
@@ -92,27 +100,40 @@ static cost_law fit(const seen *p, int n, double a)
 }
 
 /* a between nothing and what the cheapest step took: the best of a grid, then by golden section around it */
-static cost_law best_fit(const seen *p, int n)
+static cost_law best_overhead(const seen *p, int n, double c)
 {
     const double g = 0.6180339887498949;
     double most = INFINITY;
     for (int i = 0; i < n; i++) most = fmin(most, p[i].ms);
     most *= 0.999;
-    cost_law best = fit(p, n, 0);
+    cost_law best = fit(p, n, 0, c);
     for (int k = 1; k <= GRID; k++) {
-        cost_law next = fit(p, n, most * k / GRID);
+        cost_law next = fit(p, n, most * k / GRID, c);
         if (next.misfit < best.misfit) best = next;
     }
     double low = fmax(best.a - most / GRID, 0), high = fmin(best.a + most / GRID, most);
     for (int k = 0; k < GOLDEN; k++) {
         double p_at = high - g * (high - low), q_at = low + g * (high - low);
-        cost_law at = fit(p, n, p_at), other = fit(p, n, q_at);
+        cost_law at = fit(p, n, p_at, c), other = fit(p, n, q_at, c);
         if (at.misfit < other.misfit)
             high = q_at;
         else
             low = p_at;
         if (at.misfit < best.misfit) best = at;
         if (other.misfit < best.misfit) best = other;
+    }
+    return best;
+}
+
+/* reading may weigh nothing, or up to as much as all else together in the body that is read slowest, and more */
+static cost_law best_fit(const seen *p, int n)
+{
+    double most = 0;
+    for (int i = 0; i < n; i++) most = fmax(most, p[i].read_ms / p[i].n_node);
+    cost_law best = best_overhead(p, n, 0);
+    for (int k = 0; k < RATES && most > 0; k++) {
+        cost_law next = best_overhead(p, n, exp2(k - RATES / 2) / most);
+        if (next.misfit < best.misfit) best = next;
     }
     return best;
 }
@@ -198,8 +219,8 @@ static bool has_words(const seen *p, int n, const pal_setting *s)
     return element && law && solver;
 }
 
-bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, int n_substep, int leave_out,
-                            double *ms)
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, int n_substep, double read_ms,
+                            int leave_out, double *ms)
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;
@@ -209,7 +230,8 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];
         if (!counts(study, i, leave_out, s)) continue;
-        p[n] = (seen){.setting = &q->priced.setting, .n_node = q->n_node, .n_substep = q->n_substep};
+        p[n] = (seen){
+            .setting = &q->priced.setting, .n_node = q->n_node, .n_substep = q->n_substep, .read_ms = q->read_ms};
         p[n].ms = q->priced.ms * q->priced.setting.step_s / study->step_s;
         features(p[n].setting, p[n].n_node, p[n].f);
         n++;
@@ -218,11 +240,12 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     cost_law law = best_fit(p, n);
     for (int i = 0; i < n; i++) {
         double near = exp2(-2 * distance(&p[i], s, nodes));
-        off += near * (log(node_ms(&p[i], law.a)) - sum_of(law.w, p[i].f));
+        off += near * (log(node_ms(&p[i], law.a, law.c)) - sum_of(law.w, p[i].f));
         weight += near;
     }
     double f[FEATURES];
     features(s, nodes, f);
-    *ms = (law.a + substeps * nodes * exp(sum_of(law.w, f) + off / weight)) * study->step_s / s->step_s;
+    *ms = (law.a + substeps * (nodes + law.c * read_ms) * exp(sum_of(law.w, f) + off / weight)) * study->step_s /
+          s->step_s;
     return true;
 }

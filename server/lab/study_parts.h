@@ -120,6 +120,10 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
 pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
                       pal_study_point *facts, pal_note *note);
 
+/* study_run.c: milliseconds of every setting once more, at other moments of the machine: the least median counts;
+ * STATE: stopped */
+pal_err pal_study_time_again(pal_study_job *job);
+
 /* study_torture.c: takes off the front what is not there any more after being mistreated, and says so in its `why`;
  * STATE: stopped */
 pal_err pal_study_torture(pal_study_job *job);

@@ -2,18 +2,19 @@
 #include "server/session/estimate_price.h"
 
 #include "server/base/clock.h"
+#include "server/base/machine.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { TIMED = 15, LANES = 16, READS = 3 };
+enum { TIMED = 15 };
 /* of a step's time with fewer nodes; of the factor's entries with more */
 static const double least_growth = 0.6, most_growth = 2.2, least_fill = 1.1, most_fill = 1.6;
 /* the factor's share of a sub-step at most; power of iterations with nodes */
 static const double most_factor = 0.7, most_more = 0.15;
-/* an entry is a float, read forwards and backwards; more than the last would be read no slower */
-static const double entry_byte = 4, entry_reads = 2, least_byte = 1 << 16, most_byte = 32 << 20;
+/* an entry is a float, read forwards and backwards */
+static const double entry_byte = 4, entry_reads = 2;
 
 static int rising(const void *a, const void *b)
 {
@@ -50,25 +51,6 @@ static bool time_steps(pal_world *const world[2], double step_s, double out[2], 
     return out[0] > 0 && out[1] > 0;
 }
 
-/* reading of a byte of so many, ms; 0: no memory to find out */
-static double read_ms(double n_byte)
-{
-    size_t n = (size_t)(fmin(fmax(n_byte, least_byte), most_byte) / sizeof(float)) / LANES * LANES;
-    float *value = calloc(n, sizeof *value), sum[LANES] = {0};
-    double least = INFINITY;
-    if (!value) return 0;
-    for (size_t i = 0; i < n; i++) value[i] = (float)(i & 7);
-    for (int k = 0; k < READS; k++) {
-        uint64_t began = pal_clock_thread_ns();
-        for (size_t i = 0; i < n; i += LANES)
-            for (int l = 0; l < LANES; l++) sum[l] += value[i + (size_t)l];
-        least = fmin(least, 1e-6 * (double)(pal_clock_thread_ns() - began));
-    }
-    free(value);
-    /* the sums are of use, so that they are made */
-    return sum[1] > 0 ? least / ((double)n * sizeof(float)) : 0;
-}
-
 static void count(const pal_scene *scene, double limit_s, pal_foresight *out)
 {
     pal_setting at = out->setting;
@@ -87,13 +69,13 @@ static double grown(const pal_solve_report report[2], const double n_cg[2], doub
 {
     double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
     fill = fmin(fmax(fill, least_fill), most_fill);
-    double times = pow(nodes, fill), rate = read_ms(entry_byte * entries),
-           slower = read_ms(entry_byte * entries * times);
-    double factor_ms = fmin(n_cg[1] * entries * entry_byte * entry_reads * rate, most_factor * fine_ms);
+    double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
+           then = pal_machine_read_ms(entry_byte * entries * times);
+    double factor_ms = fmin(n_cg[1] * entry_reads * now, most_factor * fine_ms);
     /* finer meshes need a few more iterations */
     double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), most_more) : 0;
-    if (!(rate > 0 && slower > 0)) return nodes;
-    return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * times * fmax(slower / rate, 1)) / fine_ms;
+    if (!(now > 0 && then > 0)) return nodes;
+    return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * fmax(then / now, times)) / fine_ms;
 }
 
 void pal_estimate_price(const pal_scene *scene, pal_world *live, pal_world *small, pal_foresight *out)

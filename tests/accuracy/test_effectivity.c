@@ -3,7 +3,8 @@
  * is three times as fine; in energy that of Zienkiewicz and Zhu over the error of the work of the loads, which
  * for elements that fit together and the linear law is the square of the error in energy, and for B-bar, whose stress
  * is not that of its displacement, over the distance of its stress from that of a finer mesh. The estimate is the one
- * of a running session (session/estimate_work.h). Where elements lock the estimate is too small, and says so. */
+ * of a running session (session/estimate_work.h). Where elements lock the estimate is too small, and says so; where
+ * many voxels are cut it says that it holds within a factor of 3. */
 #include "server/lab/load_case.h"
 #include "server/lab/sample_points.h"
 #include "server/mesh/mesh_file.h"
@@ -19,7 +20,8 @@ typedef struct row {
     double work_J; /* the reference's (work_f_dot_u of its file); 0: not compared                           */
     int finer;     /* the truth is a mesh of our own, so many times as fine: of stress, and of displacement
                     * where there is no reference; 0: none */
-    bool locks;
+    bool locks,
+        cut; /* cut: many voxels are, whose part goes up and down from mesh to mesh: a factor of 3 is asked for */
 } row;
 
 /* one problem, one of its cases and one material */
@@ -266,8 +268,9 @@ static void compare(const subject *s, const pal_samples *samples)
         /* references are neo-Hookean where bodies bend far: what another law makes of it is part of the error */
         double said_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
         tell(r, &e, said_m, true_m, percent);
-        CHECK(e.locking == r->locks);
-        CHECK(r->locks || (said_m >= 0.5 * true_m && said_m <= 2 * true_m));
+        double most = r->cut ? 3 : 2;
+        CHECK(e.locking == r->locks && (strstr(e.note, "voxels are cut") != NULL) == r->cut);
+        CHECK(r->locks || (said_m >= true_m / most && said_m <= most * true_m));
         CHECK(percent == 0 || r->locks || (e.zz_percent >= 0.5 * percent && e.zz_percent <= 2 * percent));
         CHECK(isfinite(e.time_m) && isfinite(e.algebraic_m) && e.error_m >= e.discretisation_m);
     }
@@ -312,11 +315,11 @@ static void check_rows(const char *file, const row *r, int n)
 static void beam_nu_030(void)
 {
     static const row rows[] = {
-        {"linear_nu030", "linear", "hex8_bbar", 16, 0.00330122, 3, false},
-        {"linear_nu030", "linear", "hex8", 16, 0.00330122, 0, false},
-        {"linear_nu030", "linear", "tet4", 16, 0.00330122, 0, false},
-        {"linear_nu030", "linear", "tet10", 8, 0.00330122, 0, false},
-        {"nh_nu030", "neo_hookean", "hex8_bbar", 16, 0, 0, false},
+        {"linear_nu030", "linear", "hex8_bbar", 16, 0.00330122, 3, false, false},
+        {"linear_nu030", "linear", "hex8", 16, 0.00330122, 0, false, false},
+        {"linear_nu030", "linear", "tet4", 16, 0.00330122, 0, false, false},
+        {"linear_nu030", "linear", "tet10", 8, 0.00330122, 0, false, false},
+        {"nh_nu030", "neo_hookean", "hex8_bbar", 16, 0, 0, false, false},
     };
     CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
 }
@@ -324,11 +327,11 @@ static void beam_nu_030(void)
 static void beam_nu_045(void)
 {
     static const row rows[] = {
-        {"linear_nu045", "linear", "hex8_bbar", 16, 0.00324425, 3, false},
-        {"linear_nu045", "linear", "hex8", 16, 0.00324425, 0, false},
-        {"linear_nu045", "linear", "tet4", 16, 0.00324425, 0, false},
-        {"nh_nu045", "neo_hookean", "hex8_bbar", 16, 0, 0, false},
-        {"nh_nu045", "corotational", "hex8_bbar", 16, 0, 0, false},
+        {"linear_nu045", "linear", "hex8_bbar", 16, 0.00324425, 3, false, false},
+        {"linear_nu045", "linear", "hex8", 16, 0.00324425, 0, false, false},
+        {"linear_nu045", "linear", "tet4", 16, 0.00324425, 0, false, false},
+        {"nh_nu045", "neo_hookean", "hex8_bbar", 16, 0, 0, false, false},
+        {"nh_nu045", "corotational", "hex8_bbar", 16, 0, 0, false, false},
     };
     CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
 }
@@ -336,8 +339,8 @@ static void beam_nu_045(void)
 static void finer_beams(void)
 {
     static const row rows[] = {
-        {"linear_nu030", "linear", "hex8_bbar", 32, 0, 0, false},
-        {"linear_nu045", "linear", "hex8_bbar", 32, 0, 0, false},
+        {"linear_nu030", "linear", "hex8_bbar", 32, 0, 0, false, false},
+        {"linear_nu045", "linear", "hex8_bbar", 32, 0, 0, false, false},
     };
     CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
 }
@@ -345,31 +348,36 @@ static void finer_beams(void)
 static void cube_nu_0499(void)
 {
     static const row rows[] = {
-        {"linear", "linear", "hex8_bbar", 8, 0.0437455, 0, false},
-        {"linear", "linear", "hex8", 8, 0.0437455, 0, true},
-        {"linear", "linear", "tet4", 8, 0.0437455, 0, true},
+        {"linear", "linear", "hex8_bbar", 8, 0.0437455, 0, false, false},
+        {"linear", "linear", "hex8", 8, 0.0437455, 0, true, false},
+        {"linear", "linear", "tet4", 8, 0.0437455, 0, true, false},
+        {"linear", "linear", "hex8_bbar", 16, 0.0437455, 0, false, false},
     };
     CHECK_ROWS(check_shared("reference/cube/problem.json"), rows);
 }
 
 static void gear(void)
 {
-    static const row rows[] = {{"twist_linear", "linear", "hex8_bbar", 20, 0, 0, false}};
+    static const row rows[] = {
+        {"twist_linear", "linear", "hex8_bbar", 15, 0, 0, false, true},
+        {"twist_linear", "linear", "hex8_bbar", 20, 0, 0, false, true},
+        {"twist_linear", "linear", "hex8_bbar", 30, 0, 0, false, true},
+    };
     CHECK_ROWS(check_shared("reference/gear/problem.json"), rows);
 }
 
 /* needs no reference */
 static void own_beam(void)
 {
-    static const row rows[] = {{"tip", "linear", "hex8_bbar", 32, 0, 3, false}};
+    static const row rows[] = {{"tip", "linear", "hex8_bbar", 32, 0, 3, false, false}};
     CHECK_ROWS("deploy/problems/beam.json", rows);
 }
 
 static void own_bar(void)
 {
     static const row rows[] = {
-        {"bend", "linear", "hex8_bbar", 16, 0, 3, false},
-        {"twist_pull", "linear", "hex8_bbar", 16, 0, 3, false},
+        {"bend", "linear", "hex8_bbar", 16, 0, 3, false, false},
+        {"twist_pull", "linear", "hex8_bbar", 16, 0, 3, false, false},
     };
     CHECK_ROWS("deploy/problems/bar.json", rows);
 }

@@ -165,15 +165,15 @@ static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
         int nodes = 50 + 400 * k, substeps = 1 + 7 * k;
         pal_setting at = s->point[k % 2].priced.setting;
         s->point[8].err = PAL_ERR_FROZEN;
-        CHECK(pal_study_foresee_cost(s, &at, nodes, substeps, 7, &ms));
+        CHECK(pal_study_foresee_cost(s, &at, nodes, substeps, 0, 7, &ms));
         CHECK_NEAR(ms / ((overhead + node * nodes * substeps) * s->step_s / at.step_s), 1, 1e-4);
     }
     pal_setting at = s->point[0].priced.setting;
-    CHECK(!pal_study_foresee_cost(s, &at, 0, 3, -1, &ms) && !pal_study_foresee_cost(s, &at, 300, 0, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 0, 3, 0, -1, &ms) && !pal_study_foresee_cost(s, &at, 300, 0, 0, -1, &ms));
     snprintf(at.element, PAL_NAME, "tet10");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, 0, -1, &ms));
     snprintf(at.model, PAL_NAME, "fem");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, 0, -1, &ms));
     free(s);
 }
 
@@ -195,11 +195,11 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
             bool adapts = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
             CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node,
-                                         adapts ? told / 100 : p->n_substep, i, &ms));
+                                         adapts ? told / 100 : p->n_substep, 0, i, &ms));
             CHECK_NEAR(ms / p->priced.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
-    CHECK(!pal_study_foresee_cost(s, &s->point[1].priced.setting, 248, 24, 1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &s->point[1].priced.setting, 248, 24, 0, 1, &ms));
     free(s);
 }
 

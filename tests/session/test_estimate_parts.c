@@ -120,7 +120,8 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
         CHECK(k ? e.algebraic_m == 0 : e.algebraic_m > 0);
         CHECK(!e.locking);
         CHECK_NEAR(e.ms, 3, 0);
-        CHECK_TEXT(e.note, "");
+        /* eight voxels across, four, two: there is no order in what these change */
+        CHECK_TEXT(e.note, "discretisation: still grows from mesh to mesh, so more may be left");
         CHECK_INT(e.n_neighbour, k ? 2 : 6);
         CHECK_INT(e.neighbour[0].setting.size, 4);
         CHECK_INT(e.neighbour[1].setting.size, 16);
