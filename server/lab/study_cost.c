@@ -1,17 +1,17 @@
 /* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
  * it runs.
  *
- * A step of its own takes a + sub-steps (nodes + c q) r: a is what a step takes whatever is solved (the skin above
- * all), q the time of reading its solver's factor on this machine (what no longer fits into caches is read
- * slower), r what a node takes in a sub-step, whose logarithm is a sum of what each knob adds and of what grows with
- * the nodes. a, c and the sum are fitted to the others by least squares of logarithms; what the sum misses at those
- * that are near in knobs and nodes is taken off. */
+ * A step of its own takes a + sub-steps (nodes e + c q) r: a is what a step takes whatever is solved (the skin above
+ * all), e what an element takes beside others, q the time of reading its solver's factor on this machine (what no
+ * longer fits into caches is read slower), r what a node takes in a sub-step, whose logarithm is a sum of what each
+ * knob adds and of what grows with the nodes. a, c and the sum are fitted to the others by least squares of logarithms;
+ * what the sum misses at those that are near in knobs and nodes is taken off. */
 #include "server/lab/study_parts.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40, RATES = 16 };
+enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
 /* weight of "no effect" for each knob; of "off by nothing" beside settings that are near */
 static const double ridge = 3e-2, trust = 0.1;
 /* so many knobs that stand otherwise are as far as e times the nodes */
@@ -44,13 +44,6 @@ static void features(const pal_setting *s, double n_node, double f[FEATURES])
     f[17] = 0.5 * f[8] * n, f[18] = 0.5 * f[11] * n, f[19] = 0.5 * f[12] * n;
 }
 
-static double sum_of(const double w[FEATURES], const double f[FEATURES])
-{
-    double sum = 0;
-    for (int r = 0; r < FEATURES; r++) sum += w[r] * f[r];
-    return sum;
-}
-
 /* (F'F + ridge) w = F'y by elimination; the constant is not held back */
 static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
 {
@@ -67,73 +60,93 @@ static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
     }
 }
 
-/* sub-steps times what stands for its nodes */
-static double work_of(const seen *p, double c)
+/* elements are nothing to a factor but its entries, which are counted; nor is a law that turns nothing */
+static bool is_of_elements(int feature)
 {
-    return p->n_substep * (p->n_node + c * p->read_ms);
+    return feature == 6 || feature == 7 || feature == 8 || feature == 10 || feature == 17;
 }
 
-static double node_ms(const seen *p, double a, double c)
+/* what all sub-steps of a step take; *share: of it what goes with the elements */
+static double work_ms(const cost_law *law, const seen *p, double *share)
 {
-    return (p->ms - a) / work_of(p, c);
+    double sum = 0, own = 0;
+    for (int r = 0; r < FEATURES; r++) *(is_of_elements(r) ? &own : &sum) += law->w[r] * p->f[r];
+    double nodes = p->n_node * exp(own), all = nodes + law->c * p->read_ms;
+    *share = nodes / all;
+    return p->n_substep * all * exp(sum);
 }
 
 /* the best sum for an a below all costs and a rate */
 static cost_law fit(const seen *p, int n, double a, double c)
 {
-    double A[FEATURES][FEATURES + 1] = {{0}};
     cost_law law = {.a = a, .c = c};
-    for (int i = 0; i < n; i++) {
-        double y = log(node_ms(&p[i], a, c));
-        for (int r = 0; r < FEATURES; r++) {
-            for (int k = 0; k < FEATURES; k++) A[r][k] += p[i].f[r] * p[i].f[k];
-            A[r][FEATURES] += p[i].f[r] * y;
+    double share;
+    /* without reading it is linear in the logarithm; with it Gauss and Newton's way there is short */
+    for (int round = 0; round < (c > 0 ? ROUNDS : 1); round++) {
+        double A[FEATURES][FEATURES + 1] = {{0}};
+        for (int i = 0; i < n; i++) {
+            double slope[FEATURES], y = log((p[i].ms - a) / work_ms(&law, &p[i], &share));
+            for (int r = 0; r < FEATURES; r++) {
+                slope[r] = p[i].f[r] * (is_of_elements(r) ? share : 1);
+                y += slope[r] * law.w[r];
+            }
+            for (int r = 0; r < FEATURES; r++) {
+                for (int k = 0; k < FEATURES; k++) A[r][k] += slope[r] * slope[k];
+                A[r][FEATURES] += slope[r] * y;
+            }
         }
+        solve(A, law.w);
     }
-    solve(A, law.w);
     for (int i = 0; i < n; i++) {
-        double off = log((a + work_of(&p[i], c) * exp(sum_of(law.w, p[i].f))) / p[i].ms);
+        double off = log((a + work_ms(&law, &p[i], &share)) / p[i].ms);
         law.misfit += off * off;
     }
     for (int r = 1; r < FEATURES; r++) law.misfit += ridge * law.w[r] * law.w[r];
     return law;
 }
 
-/* a between nothing and what the cheapest step took: the best of a grid, then by golden section around it */
-static cost_law best_overhead(const seen *p, int n, double c)
+static double cheapest(const seen *p, int n)
 {
-    const double g = 0.6180339887498949;
-    double most = INFINITY;
-    for (int i = 0; i < n; i++) most = fmin(most, p[i].ms);
-    most *= 0.999;
+    double least = INFINITY;
+    for (int i = 0; i < n; i++) least = fmin(least, p[i].ms);
+    return 0.999 * least;
+}
+
+/* a between nothing and what the cheapest step took: the best of a grid */
+static cost_law on_grid(const seen *p, int n, double c, int grid)
+{
+    double most = cheapest(p, n);
     cost_law best = fit(p, n, 0, c);
-    for (int k = 1; k <= GRID; k++) {
-        cost_law next = fit(p, n, most * k / GRID, c);
+    for (int k = 1; k <= grid; k++) {
+        cost_law next = fit(p, n, most * k / grid, c);
         if (next.misfit < best.misfit) best = next;
     }
+    return best;
+}
+
+/* c of nothing, or up to where reading weighs more than all else in the body that is read slowest; then a by golden
+ * section */
+static cost_law best_fit(const seen *p, int n)
+{
+    const double g = 0.6180339887498949;
+    double slowest = 0, most = cheapest(p, n);
+    for (int i = 0; i < n; i++) slowest = fmax(slowest, p[i].read_ms / p[i].n_node);
+    cost_law best = on_grid(p, n, 0, GRID);
+    for (int k = 0; k < RATES && slowest > 0; k++) {
+        cost_law next = on_grid(p, n, exp2(k - RATES / 2) / slowest, ROUGH);
+        if (next.misfit < best.misfit) best = next;
+    }
+    if (best.c > 0) best = on_grid(p, n, best.c, GRID);
     double low = fmax(best.a - most / GRID, 0), high = fmin(best.a + most / GRID, most);
     for (int k = 0; k < GOLDEN; k++) {
         double p_at = high - g * (high - low), q_at = low + g * (high - low);
-        cost_law at = fit(p, n, p_at, c), other = fit(p, n, q_at, c);
+        cost_law at = fit(p, n, p_at, best.c), other = fit(p, n, q_at, best.c);
         if (at.misfit < other.misfit)
             high = q_at;
         else
             low = p_at;
         if (at.misfit < best.misfit) best = at;
         if (other.misfit < best.misfit) best = other;
-    }
-    return best;
-}
-
-/* reading may weigh nothing, or up to as much as all else together in the body that is read slowest, and more */
-static cost_law best_fit(const seen *p, int n)
-{
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, p[i].read_ms / p[i].n_node);
-    cost_law best = best_overhead(p, n, 0);
-    for (int k = 0; k < RATES && most > 0; k++) {
-        cost_law next = best_overhead(p, n, exp2(k - RATES / 2) / most);
-        if (next.misfit < best.misfit) best = next;
     }
     return best;
 }
@@ -224,7 +237,7 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;
-    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
+    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust, share;
     double substeps = adapts(s) ? finest_substeps(study, leave_out, s) : n_substep;
     if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
     for (int i = 0; i < study->n_point; i++) {
@@ -240,12 +253,11 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     cost_law law = best_fit(p, n);
     for (int i = 0; i < n; i++) {
         double near = exp2(-2 * distance(&p[i], s, nodes));
-        off += near * (log(node_ms(&p[i], law.a, law.c)) - sum_of(law.w, p[i].f));
+        off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], &share));
         weight += near;
     }
-    double f[FEATURES];
-    features(s, nodes, f);
-    *ms = (law.a + substeps * (nodes + law.c * read_ms) * exp(sum_of(law.w, f) + off / weight)) * study->step_s /
-          s->step_s;
+    seen own = {.setting = s, .n_node = nodes, .n_substep = substeps, .read_ms = read_ms};
+    features(s, nodes, own.f);
+    *ms = (law.a + work_ms(&law, &own, &share) * exp(off / weight)) * study->step_s / s->step_s;
     return true;
 }
