@@ -79,7 +79,7 @@ static void take_rest(pal_elastic_tets *t, double h_m)
 pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *build, pal_elastic_tets *out)
 {
     const pal_body *body = build->body;
-    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest};
+    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .held = body->held};
     out->n_point = wish->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));
@@ -95,8 +95,9 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *buil
     out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(wish->n_corner) * (size_t)wish->n_tet);
     out->flag = PAL_NEW(build->arena, uint8_t, wish->n_tet);
     if (wish->untangle) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
+    if (wish->untangle) out->seen = PAL_NEW(build->arena, double, 3 * body->n_node);
     if (!out->inverse || !out->volume_m3 || !out->stiff || !out->turn || !out->tangent || !out->bound ||
-        !out->inverted || !out->entry || !out->flag || (wish->untangle && !out->around))
+        !out->inverted || !out->entry || !out->flag || (wish->untangle && (!out->around || !out->seen)))
         return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_parts_make(build, wish->tet, wish->n_tet, wish->n_corner, 4, &out->parts));
     take_rest(out, body->h_m);
@@ -110,7 +111,8 @@ void pal_elastic_tets_reset(pal_elastic_tets *t)
     memset(t->turn, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
     for (int b = 0; b < t->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) t->turn[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
-    t->n_inverted = t->n_slow = 0;
+    t->n_inverted = t->n_slow = t->n_look = 0;
+    t->straight = false;
 }
 
 /* gradients of the shape functions, dN_a/dX, turned by r (NULL: as at rest) */
@@ -289,6 +291,7 @@ static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block
 void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_blocks *to)
 {
     if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
+    if (t->straight) k *= t->soft;
     for (int e = 0; e < t->wish.n_tet; e++) {
         if (*lane_at(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
         if (t->wish.law == PAL_LAW_NEO_HOOKEAN)

@@ -11,6 +11,11 @@
  * its own where there are none. It costs nothing while no element is inverted; while one is, the net torque of the
  * borrowed rotations is taken back by small forces on all nodes, so that a free body does not turn itself.
  *
+ * Straightening (corotational, elastic_tet_straight.c): one rotation an element has rests that are none of the body, in
+ * which a folded one would stay for good, or which it leaves by rounding alone. A body that `look` finds at such a rest
+ * takes one rotation for all of its elements, that of what is held (of all its nodes where nothing is): the energy is
+ * then quadratic with no other minimum than the shape at rest. Moduli are lowered so that energy does not jump.
+ *
  * An element with less than 1e-6 h^3 of volume at rest is left out. Memory: the world's arena. Thread: [load] to make,
  * then [sim]. */
 #ifndef PAL_SIM_ELASTIC_TET_H
@@ -45,6 +50,7 @@ typedef struct pal_elastic_tets {
     int32_t *owner;  /* element of each lane, -1: none                     [n_block][8]      */
     pal_elastic_parts parts;
     const double *x_rest; /* borrowed [n_node][3]                     */
+    const uint8_t *held;  /* borrowed [n_node]                        */
     double *inverse;      /* local from rest coordinates, dl/dX       [n_block][9][8]  */
     double *volume_m3;    /* fill times volume at rest, 0: left out   [n_block][8]     */
     double *stiff;        /* volume times mu and lambda               [n_block][2][8]  */
@@ -57,6 +63,10 @@ typedef struct pal_elastic_tets {
     const int32_t *entry_row;
     const pal_blocks *entry_of;
     uint8_t *flag; /* zero between calls [n_tet] */
+    bool straight; /* all elements turn as one ...                                 */
+    double soft;   /* ... and their moduli are this share of what they are          */
+    double *seen;  /* where the nodes were `n_look` looks ago; untangle     [n_node][3] */
+    int n_look;
     int n_inverted;
     int n_slow; /* rotations that vectors could not settle at the last force or linearise */
 } pal_elastic_tets;
@@ -66,6 +76,9 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *buil
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material);
 /* turns to identity */
 void pal_elastic_tets_reset(pal_elastic_tets *t);
+/* a body under an implicit solver is about to linearise while it is tangled and runs on t: straightens it when it has
+ * not moved for long and nothing presses it; true: from now on */
+bool pal_elastic_tets_look(pal_elastic_tets *t, const pal_body *body);
 /* f += force at positions d, both [n_node][3]; takes the rotations */
 void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f);
 /* J; takes the rotations. f: forces are added as by ..force; NULL: none */

@@ -127,4 +127,12 @@ static inline void pal_lane_put(double *array, int width, int place, int k, doub
 
 /* neo_hookean: the tangent at d. [sim] */
 void pal_elastic_tets_modes(pal_elastic_tets *t, const double *d);
+/* one element of a corotational law with the rotation it holds: returns its energy; force (NULL: none) [n_node][3] and
+ * torque about the origin are added to */
+double pal_tet_add_one(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque);
+/* f -= forces without sum that have this torque: what borrowed rotations turn, the body as a whole turns back */
+void pal_tet_give_back(const pal_elastic_tets *t, const double *d, const double torque[3], double *f);
+/* the whole of a body that is straightened */
+double pal_tet_straight(const pal_elastic_tets *t, const double *d, double *f);
+void pal_tet_straight_turn(pal_elastic_tets *t, const double *d);
 #endif

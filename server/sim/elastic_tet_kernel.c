@@ -301,12 +301,12 @@ void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, cons
 }
 
 /* force, its torque about the origin, and energy of a corotational element with the rotation it holds */
-static double add_one(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
+double pal_tet_add_one(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
 {
     double r[9], f[9], p[9], sum = 0;
     pal_elastic_tets_rotation(t, e, r);
-    double mu = pal_lane_of(t->stiff, 2, t->place[e], 0) / t->n_point,
-           lambda = pal_lane_of(t->stiff, 2, t->place[e], 1) / t->n_point;
+    double share = (t->straight ? t->soft : 1) / t->n_point, mu = share * pal_lane_of(t->stiff, 2, t->place[e], 0),
+           lambda = share * pal_lane_of(t->stiff, 2, t->place[e], 1);
     const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
     for (int g = 0; g < t->n_point; g++) {
         pal_elastic_tets_gradient(t, e, g, d, f);
@@ -328,7 +328,7 @@ static double add_one(const pal_elastic_tets *t, int e, const double *d, double 
 
 /* f -= forces without sum, a x r on the node at r from the mean, that have this torque: what the borrowed rotations
  * turn, the body as a whole turns back */
-static void give_back(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
+void pal_tet_give_back(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
 {
     double mean[3] = {0}, s[9] = {0}, r[3], w[3], v[9], a[3] = {0};
     for (int i = 0; i < t->n_node; i++) pal_axpy3(mean, 1.0 / t->n_node, d + 3 * i);
@@ -389,13 +389,14 @@ static bool tangled(const pal_elastic_tets *t)
 static double take(pal_elastic_tets *t, int what, const double *d, double *f)
 {
     bool slots = t->wish.n_corner == 4;
+    if (t->straight) return pal_tet_straight(t, d, f);
     if (slots) pal_slots_load(t->slots, d);
     double sum = run_blocks(t, what, d, f), torque[3] = {0};
     if (slots && f) pal_slots_add(t->slots, f);
     if (!tangled(t)) return sum;
     untangle(t);
-    for (int i = 0; i < t->n_inverted; i++) sum += add_one(t, t->inverted[i], d, f, torque);
-    if (f) give_back(t, d, torque, f);
+    for (int i = 0; i < t->n_inverted; i++) sum += pal_tet_add_one(t, t->inverted[i], d, f, torque);
+    if (f) pal_tet_give_back(t, d, torque, f);
     return sum;
 }
 
@@ -427,8 +428,11 @@ static void take_gradients(pal_elastic_tets *t)
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d)
 {
     if (t->wish.n_corner == 4) pal_slots_load(t->slots, d);
-    turn_blocks(t, d);
-    if (tangled(t)) untangle(t);
+    if (t->straight)
+        pal_tet_straight_turn(t, d);
+    else
+        turn_blocks(t, d);
+    if (tangled(t) && !t->straight) untangle(t);
     if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
         pal_elastic_tets_modes(t, d);
     else
@@ -505,6 +509,7 @@ PAL_INLINE void multiply_blocks(const pal_elastic_tets *t, int n_corner, bool ne
 void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double *p, double *out)
 {
     bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
+    if (t->straight) k *= t->soft;
     if (t->wish.n_corner == 4) {
         pal_slots_load(t->slots, p);
         if (neo)

@@ -58,12 +58,7 @@ static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
                 printf(" %s %.2f s (energy %.2f)", insult_names[insult], run.back_s, run.most);
                 CHECK(run.finite);
                 HARD_CASE(insult_cases[insult], "fem", "energy over the insult's", run.most, 1.01, "");
-                /* known to fail: a neo-Hookean tet4 body, hardly compressible, on a point stays folded on its split */
-                if (k == HARD_NEO_TET && q == 2 && insult == HARD_POINT)
-                    HARD_CASE_MISSED("point", "fem", "tet4, neo-Hookean, nu 0.499: stays folded, off rest after 10 s",
-                                     100 * hard_rms(b.body) / b.body->size_m, 0.1, 75, "% S");
-                else
-                    HARD_CASE(insult_cases[insult], "fem", "within 0.1 % S of rest after", run.back_s, most_s, "s");
+                HARD_CASE(insult_cases[insult], "fem", "within 0.1 % S of rest after", run.back_s, most_s, "s");
             }
             printf("\n");
             beam_free(&b);
@@ -151,15 +146,17 @@ static void free_bodies_come_back_to_their_shape(void)
 
 /* Voxels that are hardly filled are light and turn over at a touch. There the second stage of sdirk2 gained energy for
  * long (9.7 s until rest here, for ever in a liver of 6 voxels); after gains it goes on by backward Euler until there
- * is peace */
-static void hardly_filled_voxels_come_to_rest_under_sdirk2(void)
+ * is peace. Under implicit_euler one of the shuffled bodies stayed folded until such were straightened */
+static void hardly_filled_voxels_come_to_rest(void)
 {
-    for (int fill = 0; fill < CHECK_REPEATS(3, 1); fill++) {
+    static const char *const solvers[] = {"implicit_euler", "sdirk2"};
+    for (int run_of = 0; run_of < CHECK_REPEATS(6, 2); run_of++) {
+        const int fill = run_of / 2;
         fem_beam b;
         uint64_t seed = 11 + (uint64_t)fill;
         beam_make(&b, 4, 3, 2, 0.034, true);
         b.def->material = (pal_material){.young_Pa = 5e3, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
-        beam_solver(&b, "sdirk2");
+        beam_solver(&b, solvers[run_of % 2]);
         for (int h = 0; h < b.mesh.hexes.n_hex; h++) b.mesh.hexes.fill[h] = hard_random(&seed) < 0.5 ? 0.02F : 1;
         REQUIRE(!beam_open(&b, &note));
         for (int insult = HARD_PLANE; insult < HARD_INSULTS; insult++) {
@@ -168,14 +165,38 @@ static void hardly_filled_voxels_come_to_rest_under_sdirk2(void)
             hard_insult(&b, insult, (uint64_t)fill);
             hard_run run;
             hard_steps(&b, 10, 1.0 / 60, &run);
-            printf("  %s: back after %.2f s, energy up to %.3f\n", insult_names[insult], run.back_s, run.most);
+            printf("  %s, %s: back after %.2f s, energy up to %.3f\n", solvers[run_of % 2], insult_names[insult],
+                   run.back_s, run.most);
             CHECK(run.finite);
             CHECK_LE(run.most, 1.01);
             HARD_CASE(insult < HARD_SHUFFLE ? insult_cases[insult] : "shuffle", "fem",
-                      "sdirk2, every second voxel hardly filled: within 0.1 % S of rest after", run.back_s, 5, "s");
+                      "every second voxel hardly filled: within 0.1 % S of rest after", run.back_s, 10, "s");
+            if (run_of % 2) CHECK_LE(run.back_s, 5);
         }
         beam_free(&b);
     }
+}
+
+/* what is turned over under a load is not made straight, which would change the whole body for the sake of a corner;
+ * once the load is gone it comes back */
+static void a_pressed_body_is_not_straightened(void)
+{
+    fem_beam b;
+    hard_run run;
+    REQUIRE(open_kind(&b, &hard_kinds[HARD_HEX], 4, 2, 2, 0.45));
+    const int n[3] = {4, 2, 2}, node = box_node(n, 4, 2, 2);
+    const double force_N = 0.3 * b.body->load_cap_N;
+    REQUIRE(!pal_world_load(b.world, 0, node, (double[3]){-force_N, -force_N, -force_N}));
+    for (int i = 0; i < 300; i++) {
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        REQUIRE(!hard_hex_row(&b)->split->straight);
+    }
+    CHECK(hard_inverted(&b) > 0);
+    CHECK(b.body->rescue.n_tangled > 200);
+    REQUIRE(!pal_world_load(b.world, 0, node, (double[3]){0, 0, 0}));
+    hard_steps(&b, 10, 1.0 / 60, &run);
+    CHECK_LE(run.back_s, 10);
+    beam_free(&b);
 }
 
 int main(void)
@@ -185,6 +206,7 @@ int main(void)
     RUN(shuffled_bodies_come_back_for_every_seed);
     RUN(mirrored_hexahedra_are_found_untangled_and_counted);
     RUN(free_bodies_come_back_to_their_shape);
-    RUN(hardly_filled_voxels_come_to_rest_under_sdirk2);
+    RUN(hardly_filled_voxels_come_to_rest);
+    RUN(a_pressed_body_is_not_straightened);
     return check_report();
 }

@@ -2,7 +2,8 @@
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" | "linear"
  * | "neo_hookean"), fill (true: a voxel counts with the share of it that lies inside the surface, at least 0.02),
- * untangle (true: the body runs on its five-tetrahedra split while a corner is turned over; not for linear).
+ * untangle (true: the body runs on its five-tetrahedra split while a corner is turned over, and is straightened when it
+ * stays so, elastic_tet.h; not for linear).
  *
  * The tangent is taken at linearise, and with it the decision on untangling; without an implicit solver the decision is
  * taken whenever forces are. */
@@ -109,6 +110,7 @@ static void linearise(void *self, const pal_body *body)
     pal_hex_row *row = self;
     pal_hex_untangle(row, body);
     if (row->tangled) {
+        if (row->implicit) row->n_switch += pal_elastic_tets_look(row->split, body);
         pal_elastic_tets_linearise(row->split, body->d);
         return;
     }

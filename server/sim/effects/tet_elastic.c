@@ -9,8 +9,7 @@
  * Poisson ratios above 0.3 taken as 0.3. Pieces are looked at when the tangent is taken. corotational tet4 is tangled
  * once det F <= 0 in a piece, tet10 and neo_hookean below 0.05, neo_hookean above 30 too, where its energy, which grows
  * with the square of that, lets nothing else count. All are whole again when every piece is above 0.5 (neo_hookean: and
- * below 2). What is left: a few shuffled neo_hookean tet4 bodies in a hundred rest folded on the split, no piece
- * inverted.
+ * below 2). What rests folded on the split, as a few shuffled bodies in a hundred do, is straightened (elastic_tet.h).
  *
  * `internal` holds for corotational and neo_hookean; the linear law has no net force, but a torque once it turns, as
  * every linear model. Ten nodes, corotational: a torque too while an element is crushed to next to nothing
@@ -217,6 +216,7 @@ static void linearise(void *self, const pal_body *body)
     row->n_switch += row->tangled != before;
     if (!row->tangled) return;
     if (!before) pal_elastic_tets_reset(row->split);
+    row->n_switch += pal_elastic_tets_look(row->split, body);
     pal_elastic_tets_linearise(row->split, body->d);
 }
 
