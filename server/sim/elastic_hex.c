@@ -51,7 +51,7 @@ void pal_hex_reset(pal_hex_row *row)
     pal_kept_forget(&row->kept);
     row->n_tangled = row->n_switch = 0;
     row->n_slow = 0;
-    if (row->split) pal_elastic_tets_reset(row->split);
+    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_straight = 0;
 }
 
 /* the five-tetrahedra split: every five tetrahedra fill the cube of the same number */

@@ -48,7 +48,7 @@ typedef struct pal_hex_row {
     pal_kept kept; /* implicit: of the cubes, not of the split */
 
     bool tangled;
-    uint64_t n_tangled, n_switch; /* looks that found the body tangled, changes between cubes, split and straight; since reset */
+    uint64_t n_tangled, n_switch; /* looks that found the body tangled; changes of cubes, split, straight */
     pal_elastic_tets *split;      /* NULL: untangle is false or the law is linear */
     float *split_fill;            /* [n_tet]                                       */
 } pal_hex_row;

@@ -67,6 +67,7 @@ typedef struct pal_elastic_tets {
     double soft;   /* ... and their moduli are this share of what they are          */
     double *seen;  /* where the nodes were `n_look` looks ago; untangle     [n_node][3] */
     int n_look;
+    int n_straight, n_whole; /* times straightened since it was whole for long; looks since it is */
     int n_inverted;
     int n_slow; /* rotations that vectors could not settle at the last force or linearise */
 } pal_elastic_tets;
@@ -76,9 +77,10 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *buil
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material);
 /* turns to identity */
 void pal_elastic_tets_reset(pal_elastic_tets *t);
-/* a body under an implicit solver is about to linearise while it is tangled and runs on t: straightens it when it has
- * not moved for long and nothing presses it; true: from now on */
-bool pal_elastic_tets_look(pal_elastic_tets *t, const pal_body *body);
+/* a body under an implicit solver is about to linearise, tangled on t or not: straightens it when it is tangled, has
+ * not moved for long and nothing presses it; true: from now on. What is tangled again soon after two times rests so
+ * under its loads and is left alone */
+bool pal_elastic_tets_look(pal_elastic_tets *t, const pal_body *body, bool tangled);
 /* f += force at positions d, both [n_node][3]; takes the rotations */
 void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f);
 /* J; takes the rotations. f: forces are added as by ..force; NULL: none */

@@ -7,6 +7,8 @@
 
 /* looks, one a Newton iteration, in which a body that is getting on moves by more than this share of S */
 enum { LOOKS = 64, MOST_TURNS = 200 };
+/* how often it is straightened without so many looks of peace */
+enum { TIMES = 2, PEACE = 600 };
 static const double still_S = 1e-3;
 /* a share of the most that a node bears, 10 E h^2: what presses harder may well turn elements over for good */
 static const double pressed_share = 0.01;
@@ -73,14 +75,18 @@ static bool is_pressed(const pal_body *body)
     return false;
 }
 
-bool pal_elastic_tets_look(pal_elastic_tets *t, const pal_body *body)
+bool pal_elastic_tets_look(pal_elastic_tets *t, const pal_body *body, bool tangled)
 {
+    t->n_whole = tangled ? 0 : t->n_whole + 1;
+    if (t->n_whole >= PEACE) t->n_straight = t->n_whole = 0;
+    if (!tangled || t->n_straight >= TIMES) return false;
     if (t->straight || t->n_look++ % LOOKS != 0) return false;
     bool stuck = t->n_look > 1 && !has_moved(t, body) && !is_pressed(body);
     memcpy(t->seen, body->d, 3 * sizeof(double) * (size_t)t->n_node);
     if (!stuck) return false;
     double before = pal_elastic_tets_energy(t, body->d, NULL);
     t->straight = true, t->soft = 1;
+    t->n_straight++;
     pal_tet_straight_turn(t, body->d);
     double after = pal_tet_straight(t, body->d, NULL);
     t->soft = after > 0 ? fmax(least_soft, fmin(1, before / after)) : 1;

@@ -109,8 +109,8 @@ static void linearise(void *self, const pal_body *body)
 {
     pal_hex_row *row = self;
     pal_hex_untangle(row, body);
+    if (row->implicit && row->split) row->n_switch += pal_elastic_tets_look(row->split, body, row->tangled);
     if (row->tangled) {
-        if (row->implicit) row->n_switch += pal_elastic_tets_look(row->split, body);
         pal_elastic_tets_linearise(row->split, body->d);
         return;
     }

@@ -182,7 +182,7 @@ static void reset(void *self, const pal_body *body)
     tet_row *row = self;
     (void)body;
     pal_elastic_tets_reset(&row->whole);
-    if (row->split) pal_elastic_tets_reset(row->split);
+    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_straight = 0;
     row->tangled = false;
     pal_kept_forget(&row->kept);
     row->n_tangled = row->n_switch = 0;
@@ -214,9 +214,9 @@ static void linearise(void *self, const pal_body *body)
     row->tangled = known ? told : row->split && is_tangled(row, body->d);
     row->n_tangled += row->tangled;
     row->n_switch += row->tangled != before;
+    if (row->tangled && !before) pal_elastic_tets_reset(row->split);
+    if (row->split) row->n_switch += pal_elastic_tets_look(row->split, body, row->tangled);
     if (!row->tangled) return;
-    if (!before) pal_elastic_tets_reset(row->split);
-    row->n_switch += pal_elastic_tets_look(row->split, body);
     pal_elastic_tets_linearise(row->split, body->d);
 }
 
