@@ -4,7 +4,41 @@
 #include <math.h>
 #include <string.h>
 
-enum { FORCE = 1, ENERGY = 2, LINEARISE = 4 };
+enum { FORCE = 1, ENERGY = 2, LINEARISE = 4, SWELL = 8 };
+
+/* b.u, b the element's swell */
+PAL_INLINE pal_wide swelling(const double *swell, int n_node, pal_wide (*u)[PAL_CELL_NODES_MOST])
+{
+    pal_wide sum = {0};
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) sum += pal_wide_load(swell + (3 * m + i) * PAL_LANES) * u[i][m];
+    return sum;
+}
+/* u += p b */
+PAL_INLINE void add_swelling(const double *swell, int n_node, pal_wide p, pal_wide (*u)[PAL_CELL_NODES_MOST])
+{
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) u[i][m] += p * pal_wide_load(swell + (3 * m + i) * PAL_LANES);
+}
+PAL_INLINE const double *swell_at(const pal_cell_group *group, int n_node, int block, int lane)
+{
+    return group->swell + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
+}
+/* onto the sums of the control cells, and what they push with */
+PAL_INLINE void take_swelling(const pal_cells_elastic *c, const int32_t *home, int n_live, pal_wide s)
+{
+    for (int l = 0; l < n_live; l++) c->volume.sum[home[l]] += s[l];
+}
+PAL_INLINE pal_wide give_swelling(const pal_cells_elastic *c, const int32_t *home)
+{
+    pal_wide p;
+    for (int l = 0; l < PAL_WIDE; l++) p[l] = c->volume.push[home[l]];
+    return p;
+}
+static void find_push(const pal_cells_elastic *c)
+{
+    for (int i = 0; i < c->volume.n; i++) c->volume.push[i] = c->volume.share[i] * c->volume.sum[i];
+}
 
 /* g (world axes, forces with Q held) += what the turning of Q adds */
 PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
@@ -37,10 +71,20 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     cell_rotation(group, block, lane, y, n_node, r, s);
     if (what & LINEARISE)
         for (int i = 0; i < 9; i++) pal_wide_store(group->turn + ((size_t)block * 9 + i) * PAL_LANES + lane, r[i]);
-    if (!(what & (FORCE | ENERGY))) return 0;
+    if (!(what & (FORCE | ENERGY | SWELL))) return 0;
     cell_unturn(r, n_node, y, u);
     cell_minus_rest(group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane, n_node, u);
+    const bool apart = c->volume.n > 0;
+    const int32_t *home = group->home + block * PAL_LANES + lane;
+    const double *swell = swell_at(group, n_node, block, lane);
+    if (what & SWELL) {
+        take_swelling(c, home, n_live, swelling(swell, n_node, u));
+        return 0;
+    }
+    pal_wide push = apart ? give_swelling(c, home) : energy;
+    if (apart && what & ENERGY) energy = 0.5 * push * swelling(swell, n_node, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
+    if (apart) add_swelling(swell, n_node, push, u);
     if (what & ENERGY) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
     if (c->tangle.n_away > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
@@ -67,8 +111,20 @@ PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_nod
     return sum;
 }
 
+/* how much each control cell's volume has changed */
+static void swell_all(pal_cells_elastic *c, const double *d)
+{
+    if (c->volume.n == 0) return;
+    memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
+    all_blocks(c, PAL_CELL_CUBIC, 64, SWELL, d, NULL);
+    all_blocks(c, PAL_CELL_HEX, 8, SWELL, d, NULL);
+    all_blocks(c, PAL_CELL_PYRAMID, 5, SWELL, d, NULL);
+    find_push(c);
+}
+
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
 {
+    swell_all(c, d);
     if (c->tangle.n_away > 0) (void)pal_cell_tangle_force(&c->tangle, c->solid, d, f);
     if (c->op == PAL_CELL_EDGES) {
         pal_cells_edges_force(c, d, f);
@@ -87,6 +143,7 @@ PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, dou
 
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
+    swell_all(c, d);
     double patches = c->tangle.n_away > 0 ? pal_cell_tangle_force(&c->tangle, c->solid, d, f) : 0;
     if (c->op == PAL_CELL_EDGES) return patches + pal_cells_edges_energy(c, d);
     return patches + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
@@ -114,6 +171,9 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
             cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
+            if (c->volume.n > 0)
+                add_swelling(swell_at(group, n_node, b, l), n_node, give_swelling(c, group->home + b * PAL_LANES + l),
+                             u);
             const pal_wide by =
                 c->tangle.n_away > 0 && !c->tangle.off ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
@@ -122,8 +182,36 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
         }
 }
 
+PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *p)
+{
+    const pal_cell_group *group = &c->group[kind];
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const int n_live = cell_live(group, b, l);
+            pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
+            if (n_live == 0) continue;
+            cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
+            cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
+            cell_unturn(r, n_node, u, u);
+            take_swelling(c, group->home + b * PAL_LANES + l, n_live,
+                          swelling(swell_at(group, n_node, b, l), n_node, u));
+        }
+}
+
+/* the same of a motion p, at the last linearisation */
+static void swell_move(const pal_cells_elastic *c, const double *p)
+{
+    if (c->volume.n == 0) return;
+    memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
+    swell_kind(c, PAL_CELL_CUBIC, 64, p);
+    swell_kind(c, PAL_CELL_HEX, 8, p);
+    swell_kind(c, PAL_CELL_PYRAMID, 5, p);
+    find_push(c);
+}
+
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out)
 {
+    swell_move(c, p);
     multiply_all(c, PAL_CELL_CUBIC, 64, k, p, out);
     multiply_all(c, PAL_CELL_HEX, 8, k, p, out);
     multiply_all(c, PAL_CELL_PYRAMID, 5, k, p, out);

@@ -15,6 +15,7 @@
  * All memory from the arena. Thread: make [load], else [sim]; energy and force move the rotations' warm start. */
 #ifndef PAL_SIM_CELL_KERNEL_H
 #define PAL_SIM_CELL_KERNEL_H
+#include "server/num/blocks.h"
 #include "server/sim/cell_tangle.h"
 #include "server/sim/kept.h"
 #include "server/sim/solid.h"
@@ -47,8 +48,19 @@ typedef struct pal_cell_group {
     double *corner;      /* 1 / volume at rest at the 8 points that look for turned over elements [n_block][8][8] */
     double *here;        /* 1: an element, 0: part of a patch (cell_tangle.h)      [n_block][8] */
     double *energy_J;    /* of each element when energy was asked for last         [n_block][8] */
+    int32_t *home;       /* control cell of each element, where changes of volume have theirs [n_block][8] */
+    double *swell;       /* int kappa grad N dV, J/m, the same           [n_block][n_node][3][8] */
     int n_slow;          /* rotations of the last call that vectors did not settle */
 } pal_cell_group;
+
+/* changes of volume of whole control cells (cell_volume.c); n 0: each element has its own */
+typedef struct pal_cell_volume {
+    int n;         /* control cells */
+    double *sum;   /* int kappa tr(strain) dV, J            [n] */
+    double *share; /* 1 / int kappa dV, 1/J                 [n] */
+    double *push;  /* sum times share: mean strain of the cell [n] */
+    pal_cliques couple;
+} pal_cell_volume;
 
 typedef struct pal_cells_elastic {
     const pal_solid *solid;
@@ -56,6 +68,7 @@ typedef struct pal_cells_elastic {
     uint64_t sampled; /* of the solid, what the constants were made for */
     pal_kept kept;    /* made by the row, of PAL_CELL_POLAR under an implicit solver */
     pal_cell_tangle tangle;
+    pal_cell_volume volume;
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
 } pal_cells_elastic;
@@ -71,6 +84,10 @@ pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal
 /* constants anew where the solid has other samples than they were made for; no heap */
 void pal_cells_elastic_refresh(pal_cells_elastic *c);
 void pal_cells_elastic_reset(pal_cells_elastic *c); /* rotations are none again */
+
+/* cell_volume.c: arrays where the solid's largest Poisson ratio asks for it, and their constants; MEMORY */
+pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena);
+void pal_cell_volume_refresh(pal_cells_elastic *c);
 
 /* f [n][3] += forces at nodes d [n][3] */
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f);

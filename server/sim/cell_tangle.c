@@ -321,6 +321,22 @@ static bool take_in(pal_cell_tangle *t, const pal_solid *solid)
     return any;
 }
 
+/* elements whose volume is that of their control cell go into a patch together */
+static void take_whole_cells(pal_cell_tangle *t, const struct pal_cells_elastic *c)
+{
+    /* sums and pushes are found anew before each use */
+    double *mark = c->volume.push;
+    memset(mark, 0, sizeof *mark * (size_t)c->volume.n);
+    for (int turn = 0; turn < 2; turn++)
+        for (int cell = 0; cell < t->n_cell; cell++) {
+            int e;
+            const pal_cell_kind kind = kind_of(t, cell, &e);
+            const int32_t home = c->group[kind].home[e];
+            if (turn == 0 && t->patch[cell] != NOT) mark[home] = 1;
+            if (turn == 1 && t->patch[cell] == NOT && mark[home] > 0) t->patch[cell] = NEW;
+        }
+}
+
 /* patches anew of all elements that are in one, connected by their nodes */
 static void number(pal_cell_tangle *t, const pal_solid *solid)
 {
@@ -396,6 +412,7 @@ bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const
                           kinetic_J < still_share * patches(t));
     memcpy(t->before, t->patch, sizeof *t->patch * (size_t)t->n_cell);
     changed |= take_in(t, c->solid);
+    if (changed && c->volume.n > 0) take_whole_cells(t, c);
     if (!changed) return false;
     number(t, c->solid);
     begin(t, c, body);

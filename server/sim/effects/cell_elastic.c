@@ -66,11 +66,13 @@ static void reset(void *self, const pal_body *body)
     pal_cells_elastic_reset(self);
 }
 
-/* elements overlap far beyond the points' own neighbours: a matrix of nodes would be mostly full */
+/* elements overlap far beyond the points' own neighbours: a matrix of nodes would be mostly full. Where volumes are
+ * those of control cells, points move what their elements alone would not tell */
 static bool couple(void *self, pal_cliques *out)
 {
-    (void)self, (void)out;
-    return false;
+    const pal_cells_elastic *row = self;
+    if (row->volume.n > 0) *out = row->volume.couple;
+    return row->volume.n > 0;
 }
 
 static bool untangle(void *self, const pal_body *body)
