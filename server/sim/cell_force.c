@@ -231,7 +231,7 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
             const int patch = c->tangle.patch[c->tangle.first[kind] + e];
             if (patch >= 0 && !c->tangle.off) memcpy(r, c->tangle.of[patch].turn, sizeof r);
             for (int m = 0; m < group->n_node; m++) {
-                double share = n[m] * group->volume[b * PAL_LANES + l];
+                double share = n[m] * c->tangle.shear_J[c->tangle.first[kind] + e];
                 for (int i = 0; i < 9; i++) turn[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
             }
         }

@@ -101,7 +101,7 @@ void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const doub
  * tangle.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
 void pal_cells_corners_make(pal_cells_elastic *c);
 void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
-/* turn [n][9] += Q by the elements' volumes at their nodes */
+/* turn [n][9] += Q by the elements' stiffness, mu V, at their nodes */
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn);
 
 /* forces and energy of PAL_CELL_EDGES (cell_operator.c) */
