@@ -12,7 +12,9 @@
  *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh; about
  *                   twice too large for tetrahedra of ten nodes
  *   model           the largest distance between the rest by the neo-Hookean law and by the body's own; of springs:
- *                   between where they are and where finite elements (hex8_bbar, corotational) come to rest
+ *                   between where they are and where finite elements (hex8_bbar, corotational) come to rest; of
+ *                   springs with constants of their own, which were fitted to converged finite elements: where
+ *                   Richardson carries these to, and no part of discretisation beside it
  *   time            what the steps of the next tenth of a second (12 at most) are off, the loads staying as they are:
  *                   those steps against twice as many of half the length, over 1 - 2^-order of the solver
  *   algebraic       the same steps against those of a solver that leaves next to nothing

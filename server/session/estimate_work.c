@@ -220,8 +220,7 @@ static pal_err make_rests(pal_estimate_work *w)
     err = pal_rest_coarser(w->scene, body, element, law, &note, &w->coarse);
     if (err) say(w, note.text);
     if (stopped(w)) return PAL_ERR_STATE;
-    if (!err && cut_share(&def->mesh->hexes) > much_cut)
-        say(w, "many voxels are cut: discretisation within a factor of 3");
+    if (!err && cut_share(&def->mesh->hexes) > much_cut) say(w, "many voxels are cut: good to a factor of 3");
     /* one that cannot be had tells nothing of the order */
     if (!err) (void)pal_rest_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
     if (stopped(w)) return PAL_ERR_STATE;
@@ -515,10 +514,27 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
     out->discretisation_m = last / (exp2(w->foresight.order) - 1);
 }
 
+/* Springs whose constants were fitted to converged finite elements stand nearer to these than to those of their own
+ * voxels: how far they are from where Richardson carries the two meshes' rests. That has the mesh's part in it */
+static void compare_fitted(const pal_estimate_work *w, pal_estimate *out)
+{
+    double most = 0, more = 1 / (exp2(w->foresight.order) - 1);
+    for (int k = 0; k < w->coarse.n_common; k++) {
+        size_t i = 3 * (size_t)w->coarse.common[k];
+        double limit[3];
+        for (size_t c = 0; c < 3; c++) limit[c] = w->fine.x[i + c] + more * (w->fine.x[i + c] - w->coarse.x[i + c]);
+        most = fmax(most, pal_dist3(w->state.x + i, limit));
+    }
+    out->model_m = most, out->discretisation_m = 0;
+    tell(out, "fitted: the mesh's part is in the model's");
+}
+
 static void compare_models(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
     int n = w->state.n_node;
-    if (w->springs) /* where they are is where they rest under what they bear */
+    if (w->springs && w->foresight.setting.k_distance_J > 0 && out->discretisation_m > 0)
+        compare_fitted(w, out);
+    else if (w->springs) /* where they are is where they rest under what they bear */
         out->model_m = most_between(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;

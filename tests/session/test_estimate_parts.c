@@ -3,6 +3,7 @@
 #include "server/session/estimate_foresee.h"
 #include "server/session/estimate_work.h"
 #include "server/session/switching.h"
+#include "server/sim/spring_law.h"
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/session/clay.h"
@@ -237,6 +238,43 @@ static void calibrated_springs_have_no_neighbour_in_size(void)
     CHECK_INT(e.n_neighbour, 0);
 }
 
+/* constants as the material gives them, in a scene that calls them fitted: one part in place of two */
+static void fitted_springs_are_compared_with_converged_elements(void)
+{
+    pal_scene *own = fem_scene();
+    pal_estimate e[2];
+    *own = scene, own->body[0].n_effect = 0;
+    double k[3], h_m = mesh.tets.h_m, young_Pa = own->body[0].material.young_Pa;
+    pal_spring_factors(own->body[0].material.poisson, true, k);
+    pal_setting to;
+    pal_set_scene *set = NULL, *plain = NULL;
+    pal_note note = {""};
+    pal_setting_of(own, 0, &to);
+    to.k_distance_J = k[0] * young_Pa * h_m * h_m * h_m;
+    to.k_volume_J = k[2] * young_Pa * h_m * h_m * h_m;
+    if (pal_setting_make(own, 0, &to, &note, &set)) CHECK_FAIL("%s", note.text);
+    REQUIRE(set);
+    /* the same voxels without constants */
+    to.k_distance_J = to.k_volume_J = 0;
+    if (pal_setting_make(&set->scene, 0, &to, &note, &plain)) CHECK_FAIL("%s", note.text);
+    REQUIRE(plain);
+    for (int i = 0; i < 2; i++) {
+        const pal_scene *at = i ? &set->scene : &plain->scene;
+        pal_world *w = swinging(at, 0);
+        REQUIRE(estimate_of(at, w, &e[i]));
+        printf("  discretisation %.3g, model %.3g mm, %s\n", 1e3 * e[i].discretisation_m, 1e3 * e[i].model_m,
+               e[i].note);
+        pal_world_destroy(w);
+    }
+    CHECK(e[1].discretisation_m == 0 && strstr(e[1].note, "the mesh's part is in the model's"));
+    CHECK_NEAR(e[1].error_m, e[1].model_m + e[1].time_m, 1e-15);
+    CHECK(e[0].discretisation_m > 0 && !strstr(e[0].note, "fitted"));
+    CHECK(e[1].model_m > 0 && e[1].model_m < 2 * (e[0].discretisation_m + e[0].model_m));
+    pal_set_scene_free(plain);
+    pal_set_scene_free(set);
+    free(own);
+}
+
 /* of control cells time and algebraic part alone are known: their sum is not the error */
 static void small_parts_alone_are_no_error(void)
 {
@@ -416,6 +454,7 @@ int main(void)
     RUN(neighbours_follow_the_models_of_cost_and_error);
     RUN(neighbours_are_what_a_switch_makes);
     RUN(calibrated_springs_have_no_neighbour_in_size);
+    RUN(fitted_springs_are_compared_with_converged_elements);
     RUN(small_parts_alone_are_no_error);
     RUN(elements_that_lock_say_so);
     RUN(rows_switched_off_are_off_for_the_estimate);
