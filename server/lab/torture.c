@@ -227,7 +227,7 @@ static double work_J(const pal_body *body)
         double size = pal_norm3(body->outer + i), way[3];
         if (!(size > 0)) continue;
         pal_sub3(way, body->d + i, body->node_rest + i);
-        sum += fmin(1, body->load_cap_N / size) * pal_dot3(body->outer + i, way);
+        sum += fmin(1, pal_body_bears_N(body, (int)(i / 3)) / size) * pal_dot3(body->outer + i, way);
     }
     return sum;
 }

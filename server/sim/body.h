@@ -83,10 +83,12 @@ typedef struct pal_body {
     double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
     double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
     double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
-    double brake_1_s,
-        brake_s;        /* extra drag and for how long yet, after a change that puts work in (brake.h); 0: none */
-    pal_rescues rescue; /* since reset: what kept it within its bounds, and what that took         */
-    char why[PAL_WHY];  /* one sentence while frozen, else empty                                   */
+    pal_rescues rescue;      /* since reset: what kept it within its bounds, and what that took         */
+    char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
+    /* extra drag, and for how long yet, after a change that puts work in (brake.h); 0: none */
+    double brake_1_s, brake_s;
+    /* what a corner of a full voxel weighs (pal_body_bears_N); 0: no voxels */
+    double corner_kg;
 
     bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
     bool wants_compliance; /* a CONTACT row asks for it: set in its make; the SOLVE row is made after all others */
@@ -129,6 +131,13 @@ static inline int pal_body_point(const pal_body *body, int k)
 static inline int pal_body_nodes(const pal_body *body)
 {
     return body->embed ? body->n_node : body->n_active;
+}
+/* most of a lasting load that a node bears: load_cap_N, and of that the part that the node is of a full voxel's corner,
+ * as a sliver of a voxel is as much softer */
+static inline double pal_body_bears_N(const pal_body *body, int node)
+{
+    double part = body->corner_kg > 0 && !body->implicit ? body->node_mass_kg[node] / body->corner_kg : 1;
+    return part < 1 ? part * body->load_cap_N : body->load_cap_N;
 }
 /* how easily a node moves, 1/kg; 0: it is held */
 static inline double pal_body_ease(const pal_body *body, int node)

@@ -316,6 +316,7 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_n
         for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
     }
     body->load_cap_N = 10 * to->young_Pa * body->h_m * body->h_m;
+    body->corner_kg *= ratio;
     w->material[b] = *to;
     return PAL_ERR_OK;
 }
@@ -454,15 +455,17 @@ pal_err pal_world_pull(pal_world *world, int body)
     return err;
 }
 
-static void cap_loads(pal_body *body)
+/* lasting: what else presses the nodes is not there yet */
+static void cap_loads(pal_body *body, bool lasting)
 {
-    double cap2 = body->load_cap_N * body->load_cap_N;
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
-        if (load2 <= cap2) continue;
+        if (load2 == 0) continue;
+        double cap = lasting ? pal_body_bears_N(body, i) : body->load_cap_N;
+        if (load2 <= cap * cap) continue;
         uint64_t before = pal_clock_ns();
-        pal_scale3(load, body->load_cap_N / sqrt(load2), load);
+        pal_scale3(load, cap / sqrt(load2), load);
         body->rescue.n_capped++;
         body->rescue.ns += pal_clock_ns() - before;
     }
@@ -483,7 +486,7 @@ static void run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
     begin_loads(body);
-    if (body->implicit && body->outer) cap_loads(body);
+    if (body->outer) cap_loads(body, true);
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
@@ -491,7 +494,7 @@ static void run_contact(pal_world *w, pal_step *step, int b)
         if (fails(w, body, row, row->effect->run(row->self, step))) return;
         row->spent_ns += pal_clock_ns() - before;
     }
-    if (!body->implicit && (body->outer || step->n_contact > 0)) cap_loads(body);
+    if (!body->implicit && step->n_contact > 0) cap_loads(body, false);
 }
 
 static uint64_t force_ns(const pal_step *step)

@@ -411,6 +411,41 @@ static void goes_on_where_another_world_was(void)
     box_free(&box);
 }
 
+/* 10 E h^2 is what a voxel bears: a node that stands for a third of a voxel's corner bears a third of it */
+static void a_sliver_bears_less_of_a_lasting_load(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(3, 3, 3, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, false);
+    pal_world *world;
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    pal_body *body = pal_world_body(world, 0);
+    int thin = -1, full = -1;
+    for (int i = 0; i < body->n_dof; i++) {
+        if (body->held[i]) continue;
+        if (thin < 0 || body->mass_kg[i] < body->mass_kg[thin]) thin = i;
+        if (full < 0 || body->mass_kg[i] > body->mass_kg[full]) full = i;
+    }
+    const double h = 0.01, cap_N = 10 * scene->body[0].material.young_Pa * h * h;
+    CHECK_NEAR(body->corner_kg, scene->body[0].material.density_kg_m3 * h * h * h / 8, 1e-15);
+    CHECK_NEAR(body->mass_kg[thin] / body->corner_kg, 1.0 / 3, 1e-9);
+    REQUIRE(!pal_world_load(world, 0, thin, (const double[3]){1e6, 0, 0}));
+    REQUIRE(!pal_world_load(world, 0, full, (const double[3]){0, 0, -1e6}));
+    REQUIRE(!pal_world_step(world, 1e-4));
+    CHECK_NEAR(body->load[3 * thin] / cap_N, 1.0 / 3, 1e-9);
+    CHECK_NEAR(body->load[3 * full + 2] / cap_N, -1, 1e-9);
+    CHECK(body->rescue.n_capped >= 2);
+    /* twice as dense and as stiff: the part stays, the cap goes with E */
+    pal_material to = scene->body[0].material;
+    to.density_kg_m3 *= 2, to.young_Pa *= 2;
+    REQUIRE(!pal_world_material(world, 0, &to, &note));
+    REQUIRE(!pal_world_step(world, 1e-4));
+    CHECK_NEAR(body->load[3 * thin] / cap_N, 2.0 / 3, 1e-9);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
 int main(void)
 {
     RUN(goes_on_where_another_world_was);
@@ -426,5 +461,6 @@ int main(void)
     RUN(sags_and_comes_to_rest_under_its_weight);
     RUN(has_rows_only_for_what_the_scene_calls_for);
     RUN(spring_scenes_pay_nothing_for_finite_elements);
+    RUN(a_sliver_bears_less_of_a_lasting_load);
     return check_report();
 }
