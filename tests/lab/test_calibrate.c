@@ -369,6 +369,38 @@ static void constants_that_were_known_are_found_again(void)
     }
 }
 
+/* loads that ask for a twentieth of the volume stiffness get a tenth of it where that is the floor, else what they ask
+ * for */
+static void volume_stiffness_has_a_floor_where_one_is_asked_for(void)
+{
+    bench truth;
+    pal_samples s[3] = {{0}};
+    bench_begin(&truth, 4, 3);
+    truth.options.without_area = true;
+    REQUIRE(bench_make(&truth));
+    CHECK_INT(truth.info.kind[1], PAL_SPRING_VOLUME);
+    truth.theta[1] += log(0.05);
+    for (int k = 0; k < 3; k++) REQUIRE(samples_of(&truth, truth.theta, k, &s[k]));
+    for (int floor = 0; floor < 2; floor++) {
+        bench b;
+        pal_fit_options o = {0};
+        pal_fit_result r;
+        bench_begin(&b, 4, 3);
+        b.options.without_area = true;
+        b.options.smooth = b.options.pull = 0;
+        b.options.least_volume = floor ? 0.1 : 0;
+        for (int k = 0; k < 3; k++) b.cases[k].samples = &s[k];
+        REQUIRE(bench_make(&b));
+        CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &note), 0);
+        printf("  %s floor: edges %.3g, volumes %.3g of the start\n", floor ? "with a" : "without a",
+               exp(b.theta[0] - b.info.start[0]), exp(b.theta[1] - b.info.start[1]));
+        CHECK_NEAR(exp(b.theta[1] - b.info.start[1]), floor ? 0.1 : 0.05, floor ? 1e-6 : 1e-3);
+        bench_close(&b);
+    }
+    for (int k = 0; k < 3; k++) pal_samples_free(&s[k]);
+    bench_close(&truth);
+}
+
 /* ---- annealing ---- */
 
 /* the walk as its caller sees it */
@@ -599,6 +631,7 @@ int main(void)
     RUN(a_spring_takes_the_mean_of_its_corners_and_those_the_grid);
     RUN(grid_nodes_that_touch_nothing_are_no_parameters);
     RUN(constants_that_were_known_are_found_again);
+    RUN(volume_stiffness_has_a_floor_where_one_is_asked_for);
     RUN(annealing_walks_the_same_way_for_any_team);
     RUN(annealing_ends_as_it_is_told);
     RUN(points_may_be_evaluated_elsewhere);
