@@ -1,33 +1,52 @@
 #!/bin/sh
 # Tables of the hard cases from what the tests recorded (hard_case.h).
 #
-#   make_table.sh RECORDS            writes tests/stability/README.md and the matrix in README.md
-#   make_table.sh --run BUILD        runs all tests that record, then the same
-#   make_table.sh --check            every case x model stands in both tables of the tree
-#   make_table.sh --check RECORDS    and RECORDS has every case x model too
-# Exit code 1 and a line for each hole.
+#   make_table.sh --run BUILD        builds in BUILD (release; made when it is not there) every test that records, runs
+#                                    them and writes records.tsv and both tables: the one command that makes them
+#   make_table.sh RECORDS            the same from a folder of records that is there, or from records.tsv
+#   make_table.sh --check            every case x model is recorded in the tree, or why not; both tables are to the byte
+#                                    what records.tsv says
+#   make_table.sh --check RECORDS    and the records of a run are those of records.tsv: the same lines, words, verdicts,
+#                                    bounds and counts, figures off by a fifth of themselves or of their bound at most
+# Exit code 1 and a line for each fault.
 set -eu
 cd "$(dirname "$0")/../.."
 LC_ALL=C
 export LC_ALL
 catalogue=tests/stability/catalogue.txt
 whole=tests/stability/README.md
+kept=tests/stability/records.tsv
 models="tet_springs adaptive_springs fem subdivision_fem"
 tab=$(printf '\t')
 
 recorders() { grep -l '"tests/stability/\(hard_case\|four_models\).h"' tests/*/test_*.c; }
 
-# all records, one a line; of equal case, model and words in several tests the worst
+# all records of a folder or file, one a line, in the order of the catalogue, models and tests; of equal case, model and
+# words in several tests the worst. Files of tests that are no more do not count
 gather() {
-    cat "$1"/*.tsv 2>/dev/null | awk -F '\t' -v OFS='\t' '
+    if [ -d "$1" ]; then
+        for test in $(recorders); do cat "$1/$(basename "$test" .c).tsv"; done
+    else
+        cat "$1"
+    fi | awk -F '\t' -v OFS='\t' -v models="$models" -v catalogue="$catalogue" '
+        function ratio(value, bound) { return bound > 0 ? value / bound : value + 0 }
+        BEGIN {
+            n_model = split(models, model, " ")
+            while ((getline text < catalogue) > 0)
+                if (text !~ /^#/ && text != "") { split(text, at, "|"); gsub(/ /, "", at[1]); id[++n_id] = at[1] }
+        }
         { key = $1 FS $2 FS $4 }
-        !(key in line) { order[++n] = key; line[key] = $0; ratio[key] = $6 ? $5 / $6 : 0; next }
-        ($6 ? $5 / $6 : 0) > ratio[key] { line[key] = $0; ratio[key] = $5 / $6 }
-        END { for (i = 1; i <= n; i++) print line[order[i]] }'
+        !(key in line) { order[$1, $2, ++count[$1, $2]] = key; line[key] = $0; worst[key] = ratio($5, $6); next }
+        ratio($5, $6) > worst[key] { line[key] = $0; worst[key] = ratio($5, $6) }
+        END {
+            for (i = 1; i <= n_id; i++)
+                for (m = 1; m <= n_model; m++)
+                    for (k = 1; k <= count[id[i], model[m]]; k++) print line[order[id[i], model[m], k]]
+        }'
 }
 
 tables() { # RECORDS part(whole|matrix)
-    gather "$1" | awk -F '\t' -v part="$2" -v models="$models" -v catalogue="$catalogue" '
+    awk -F '\t' -v part="$2" -v models="$models" -v catalogue="$catalogue" '
         function trim(s) { gsub(/^ +| +$/, "", s); return s }
         # INFINITY of a time until rest
         function shown(value) { return value == "inf" ? "never" : value }
@@ -37,7 +56,6 @@ tables() { # RECORDS part(whole|matrix)
             return shown(value) (unit == "" || value == "inf" ? "" : " " unit)
         }
         function cell(kind, value, bound, unit) {
-            if (kind == "none") return "–"
             if (kind == "all") return value " of " bound
             text = shown(value) " (" bound ")" (unit == "" ? "" : " " unit)
             return kind == "missed" && value > bound ? "**" text "**" : text
@@ -63,62 +81,74 @@ tables() { # RECORDS part(whole|matrix)
                 row = "| " trim(at[2])
                 if (part == "whole") print "| **" id "**: " trim(at[2]) " | | " trim(at[3]) " | | | |"
                 for (m = 1; m <= n_model; m++) {
-                    best = 0; worst = -4
+                    best = 0; worst = -4; beside = ""
                     for (k = 1; k <= count[id, model[m]]; k++) {
                         i = id SUBSEP model[m] SUBSEP k
                         r = kind[i] == "none" ? -1 : kind[i] == "all" ? 0.5 : bound[i] > 0 ? value[i] / bound[i] : 0
                         # the hour that ran tells more than minutes beside it, however near to their bound
                         if (id == "hour" && kind[i] != "none" && what[i] !~ /drift in an hour/) r -= 2
                         if (kind[i] == "missed" && value[i] > bound[i]) r += 1e9
-                        if (r > worst) { worst = r; best = i }
+                        # what a scene has to ask for stands beside what it gets, and does not stand for it
+                        if (what[i] ~ /not the default/) beside = beside "; not by default " cell(kind[i], value[i], bound[i], unit[i])
+                        else if (r > worst) { worst = r; best = i }
                         if (part != "whole") continue
                         shall = kind[i] == "none" ? "" : kind[i] == "all" ? "all" : "<= " bound[i] (unit[i] == "" ? "" : " " unit[i])
                         f = figure(kind[i], value[i], bound[i], unit[i])
                         if (kind[i] == "missed" && value[i] > bound[i]) f = "**" f "**, missed; the test holds it at <= " ceiling[i]
                         print "| " id " | " model[m] " | " what[i] " | " f " | " shall " | " test[i] " |"
                     }
-                    row = row " | " (best ? cell(kind[best], value[best], bound[best], unit[best]) : "?")
+                    if (best && kind[best] == "none") {
+                        if (!(what[best] in note)) { note[what[best]] = ++n_note; why[n_note] = what[best] }
+                        row = row " | – <sup>" note[what[best]] "</sup>"
+                    } else
+                        row = row " | " (best ? cell(kind[best], value[best], bound[best], unit[best]) beside : "?")
                 }
                 if (part == "matrix") print row " |"
             }
-        }'
+            if (part == "matrix") printf "\nWhy a case cannot be put to a model:\n"
+            for (k = 1; k <= n_note && part == "matrix"; k++) print (k > 1 ? "· " : "") "<sup>" k "</sup> " why[k] (k < n_note ? "" : ".")
+        }' "$1"
 }
 
-write() {
+# the whole table and the first page with its matrix, as records.tsv wants them: to the files WHOLE and PAGE
+render() {
     {
         cat <<'TEXT'
 # Hard cases
 
-Made by `tests/stability/make_table.sh --run BUILD` from what the tests record (`hard_case.h`); the cases are those of
+Made by `tests/stability/make_table.sh --run BUILD` from what the tests record (`hard_case.h`, kept in `records.tsv`); the cases are those of
 `catalogue.txt`. A line in bold opens a case and tells what shall hold; then what every model does. Figures are the worst of all
 elements, laws, solvers and seeds of the test. S: diagonal of the box around the body at rest. **Bold figures** miss what shall hold.
 
 TEXT
-        tables "$1" whole
-    } >"$whole.new"
-    mv "$whole.new" "$whole"
-    tables "$1" matrix >"$whole.matrix"
-    awk -v matrix="$whole.matrix" '
+        tables "$kept" whole
+    } >"$1"
+    tables "$kept" matrix >"$2.matrix"
+    awk -v matrix="$2.matrix" '
         /^<!-- hard cases -->/ { print; while ((getline line < matrix) > 0) print line; skip = 1; next }
         /^<!-- end of hard cases -->/ { skip = 0 }
-        !skip { print }' README.md >README.md.new
-    rm "$whole.matrix"
+        !skip { print }' README.md >"$2"
+    rm "$2.matrix"
+}
+
+write() {
+    gather "$1" >"$kept.new"
+    mv "$kept.new" "$kept"
+    render "$whole.new" README.md.new
+    mv "$whole.new" "$whole"
     mv README.md.new README.md
+    holes
 }
 
 ids() { sed -n '/^#/d; s/^\([a-z_]*\) *|.*/\1/p' "$catalogue"; }
 
-check() {
+# every case x model is recorded, by a test that is there
+holes() {
     bad=0
-    n=$(ids | wc -l)
     for id in $(ids); do
         for model in $models; do
-            grep -q "^| $id | $model | [^|]" "$whole" || {
-                echo "$whole: no line of case $id, model $model"
-                bad=1
-            }
-            [ -z "${1-}" ] || grep -hq "^$id$tab$model$tab" "$1"/*.tsv || {
-                echo "$1: no record of case $id, model $model"
+            grep -q "^$id$tab$model$tab" "$kept" || {
+                echo "$kept: no line of case $id, model $model"
                 bad=1
             }
         done
@@ -127,22 +157,60 @@ check() {
             bad=1
         }
     done
-    rows=$(sed -n '/^<!-- hard cases -->/,/^<!-- end of hard cases -->/p' README.md | grep -c '^| ' || true)
-    [ "$rows" -eq $((n + 2)) ] || {
-        echo "README.md: the matrix of hard cases has $rows lines, wanted $((n + 2))"
-        bad=1
-    }
-    ! sed -n '/^<!-- hard cases -->/,/^<!-- end of hard cases -->/p' README.md | grep '| ? |' || {
-        echo "README.md: the matrix of hard cases has a hole"
-        bad=1
-    }
-    [ -z "${1-}" ] || for id in $(cut -f 1 "$1"/*.tsv | sort -u); do
-        ids | grep -qx "$id" || {
-            echo "$catalogue: case $id is recorded, but not there"
-            bad=1
+    return $bad
+}
+
+# the records of a run beside those in the tree
+compare() {
+    gather "$1" | awk -F '\t' -v kept="$kept" '
+        function away(a, b, bound, d, size) {
+            if (a == b) return 0
+            d = a - b; size = a > b ? a : b
+            if (d < 0) d = -d
+            return a == "inf" || b == "inf" || !(d <= 0.2 * size || d <= 0.2 * bound)
         }
-    done
-    [ $bad = 0 ] && echo "$n hard cases, every one with every model"
+        function fault(text) { print kept ": " text; bad = 1 }
+        BEGIN {
+            while ((getline line < kept) > 0) {
+                n = split(line, f, "\t")
+                key = f[1] ", " f[2] ", " f[4]
+                for (i = 1; i <= n; i++) was[key, i] = f[i]
+                there[key] = 1
+            }
+        }
+        {
+            key = $1 ", " $2 ", " $4
+            if (!(key in there)) { fault(key ": recorded, but not there"); next }
+            delete there[key]
+            if ($3 != was[key, 3] || $6 != was[key, 6] || $7 != was[key, 7] || $10 != was[key, 10])
+                fault(key ": now " $3 " " $5 " (" $6 ") " $7 ", was " was[key, 3] " " was[key, 5] " (" was[key, 6] ") " was[key, 7])
+            else if (($3 == "all" && $5 != was[key, 5]) || ($3 != "none" && away($5, was[key, 5], $6)) ||
+                     ($3 == "missed" && ($5 <= $6) != (was[key, 5] <= was[key, 6])))
+                fault(key ": " $5 " now, " was[key, 5] " in the tree")
+        }
+        END {
+            for (key in there) fault(key ": no test records it")
+            exit bad
+        }'
+}
+
+same() { # FILE MADE
+    cmp -s "$1" "$2" && return 0
+    echo "$1 is not what $kept says: $(diff "$1" "$2" | grep -c '^[<>]') lines differ, the first:"
+    diff "$1" "$2" | grep '^[<>]' | sed -n 1,2p | cut -c 1-300
+    return 1
+}
+
+check() {
+    bad=0
+    holes || bad=1
+    work=$(mktemp -d)
+    render "$work/whole" "$work/page"
+    same "$whole" "$work/whole" || bad=1
+    same README.md "$work/page" || bad=1
+    rm -r "$work"
+    [ -z "${1-}" ] || compare "$1" || bad=1
+    [ $bad = 0 ] && echo "$(ids | wc -l) hard cases, every one with every model"
     return $bad
 }
 
@@ -162,14 +230,25 @@ case "${1-}" in
     check "${2-}"
     ;;
 --run)
-    PAL_HARD_CASES=$2/hard_cases
+    build=$2
+    [ -f "$build/build.ninja" ] || cmake -S . -B "$build" -G Ninja -D PAL_PRESET=release -D PAL_BUILD_TESTS=ON
+    grep -q '^PAL_PRESET:[A-Z]*=release' "$build/CMakeCache.txt" || {
+        echo "$build is no release build: builds with sanitizers record nothing"
+        exit 1
+    }
+    cmake --build "$build" --target recorders
+    [ -d "${PAL_SHARED:-../shared}/reference" ] || {
+        echo "some that record need ../shared"
+        exit 1
+    }
+    PAL_HARD_CASES=$(realpath "$build")/hard_cases
     export PAL_HARD_CASES
     rm -rf "$PAL_HARD_CASES"
     mkdir -p "$PAL_HARD_CASES"
     for test in $(recorders); do
-        program=$(echo "$test" | sed 's/\.c$//')
+        program=${test%.c}
         echo "$program"
-        "$2/$program" >"$PAL_HARD_CASES/last" || {
+        "$build/$program" >"$PAL_HARD_CASES/last" || {
             cat "$PAL_HARD_CASES/last"
             exit 1
         }
@@ -177,7 +256,7 @@ case "${1-}" in
     write "$PAL_HARD_CASES"
     ;;
 "" | -*)
-    sed -n '2,9s/^# \{0,1\}//p' "$0"
+    sed -n '2,12s/^# \{0,1\}//p' "$0"
     exit 2
     ;;
 *)
