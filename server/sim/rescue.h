@@ -12,8 +12,9 @@ typedef struct pal_rescues {
     uint64_t n_capped;  /* node loads shortened to load_cap_N                                                   */
     uint64_t n_clamped; /* node moves shortened by the solver                                                   */
     uint64_t n_heavy;   /* sub-steps in which deformation asked for more than the budget of sub-steps           */
-    uint64_t n_tangled; /* times that voxel elements were found turned over and ran on their split              */
-    uint64_t n_split;   /* changes between voxel elements and their split; not in the sum: n_tangled says it    */
+    uint64_t n_tangled; /* times that elements were found turned over: voxels ran on their split, those of solids
+                           on the edges of their cells                                                          */
+    uint64_t n_split;   /* changes between elements and that; not in the sum: n_tangled says it                 */
     uint64_t n_search;  /* implicit steps taken again, shorter, because the energy had risen                    */
     uint64_t n_slipped; /* tools that stayed too far within, set anew at the nearest place outside              */
     uint64_t n_stopped; /* the body was stopped and put back: at most 1, a stopped body waits for its reset     */

@@ -6,6 +6,7 @@
  *
  * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when the model
  * has taken others (painting, a live edit of the material), the constants are made anew before they are used next.
+ * Elements that are turned over run on the edges of their cells (cell_tangle.h), which body->rescue counts and times.
  * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
  * of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
