@@ -29,8 +29,10 @@ PAL_INLINE int cell_reference(int n_node)
     return n_node == PAL_CUBIC_NODES ? 21 : 0;
 }
 
-/* y = x - x_0 of half a block from lane l on, [3][n_node] */
-PAL_INLINE void cell_gather(const int32_t *node, int n_node, const double *x, pal_wide (*y)[PAL_CELL_NODES_MOST])
+/* y = x - x_0 of half a block from lane l on, [3][n_node]. Never inlined: it becomes hundreds of moves in one block
+ * with what follows, over which gcc sits ten times as long as over the rest of the file */
+static __attribute__((noinline, unused)) void cell_gather(const int32_t *node, int n_node, const double *x,
+                                                          pal_wide (*y)[PAL_CELL_NODES_MOST])
 {
     for (int m = 0; m < n_node; m++)
         for (int l = 0; l < PAL_WIDE; l++) {
