@@ -92,7 +92,8 @@ typedef struct pal_surface_scene {
     pal_material material; /* young_Pa 0: the default material                 */
     bool largest_only;     /* keep only the largest of several pieces             */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
-    double hold;           /* lowest part of the height held in place; 0: 0.05        */
+    double hold;           /* lowest part of the height held in place; 0: 0.05, of cells
+                            * more where that is not an eighth of the control vertices     */
     bool gravity;      /* add the effect; a shape as scanned carries its own weight already, so the default is none */
     bool area_springs; /* add the row face_area; without it edges and volumes bear its share */
     /* model fem in place of springs */

@@ -397,6 +397,27 @@ static int choose_levels(const pal_cells *cells)
     return cells->n_cell <= WANTED_ELEMENTS / 64 ? 2 : 1;
 }
 
+static int by_height(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* a solid that stands on a thin thing, as a kidney on its ureter, would sway on it for half a minute: what is held is
+ * the part of the height that has an eighth of the control vertices */
+static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double *fraction)
+{
+    int n = cells->n_vertex;
+    double *height = malloc(sizeof(double) * (size_t)n);
+    if (!height) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n; i++) height[i] = pal_dot3(cells->x + 3 * (size_t)i, up);
+    qsort(height, (size_t)n, sizeof(double), by_height);
+    double part = (height[(n - 1) / 8] - height[0]) / (height[n - 1] - height[0]);
+    *fraction = fmax(*fraction, part);
+    free(height);
+    return PAL_ERR_OK;
+}
+
 /* name, body and tools of control cells in cells[0] with their boundary in mesh[0] */
 static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
 {
@@ -417,7 +438,10 @@ static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) body->material = options->material;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
-    if (options->hold > 0) body->support[0].fraction = options->hold;
+    if (options->hold > 0)
+        body->support[0].fraction = options->hold;
+    else
+        PAL_TRY(hold_an_eighth(&loaded->cells[0], scene->up, &body->support[0].fraction));
     scene->n_body = 1;
     pal_tools_default(scene, 3);
     pal_surface_box(&loaded->mesh[0].surface, low, high);
