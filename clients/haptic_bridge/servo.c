@@ -357,7 +357,8 @@ static bool servo_limit(pal_servo *s, double force_d[3], double dt)
     double most = s->cap_N;
     if (size > most) cut = true;
     most = fmin(most, before + s->cap_N / RISE_TIME_S * dt);
-    if (size > most) pal_scale3(force_d, most / size, force_d);
+    /* a hair less, so that no rounding passes the cap */
+    if (size > most) pal_scale3(force_d, most / size * (1 - 1e-12), force_d);
     return cut;
 }
 

@@ -295,7 +295,7 @@ static void add_spread(const pal_transfer *t, const pal_body *from, const pal_bo
 static void find_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     bool lumped = t->shell || (!from->embed && from->n_node >= to->n_node);
-    lookers l = {NULL};
+    lookers l = {0};
     pal_row_build rows;
     if (lumped || t->spread.n_row > 0) return;
     if (find_lookers(&t->in, from->n_node, &l)) {
