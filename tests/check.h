@@ -21,6 +21,18 @@
 static int check_passed, check_failed, check_count;
 static bool check_bad;
 
+/* the largest distance of two lists of n points */
+static inline double check_farthest(const float *a, const float *b, int n)
+{
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double far = 0;
+        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
+        most = fmax(most, sqrt(far));
+    }
+    return most;
+}
+
 static inline double check_random01(uint64_t *seed)
 {
     *seed = *seed * 6364136223846793005u + 1442695040888963407u;

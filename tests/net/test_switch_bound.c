@@ -35,17 +35,6 @@ static float *find_rest(const pal_setting *s, int *n)
     return x;
 }
 
-static double farthest(const float *a, const float *b, int n)
-{
-    double most = 0;
-    for (int i = 0; i < n; i++) {
-        double far = 0;
-        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
-        most = fmax(most, sqrt(far));
-    }
-    return most;
-}
-
 static void make_study(void)
 {
     const pal_setting right = {.model = "fem", .element = "hex8_bbar", .size = FINE};
@@ -62,7 +51,7 @@ static void make_study(void)
     for (int i = 0; i < POINTS; i++) {
         float *x = find_rest(i ? &point[i].setting : NULL, &n);
         REQUIRE(n == n_right);
-        point[i].error_m = farthest(x, best, n);
+        point[i].error_m = check_farthest(x, best, n);
         free(x);
     }
     free(best);

@@ -3,17 +3,6 @@
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_press.h"
 
-static double farthest(const float *a, const float *b, int n)
-{
-    double most = 0;
-    for (int i = 0; i < n; i++) {
-        double far = 0;
-        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
-        most = fmax(most, sqrt(far));
-    }
-    return most;
-}
-
 typedef struct seen {
     double frame_m, least_N, most_N, is_N;
 } seen;
@@ -31,7 +20,7 @@ static void watch(pal_world *next, double step_s, double from_m, seen *out)
     for (int k = 0; k < AFTER; k++) {
         memcpy(last, to->shown, n_byte);
         step(next, step_s, 1);
-        out->frame_m = fmax(out->frame_m, farthest(last, to->shown, to->n_shown));
+        out->frame_m = fmax(out->frame_m, check_farthest(last, to->shown, to->n_shown));
         double now_N = pal_norm3(tool->mean_force_N);
         out->least_N = fmin(out->least_N, now_N), out->most_N = fmax(out->most_N, now_N);
         if (table) printf(k < 16 ? " %.2f" : "", now_N);
@@ -51,7 +40,7 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
     pal_transfer *x = carry(i, j, before, next, &r);
     seen s;
     /* the frame of the switch shows what was shown */
-    double first_m = farthest(from->shown, to->shown, to->n_shown);
+    double first_m = check_farthest(from->shown, to->shown, to->n_shown);
     CHECK_LE(first_m, 1e-7);
     CHECK(to->lag_m != NULL && r.frame_move_m > 0);
     CHECK_NEAR(r.frame_move_m, r.most_move_m / 10, 1e-12);
@@ -86,7 +75,8 @@ static void every_pair_under_a_press(void)
             if (i == j) continue;
             REQUIRE(a->n_shown == best->n_shown && b->n_shown == best->n_shown);
             check_pair(i, j, w[i],
-                       farthest(a->shown, best->shown, best->n_shown) + farthest(b->shown, best->shown, best->n_shown));
+                       check_farthest(a->shown, best->shown, best->n_shown) +
+                           check_farthest(b->shown, best->shown, best->n_shown));
         }
     for (int i = 0; i <= N; i++) pal_world_destroy(w[i]);
     unmake();

@@ -39,17 +39,6 @@ static void pull(const pulled *p, pal_world *w, double step_s)
     }
 }
 
-static double farthest(const float *a, const float *b, int n)
-{
-    double most = 0;
-    for (int i = 0; i < n; i++) {
-        double far = 0;
-        for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
-        most = fmax(most, sqrt(far));
-    }
-    return most;
-}
-
 /* largest length of a shown edge over that at rest */
 static double longest_edge(const pal_world *w)
 {
@@ -81,7 +70,7 @@ static double find_errors(pulled *p)
         const pal_body *a = pal_world_look(w, 0), *b = pal_world_look(right, 0);
         pull(p, w, p->set[i]->scene.step_s);
         if (a->n_shown != b->n_shown) abort();
-        p->error_m[i] = farthest(a->shown, b->shown, b->n_shown);
+        p->error_m[i] = check_farthest(a->shown, b->shown, b->n_shown);
         longest = fmax(longest, longest_edge(w));
         if (table) printf("  setting %d: off by %.2f mm\n", i, 1e3 * p->error_m[i]);
         pal_world_destroy(w);
@@ -105,7 +94,7 @@ static void watch(const pulled *p, pal_world *w, double step_s, int n, double bo
         pull_to(p, w, *part);
         step(w, step_s, 1);
         if (k == 0) out->first_J = pal_body_kinetic_J(b);
-        out->frame = fmax(out->frame, farthest(last, b->shown, b->n_shown) / bound_m);
+        out->frame = fmax(out->frame, check_farthest(last, b->shown, b->n_shown) / bound_m);
         out->edge = fmax(out->edge, longest_edge(w));
         out->least_N = fmin(out->least_N, pal_norm3(force_N)), out->most_N = fmax(out->most_N, pal_norm3(force_N));
         memcpy(last, b->shown, 3 * sizeof *last * (size_t)b->n_shown);
@@ -153,7 +142,7 @@ static void slide(pulled *p, uint64_t seed)
         seen s = {.least_N = before_N, .most_N = before_N};
         double bound_m = p->error_m[at_setting] + p->error_m[to];
         w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &energy_J);
-        CHECK_LE(farthest(last, pal_world_look(w, 0)->shown, pal_world_look(w, 0)->n_shown), 1e-6);
+        CHECK_LE(check_farthest(last, pal_world_look(w, 0)->shown, pal_world_look(w, 0)->n_shown), 1e-6);
         watch(p, w, p->set[to]->scene.step_s, n, bound_m, last, &part, &s);
         if (table)
             printf("  %d -> %d, %2d steps: %.3f of %.2f mm in a frame, edges %.2f (%.2f), force %.2f, %.2f to %.2f N\n",
