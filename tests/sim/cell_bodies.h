@@ -109,6 +109,19 @@ static inline const double *cell_force(cell_body *b)
     cell_effect->run(b->row, &b->step);
     return b->body.f;
 }
+/* net force and net torque about the origin, over the sums of the lengths of what adds up to them */
+static inline void cell_net(cell_body *b, double *force, double *torque)
+{
+    double f_sum[3] = {0, 0, 0}, t_sum[3] = {0, 0, 0}, size = 0, lever = 0, c[3];
+    const double *f = cell_force(b);
+    for (int m = 0; m < b->body.n_node; m++) {
+        pal_add3(f_sum, f_sum, f + 3 * m);
+        pal_cross3(c, b->body.d + 3 * m, f + 3 * m);
+        pal_add3(t_sum, t_sum, c);
+        size += pal_norm3(f + 3 * m), lever += pal_norm3(c);
+    }
+    *force = pal_norm3(f_sum) / size, *torque = pal_norm3(t_sum) / lever;
+}
 static inline double cell_energy(cell_body *b)
 {
     return cell_effect->energy(b->row, &b->body);
