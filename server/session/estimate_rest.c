@@ -15,7 +15,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEWTON_A_STEP = 3, MOST_STEPS = 30, LEAST_HEXES = 4 };
+enum { NEWTON_A_STEP = 3, MOST_STEPS = 30, LEAST_HEXES = 4, MORE_PRESSES = 2 };
+/* near enough in the work of contact; times that its loads are taken more or less at most, in one go */
+#define SAME_PRESS 0.05
+#define MOST_PART  5.0
 static const double rest_tolerance = 1e-6, drop_fill = 0.25, slack_h = 1e-6;
 /* of E h^2: what is left on a node of a body without loads is the rounding of its places, which no tolerance of loads
  * that are 0 is met by */
@@ -187,7 +190,7 @@ static pal_err merge(pal_rest *r, const pal_prepared *mesh, pal_note *note)
 
 /* ---- where the running body's nodes lie ---- */
 
-static void shape_at(const pal_body *b, const double local[4], double *shape)
+void pal_rest_shape(const pal_body *b, const double local[4], double *shape)
 {
     if (b->n_corner == PAL_HEX_CORNERS)
         pal_hex_shape(local, shape, NULL);
@@ -212,7 +215,7 @@ static pal_err find_near(pal_rest *r, const pal_body *body)
         double local[4];
         int e = pal_locate_point(locate, body->node_rest + 3 * i, local, NULL);
         double *weight = r->weight + (size_t)n * (size_t)i, most = 0;
-        shape_at(own, local, weight);
+        pal_rest_shape(own, local, weight);
         for (int k = 0; k < n; k++) most = fmax(most, weight[k]);
         if (most > 1 - 1e-9) r->common[r->n_common++] = i;
         memcpy(r->near + (size_t)n * (size_t)i, own->element + (size_t)n * (size_t)e, (size_t)n * sizeof *r->near);
@@ -268,27 +271,48 @@ void pal_rest_free(pal_rest *r)
 
 /* ---- rest ---- */
 
-static pal_err put_loads(pal_rest *r, const double *load)
+/* of what the state bears the loads of tools, with what of them accelerates the body */
+static void touch_at(const pal_estimate_state *s, int i, double out[3])
 {
+    pal_sub3(out, s->borne + 3 * (size_t)i, s->outer + 3 * (size_t)i);
+}
+
+/* what the state bears, with `part` times the loads of tools in it */
+static void load_at(const pal_estimate_state *s, double part, int i, double out[3])
+{
+    double touch[3];
+    touch_at(s, i, touch);
+    pal_copy3(out, s->borne + 3 * (size_t)i);
+    pal_axpy3(out, part - 1, touch);
+}
+
+static pal_err put_loads(pal_rest *r, const pal_estimate_state *state, double part)
+{
+    double load[3];
     const pal_body *own = pal_world_look(r->world, 0);
     if (r->n_near == 0) {
-        for (int i = 0; i < own->n_node; i++) PAL_TRY(pal_world_load(r->world, 0, i, load + 3 * i));
+        for (int i = 0; i < own->n_node; i++) {
+            load_at(state, part, i, load);
+            PAL_TRY(pal_world_load(r->world, 0, i, load));
+        }
         return PAL_ERR_OK;
     }
     double *f = calloc(3 * (size_t)own->n_node, sizeof *f);
     if (!f) return PAL_ERR_MEMORY;
-    for (int i = 0; i < r->n_node; i++)
+    for (int i = 0; i < r->n_node; i++) {
+        load_at(state, part, i, load);
         for (int k = 0; k < r->n_near; k++) {
             size_t at = (size_t)r->n_near * (size_t)i + (size_t)k;
-            pal_axpy3(f + 3 * (size_t)r->near[at], r->weight[at], load + 3 * i);
+            pal_axpy3(f + 3 * (size_t)r->near[at], r->weight[at], load);
         }
+    }
     pal_err err = PAL_ERR_OK;
     for (int i = 0; i < own->n_node && !err; i++) err = pal_world_load(r->world, 0, i, f + 3 * i);
     free(f);
     return err;
 }
 
-static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const double *from)
+static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const double *from, double part)
 {
     pal_body *own = pal_world_body(r->world, 0);
     pal_material now;
@@ -305,7 +329,7 @@ static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const dou
         if (from || own->held[i]) pal_copy3(own->x + 3 * i, from && !own->held[i] ? from + 3 * i : state->x + 3 * i);
     memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
     pal_world_moved(r->world, 0);
-    return put_loads(r, state->borne);
+    return put_loads(r, state, part);
 }
 
 static bool nothing_acts(const pal_rest *r, double young_Pa)
@@ -348,12 +372,41 @@ static void take_places(pal_rest *r, const pal_body *body)
     }
 }
 
-bool pal_rest_find(pal_rest *r, const pal_estimate_state *state, const pal_body *body, const double *from,
-                   const _Atomic bool *stop)
+static bool find(pal_rest *r, const pal_estimate_state *state, const pal_body *body, const double *from, double part,
+                 const _Atomic bool *stop)
 {
-    if (!r->world) return false;
-    bool good = !put_state(r, state, from) && converge(r, state->material.young_Pa, stop);
+    bool good = !put_state(r, state, from, part) && converge(r, state->material.young_Pa, stop);
     r->known = good;
     if (good) take_places(r, body);
     return good;
+}
+
+/* work of the loads of tools on the way from rest to x */
+static double pressed_J(const pal_estimate_state *s, const pal_body *body, const double *x)
+{
+    double sum = 0;
+    for (int i = 0; i < s->n_node && s->touched; i++) {
+        double u[3], touch[3];
+        pal_sub3(u, x + 3 * (size_t)i, body->node_rest + 3 * (size_t)i);
+        touch_at(s, i, touch);
+        if (!body->held[i]) sum += pal_dot3(touch, u);
+    }
+    return sum;
+}
+
+bool pal_rest_find(pal_rest *r, const pal_estimate_state *state, const pal_body *body, const double *from,
+                   const _Atomic bool *stop)
+{
+    if (!r->world || !find(r, state, body, from, 1, stop)) return false;
+    double want_J = pressed_J(state, body, state->x), got_J = pressed_J(state, body, r->x), part = 1, last = 0,
+           last_J = 0;
+    for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > SAME_PRESS; k++) {
+        /* without contact what rests under other loads counts for little: the first guess is a line from nothing */
+        double slope = (got_J - last_J) / (part - last), next = part + (want_J - got_J) / slope;
+        if (!(next > part / MOST_PART && next < part * MOST_PART)) break;
+        last = part, last_J = got_J, part = next;
+        if (!find(r, state, body, r->n_near > 0 ? NULL : r->x, part, stop)) return find(r, state, body, from, 1, stop);
+        got_J = pressed_J(state, body, r->x);
+    }
+    return true;
 }

@@ -28,8 +28,13 @@ pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *
 pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                          pal_note *note, pal_rest *out);
 void pal_rest_free(pal_rest *rest); /* a zeroed one is fine */
+/* shape functions of a body's elements at local coordinates (mesh/locate.h): shape [n_corner] */
+void pal_rest_shape(const pal_body *body, const double local[4], double *shape);
 /* the rest under what the state bears -> x, known; false: no rest was found or *stop. from: places of the running
- * body's nodes to begin at; NULL, and in another mesh: where it was last */
+ * body's nodes to begin at; NULL, and in another mesh: where it was last.
+ * A tool is held where it is, whatever the mesh makes of its force: loads of tools are taken as many times as bring
+ * what they press as far, in the mean that does their work, as it is in the state (two more solutions at most; where
+ * these bring it no nearer: as they are) */
 bool pal_rest_find(pal_rest *rest, const pal_estimate_state *state, const pal_body *body, const double *from,
                    const _Atomic bool *stop);
 #endif

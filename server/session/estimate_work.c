@@ -1,7 +1,7 @@
 /* The parts of the error of one body: its own scene, the steps ahead (time and algebraic parts), the rests (the other
  * parts). */
 #include "server/session/estimate_price.h"
-#include "server/session/estimate_rest.h"
+#include "server/session/estimate_shown.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -38,7 +38,9 @@ struct pal_estimate_work {
     /* springs: voxels that finite elements may stand on; n_hex 0: those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
+    bool skinned;                           /* what is shown hangs on nodes */
     pal_rest fine, coarse, coarsest, model; /* world NULL: there is none */
+    pal_estimate_shown shown;               /* n 0: nothing is, or nodes are */
     pal_foresight foresight;
     bool priced;     /* what more nodes cost has been measured, or cannot be */
     double awake_ms; /* of a step of a body that was never seen awake; 0: not measured yet */
@@ -96,6 +98,7 @@ static pal_err make_scene(pal_estimate_work *w, const pal_scene *scene, int body
     w->scene->n_tool = 0;
     pal_body_def *def = &w->scene->body[0];
     if (body > 0) *def = scene->body[body];
+    w->skinned = !strcmp(def->output.name, "skin_out");
     def->output.name[0] = 0;
     keep_forces(def);
     return PAL_ERR_OK;
@@ -224,6 +227,7 @@ static pal_err make_rests(pal_estimate_work *w)
     /* one that cannot be had tells nothing of the order */
     if (!err) (void)pal_rest_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
     if (stopped(w)) return PAL_ERR_STATE;
+    if (w->skinned) PAL_TRY(pal_estimate_shown_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
     bool neo = !strcmp(model_text(def, "law", ""), "neo_hookean");
     if (!w->springs && !neo && pal_rest_make(w->scene, body, NULL, "neo_hookean", &note, &w->model)) say(w, note.text);
     return PAL_ERR_OK;
@@ -238,6 +242,7 @@ static pal_err take_state(pal_estimate_work *w)
     s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
     s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
     s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->outer = calloc(3 * (size_t)body->n_node, sizeof(double));
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
     for (int i = 0; i < pal_world_rows(w->live); i++) {
         const pal_effect *effect = pal_world_effect(w->live, i)->effect;
@@ -245,7 +250,7 @@ static pal_err take_state(pal_estimate_work *w)
         s->row[s->n_row] = effect->name;
         s->row_on[s->n_row++] = true;
     }
-    return s->x && s->v && s->load && s->borne && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return s->x && s->v && s->load && s->outer && s->borne && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body, pal_note *note)
@@ -287,9 +292,10 @@ void pal_estimate_work_close(pal_estimate_work *w)
     pal_world_destroy(w->exact);
     pal_rest_free(&w->fine), pal_rest_free(&w->coarse), pal_rest_free(&w->coarsest);
     pal_rest_free(&w->model);
+    pal_estimate_shown_free(&w->shown);
     pal_hexes_free(&w->voxels.hexes);
     free(w->scene), free(w->exact_scene);
-    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.borne);
+    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.outer), free(w->state.borne);
     free(w->first), free(w->second);
     free(w);
 }
@@ -339,6 +345,15 @@ static double fixed_ms(const pal_world *world, int body)
     return 1e-6 * sum_ns;
 }
 
+static bool is_touched(const pal_world *world)
+{
+    const pal_tools *tools = pal_world_tools(world);
+    bool any = false;
+    for (int t = 0; t < tools->n_tool; t++)
+        any = any || pal_dot3(tools->tool[t].mean_force_N, tools->tool[t].mean_force_N) > 0;
+    return any;
+}
+
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
 {
     const pal_body *from = pal_world_look(world, body);
@@ -348,6 +363,11 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     memcpy(state->x, from->x, n_byte);
     memcpy(state->v, from->v, n_byte);
     memcpy(state->load, from->load, 3 * sizeof(double) * (size_t)from->n_node);
+    state->touched = is_touched(world);
+    if (from->outer)
+        memcpy(state->outer, from->outer, 3 * sizeof(double) * (size_t)from->n_node);
+    else
+        memset(state->outer, 0, 3 * sizeof(double) * (size_t)from->n_node);
     state->tick = pal_world_tick(world);
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
@@ -495,7 +515,8 @@ static double change(const pal_rest *rest, const pal_rest *coarser)
 static bool changes_grow(pal_estimate_work *w, const pal_body *body, double last)
 {
     if (!w->coarsest.world || !pal_rest_find(&w->coarsest, &w->state, body, NULL, w->stop)) return false;
-    double first = change(&w->coarse, &w->coarsest);
+    double first = w->shown.n > 0 ? pal_estimate_shown_change(&w->shown, PAL_SHOWN_COARSE, PAL_SHOWN_COARSEST)
+                                  : change(&w->coarse, &w->coarsest);
     return first > 0 && last >= first;
 }
 
@@ -507,19 +528,23 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
         if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
         return;
     }
-    double last = change(&w->fine, &w->coarse);
+    double last = w->shown.n > 0 ? pal_estimate_shown_change(&w->shown, PAL_SHOWN_FINE, PAL_SHOWN_COARSE)
+                                 : change(&w->fine, &w->coarse);
     bool early = changes_grow(w, body, last);
     w->foresight.order = early ? early_order : usual_order;
     if (early) tell(out, "discretisation: still grows from mesh to mesh, so more may be left");
     out->discretisation_m = last / (exp2(w->foresight.order) - 1);
+    /* how springs hang is in how far they are from elements */
+    if (w->shown.n > 0 && !w->springs) out->discretisation_m += pal_estimate_shown_off(&w->shown, w->fine.x, 0);
 }
 
 /* Springs whose constants were fitted to converged finite elements stand nearer to these than to those of their own
  * voxels: how far they are from where Richardson carries the two meshes' rests. That has the mesh's part in it */
-static void compare_fitted(const pal_estimate_work *w, pal_estimate *out)
+static void compare_fitted(pal_estimate_work *w, pal_estimate *out)
 {
     double most = 0, more = 1 / (exp2(w->foresight.order) - 1);
-    for (int k = 0; k < w->coarse.n_common; k++) {
+    if (w->shown.n > 0) most = pal_estimate_shown_off(&w->shown, w->state.x, more);
+    for (int k = 0; k < w->coarse.n_common && w->shown.n == 0; k++) {
         size_t i = 3 * (size_t)w->coarse.common[k];
         double limit[3];
         for (size_t c = 0; c < 3; c++) limit[c] = w->fine.x[i + c] + more * (w->fine.x[i + c] - w->coarse.x[i + c]);
@@ -535,7 +560,8 @@ static void compare_models(pal_estimate_work *w, const pal_body *body, pal_estim
     if (w->springs && w->foresight.setting.k_distance_J > 0 && out->discretisation_m > 0)
         compare_fitted(w, out);
     else if (w->springs) /* where they are is where they rest under what they bear */
-        out->model_m = most_between(w->state.x, w->fine.x, n);
+        out->model_m =
+            w->shown.n > 0 ? pal_estimate_shown_off(&w->shown, w->state.x, 0) : most_between(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
     else if (pal_rest_find(&w->model, &w->state, body, w->fine.x, w->stop))

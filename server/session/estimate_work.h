@@ -15,8 +15,10 @@ typedef struct pal_estimate_state {
     int n_dof, n_node;
     double *x, *v; /* m, m/s [n_dof][3] */
     double *load;  /* lasting and contact loads, N [n_node][3] */
+    double *outer; /* of load: what lasts, N [n_node][3] */
     double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
     bool asleep;
+    bool touched;    /* a tool presses or pulls */
     int n_substep;   /* of the step */
     double fixed_ms; /* of one awake, in rows that are neither forces nor solver: what is shown, contact, guards; the
                         least of the states so far, as a step that was interrupted says too much */

@@ -1,6 +1,8 @@
 /* What a switch promises, over the wire: a ball under its weight that a client presses goes from point to point of its
- * study and along its knobs, the energy within 2 %, no shown vertex farther in a frame than the errors that were shown
- * of both settings allow, and the answer says so. The carry is made beside the loop, not by it. */
+ * study and along its knobs, the energy within 2 %, no shown vertex farther in all than the errors that were shown of
+ * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
+ * made beside the loop, not by it. */
+#include "server/session/estimate_work.h"
 #include "server/session/switching.h"
 #include "tests/net/order_room.h"
 #include "tests/session/small_scene.h"
@@ -10,11 +12,23 @@ enum { POINTS = 3, STEPS = 100, FINE = 11 };
 static pal_scene scene;
 static pal_prepared mesh;
 static pal_priced_setting point[POINTS];
+static double estimate_m[POINTS];
 
 /* ---- a study of the ball as it is pressed ---- */
 
-/* shown places at rest under the press, heap [n][3] */
-static float *find_rest(const pal_setting *s, int *n)
+/* of a running session there */
+static double estimate_of(const pal_scene *at, const pal_world *w)
+{
+    pal_estimate_work *work = NULL;
+    pal_estimate e = {.error_m = NAN};
+    CHECK(!pal_estimate_work_open(at, 0, NULL, NULL, &work));
+    if (work) CHECK(pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, &e));
+    pal_estimate_work_close(work);
+    return e.error_m;
+}
+
+/* shown places at rest under the press, heap [n][3], and the estimate of its error; error_m NULL: not wanted */
+static float *find_rest(const pal_setting *s, int *n, double *error_m)
 {
     pal_note note = {""};
     pal_set_scene *set = NULL;
@@ -30,6 +44,7 @@ static float *find_rest(const pal_setting *s, int *n)
     if (!x) abort();
     memcpy(x, b->shown, 3 * sizeof *x * (size_t)b->n_shown);
     *n = b->n_shown;
+    if (error_m) *error_m = estimate_of(set ? &set->scene : &scene, w);
     pal_world_destroy(w);
     pal_set_scene_free(set);
     return x;
@@ -47,14 +62,25 @@ static void make_study(void)
     order_point(&point[1], "fem", "hex8_bbar", 6);
     order_point(&point[2], "fem", "tet4", 8);
     point[0].setting.k_area_J = -1;
-    float *best = find_rest(&right, &n_right);
+    float *best = find_rest(&right, &n_right, NULL);
     for (int i = 0; i < POINTS; i++) {
-        float *x = find_rest(i ? &point[i].setting : NULL, &n);
+        float *x = find_rest(i ? &point[i].setting : NULL, &n, &estimate_m[i]);
         REQUIRE(n == n_right);
         point[i].error_m = check_farthest(x, best, n);
         free(x);
     }
     free(best);
+}
+
+/* what tools touch and clients see is the skin: an estimate of nodes alone said a fifth of its error here */
+static void a_press_is_estimated_as_it_is_shown(void)
+{
+    for (int i = 0; i < POINTS; i++) {
+        double ratio = estimate_m[i] / point[i].error_m;
+        printf("  %s, %d voxels: off by %.3f mm, estimate %.3f mm: %.2f\n", point[i].setting.model,
+               point[i].setting.size, 1e3 * point[i].error_m, 1e3 * estimate_m[i], ratio);
+        CHECK(ratio >= 0.5 && ratio <= 3);
+    }
 }
 
 /* ---- over the wire ---- */
@@ -80,8 +106,8 @@ static void check_jump(const mem_client *c)
     CHECK_LE(fabs(told(c, "energy_percent")), 2);
     CHECK(told(c, "energy_before_J") > 1e-4);
     CHECK(told(c, "most_move_m") > 0 && told(c, "body_move_m") > 0);
-    /* what goes from one frame to the next: nobody sees more of a switch at once */
-    CHECK_LE(told(c, "frame_move_m"), bound_m);
+    CHECK_LE(told(c, "most_move_m"), bound_m);
+    CHECK_NEAR(told(c, "frame_move_m"), told(c, "most_move_m") / 10, 1e-9);
     CHECK(strstr(text, "within the bound") != NULL);
     CHECK(!strstr(text, "beyond 2 %"));
 }
@@ -98,7 +124,6 @@ static void every_pair_keeps_the_errors_shown(void)
         snprintf(args, sizeof args, "\"index\":%d", way[k]);
         CHECK(order(&c, "point", args));
         check_jump(&c);
-        CHECK_LE(told(&c, "most_move_m"), told(&c, "bound_m"));
         CHECK_NEAR(told(&c, "error_before_m"), point[at].error_m, 1e-9);
         CHECK_NEAR(told(&c, "error_after_m"), point[way[k]].error_m, 1e-9);
         until_frame(&c);
@@ -117,9 +142,7 @@ static const pal_wire_neighbour *next_size(const pal_wire_estimate *e)
     return NULL;
 }
 
-/* while somebody looks the bound is that of the estimate and of the neighbour on the knob. At rest under its weight a
- * point of the body goes by a part of it; its skin, which hangs on other nodes then, by about all of it, and under a
- * press by more, but that is let go over ten frames */
+/* while somebody looks the bound is that of the estimate and of the neighbour on the knob */
 static void a_knob_keeps_the_errors_foreseen(bool pressed)
 {
     mem_client c;
@@ -139,7 +162,7 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     snprintf(args, sizeof args, "\"size\":%u", next->size);
     CHECK(order(&c, "knob", args));
     check_jump(&c);
-    if (!pressed) CHECK_LE(told(&c, "body_move_m"), told(&c, "bound_m"));
+    CHECK_LE(told(&c, "body_move_m"), told(&c, "bound_m"));
     printf("  %s: moves %.3f mm, %.3f mm a frame, a point of the body %.3f mm, bound %.3f mm\n",
            pressed ? "pressed" : "under its weight", 1e3 * told(&c, "most_move_m"), 1e3 * told(&c, "frame_move_m"),
            1e3 * told(&c, "body_move_m"), 1e3 * told(&c, "bound_m"));
@@ -154,7 +177,6 @@ static void a_knob_at_rest_keeps_the_errors_foreseen(void)
     a_knob_keeps_the_errors_foreseen(false);
 }
 
-/* right under the ball of a tool one vertex hangs on other nodes by more than an estimate of the whole body says */
 static void a_knob_under_a_press_keeps_them_too(void)
 {
     a_knob_keeps_the_errors_foreseen(true);
@@ -177,6 +199,7 @@ static void without_errors_shown_there_is_no_bound(void)
 int main(void)
 {
     make_study();
+    RUN(a_press_is_estimated_as_it_is_shown);
     RUN(every_pair_keeps_the_errors_shown);
     RUN(a_knob_at_rest_keeps_the_errors_foreseen);
     RUN(a_knob_under_a_press_keeps_them_too);

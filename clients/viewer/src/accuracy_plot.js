@@ -169,18 +169,18 @@ export function knobOrder(body, to) {
   return to.knob === "method" || Object.keys(args).length === 0 ? null : { verb: "knob", target: body, args };
 }
 
-/** the errors shown of both settings bound what a switch may move in a frame @param {Record<string, number>} args */
-function boundWords({ most_move_m, frame_move_m = most_move_m, bound_m }) {
+/** the errors shown of both settings bound what a switch may move @param {Record<string, number>} args */
+function boundWords({ most_move_m, bound_m }) {
   if (typeof bound_m !== "number") return "";
   // what rounds to nothing in these words is no jump
-  return frame_move_m <= Math.max(bound_m, LEAST_SAID_M) ? ` of ${millimetres(bound_m)} allowed` : `, more than the ${millimetres(bound_m)} allowed`;
+  return most_move_m <= Math.max(bound_m, LEAST_SAID_M) ? ` of ${millimetres(bound_m)} allowed` : `, more than the ${millimetres(bound_m)} allowed`;
 }
 
 /** what a switch did @param {{text: string, args?: Record<string, number>}} answer */
 export function switchWords({ text, args = {} }) {
   const said = [];
   if (typeof args.energy_percent === "number") said.push(`energy ${args.energy_percent >= 0 ? "+" : "−"}${Math.abs(args.energy_percent).toFixed(2)} %`);
-  if (typeof args.frame_move_m === "number") said.push(`moves ${millimetres(args.frame_move_m)} a frame${boundWords(args)}, ${millimetres(args.most_move_m)} in all`);
+  if (typeof args.frame_move_m === "number") said.push(`moves ${millimetres(args.most_move_m)}${boundWords(args)}, ${millimetres(args.frame_move_m)} a frame`);
   else if (typeof args.most_move_m === "number") said.push(`moved ${millimetres(args.most_move_m)}${boundWords(args)}`);
   if (typeof args.made_ms === "number") said.push(`made in ${args.made_ms < 1000 ? `${args.made_ms.toFixed(0)} ms` : `${(args.made_ms / 1000).toFixed(1)} s`}`);
   return said.length ? `Switched: ${said.join(", ")}.` : text;

@@ -103,8 +103,8 @@ test("a switch is told by what it did", () => {
   assert.equal(switchWords({ text: "x", args: { most_move_m: 4e-5, bound_m: 1.2e-3 } }), "Switched: moved 0.04 mm of 1.2 mm allowed.");
   assert.equal(switchWords({ text: "x", args: { most_move_m: 4e-3, bound_m: 1.2e-3 } }), "Switched: moved 4 mm, more than the 1.2 mm allowed.");
   assert.equal(switchWords({ text: "x", args: { most_move_m: 2e-8, bound_m: 1e-9 } }), "Switched: moved < 0.001 mm of < 0.001 mm allowed.", "at rest");
-  assert.equal(switchWords({ text: "x", args: { most_move_m: 3e-4, frame_move_m: 3e-5, bound_m: 2e-4 } }), "Switched: moves 0.03 mm a frame of 0.2 mm allowed, 0.3 mm in all.");
-  assert.equal(switchWords({ text: "x", args: { most_move_m: 4e-3, frame_move_m: 4e-4, bound_m: 2e-4 } }), "Switched: moves 0.4 mm a frame, more than the 0.2 mm allowed, 4 mm in all.");
+  assert.equal(switchWords({ text: "x", args: { most_move_m: 3e-4, frame_move_m: 3e-5, bound_m: 2e-4 } }), "Switched: moves 0.3 mm, more than the 0.2 mm allowed, 0.03 mm a frame.");
+  assert.equal(switchWords({ text: "x", args: { most_move_m: 1.5e-4, frame_move_m: 1.5e-5, bound_m: 2e-4 } }), "Switched: moves 0.15 mm of 0.2 mm allowed, 0.015 mm a frame.");
   assert.equal(switchWords({ text: "fem, 16 voxels" }), "fem, 16 voxels");
 });
 
