@@ -9,10 +9,11 @@
  * velocities are half a sub-step before their positions, which shows as a ripple where much moves fast; a step in which
  * cubes change to their split or back is not judged: the two store other energies in one shape), and after release
  * within 0.1 % S of rest in RMS, S being the box diagonal. A body that nothing holds is compared after the best rigid
- * motion. Springs (tet_springs) may stay tangled or be stopped when their shape was taken away: a lattice of lengths
- * and volumes has several rests; they have to be finite, bounded and within 0.1 % S of rest after a reset. Each body
- * of a scene is excused for itself alone. Solids of cells are not excused: one that stays folded fails, is reset to see
- * that this brings it back, and the note says what helps.
+ * motion. Springs (tet_springs) untangle; where they may not (model key untangle false), or do not find back, they may
+ * stay tangled or be stopped when their shape was taken away: a lattice of lengths and volumes has several rests; they
+ * have to be finite, bounded and within 0.1 % S of rest after a reset. Each body of a scene is excused for itself
+ * alone. Solids of cells are not excused: one that stays folded fails, is reset to see that this brings it back, and
+ * the note says what helps.
  *
  * A scene that a moving support leads for ever is compared with an untouched run beside it instead of with rest; its
  * energy is not judged. Springs that stay away until their reset are told apart: `collapsed`, no failure.

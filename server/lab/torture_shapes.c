@@ -93,13 +93,15 @@ static void shaped(pal_rig *rig, shape how)
     bool springs = true;
     for (int b = 0; b < rig->scene->n_body; b++) {
         spoil(rig, b, how);
-        rig->may_stay[b] = pal_rig_springs(rig, b);
-        rig->may_stop[b] = rig->may_stay[b] || (how == BLOWN_UP && guarded(rig, b));
-        springs = springs && rig->may_stay[b];
+        /* what untangles and has a guard is judged as all others when it is beyond the guard's reach */
+        const bool untangles = pal_world_body(rig->world, b)->tangle != NULL, far = how == BLOWN_UP && guarded(rig, b);
+        rig->may_stay[b] = pal_rig_springs(rig, b) && !(untangles && far);
+        rig->may_stop[b] = rig->may_stay[b] || far;
+        springs = springs && rig->may_stay[b] && !untangles;
     }
     double before = extent(rig);
     pal_rig_moved(rig);
-    /* springs alone need not come back: long enough to see that they are bounded */
+    /* springs that do not untangle need not come back: long enough to see that they are bounded */
     pal_rig_relax(rig, springs ? springs_s : how == BLOWN_UP ? blown_s : back_s);
     int n = turned_over(rig);
     double after = extent(rig);

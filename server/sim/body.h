@@ -100,9 +100,11 @@ typedef struct pal_body {
     const float *fill; /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
 
     /* geometry at rest, borrowed from the scene's prepared mesh by the model; NULL when the model has none */
-    const pal_tets *tets;       /* its nodes are the body's first ones */
-    const pal_hexes *hexes;     /* the same nodes as cubes; NULL: none */
-    pal_slots *slots;           /* memory order of the nodes for kernels; NULL: none made       */
+    const pal_tets *tets;   /* its nodes are the body's first ones */
+    const pal_hexes *hexes; /* the same nodes as cubes; NULL: none */
+    pal_slots *slots;       /* memory order of the nodes for kernels; NULL: none made       */
+    /* what springs run on where they are turned over (spring_tangle.h); NULL: they never untangle */
+    struct pal_spring_tangle *tangle;
     const pal_surface *surface; /* shown surface at rest                                       */
     const pal_skin *skin;       /* surface on nodes; NULL: shown vertices are the surface nodes */
     /* what is shown: all of these are set by the OUTPUT row's make; none: n_shown 0 */

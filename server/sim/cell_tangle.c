@@ -2,7 +2,7 @@
 #include "server/sim/cell_tangle.h"
 
 #include "server/base/vec3.h"
-#include "server/num/polar.h"
+#include "server/sim/best_turn.h"
 #include "server/sim/cell_kernel.h"
 #include "server/sim/elastic_law.h"
 
@@ -126,45 +126,6 @@ static inline void edge_vector(const double *d, const int32_t edge[2], double ou
     pal_sub3(out, d + 3 * (size_t)edge[1], d + 3 * (size_t)edge[0]);
 }
 
-/* the rotation that maximises G : s */
-static void best_turn(const double s[9], double turn[9])
-{
-    double u[9], w[3], v[9];
-    pal_svd3(s, u, w, v);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            turn[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + u[3 * i + 2] * v[3 * j + 2];
-}
-
-static void add_outer(double s[9], double k, const double x[3], const double y[3])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) s[3 * i + j] += k * x[i] * y[j];
-}
-
-/* G of what is held; false: too little is, for a rotation */
-static bool held_turn(const pal_body *body, double turn[9])
-{
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, s[9] = {0}, rest[9] = {0}, width[3], axes[9];
-    int n = 0;
-    for (int i = 0; i < body->n_dof; i++) {
-        if (!body->held[i]) continue;
-        pal_add3(from, from, body->x_rest + 3 * (size_t)i), pal_add3(to, to, body->x + 3 * (size_t)i), n++;
-    }
-    if (n < 3) return false;
-    pal_scale3(from, 1.0 / n, from), pal_scale3(to, 1.0 / n, to);
-    for (int i = 0; i < body->n_dof; i++) {
-        double x[3], y[3];
-        if (!body->held[i]) continue;
-        pal_sub3(x, body->x + 3 * (size_t)i, to), pal_sub3(y, body->x_rest + 3 * (size_t)i, from);
-        add_outer(s, 1, x, y), add_outer(rest, 1, y, y);
-    }
-    pal_eigen3(rest, width, axes);
-    if (!(width[1] > 1e-6 * body->size_m * body->size_m)) return false;
-    best_turn(s, turn);
-    return true;
-}
-
 /* rotations at d of those patches that have their own */
 static void find_turns(pal_cell_tangle *t, const pal_solid *solid, const double *d)
 {
@@ -175,11 +136,11 @@ static void find_turns(pal_cell_tangle *t, const pal_solid *solid, const double 
         for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
             double x[3], y[3];
             edge_vector(d, edge[i], x), edge_vector(solid->node_rest, edge[i], y);
-            add_outer(t->of[t->patch[cell]].sum, t->k_N_m[cell], x, y);
+            pal_add_outer(t->of[t->patch[cell]].sum, t->k_N_m[cell], x, y);
         }
     }
     for (int p = 0; p < t->n_patch; p++)
-        if (!t->of[p].held) best_turn(t->of[p].sum, t->of[p].turn);
+        if (!t->of[p].held) pal_best_turn(t->of[p].sum, t->of[p].turn);
 }
 
 /* energy of a cell's edges, J, without s; f: forces are added with it */
@@ -369,7 +330,7 @@ static void number(pal_cell_tangle *t, const pal_solid *solid)
 static void begin(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body)
 {
     double held[9];
-    const bool led = held_turn(body, held);
+    const bool led = pal_held_turn(body, held);
     for (int cell = 0; cell < t->n_cell; cell++)
         if (t->patch[cell] >= 0) t->of[t->patch[cell]].n++;
     for (int p = 0; p < t->n_patch; p++) {

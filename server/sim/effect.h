@@ -129,6 +129,8 @@ typedef struct pal_effect {
     /* live edit: constants that the scene did not give are derived again. REFUSED: nothing changed */
     pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_note *note);
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
+    /* FORCE: the row's springs, which others switch off where they are turned over (spring_tangle.h) */
+    struct pal_spring_row *(*springs)(void *self);
     /* FORCE: looks for elements that are turned over and chooses what they run on from now on; true: forces and
      * stiffness are others than before. Solvers ask between sub-steps, never within one */
     bool (*untangle)(void *self, const pal_body *body);

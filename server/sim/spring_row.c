@@ -14,16 +14,19 @@ static void corners_at(const double *x, const int32_t *node, int n, const double
 
 /* ---- regions ---- */
 
-/* weights of the body's material as it is; those of regions keep what they give */
+/* weights of the body's material as it is; those of regions keep what they give. What is off stays so until the next
+ * look */
 static void weigh(pal_spring_row *row, const pal_material *material)
 {
+    double *q = row->all ? row->all : row->q;
     double factor[3], young_Pa = material->young_Pa;
     pal_spring_factors(material->poisson, row->spring.without_area, factor);
     const double f = factor[row->spring.kind], over[4] = {1, 1 / young_Pa, 1 / f, 1 / (young_Pa * f)};
     for (int i = 0; i < row->strips.n_lane; i++) {
-        row->q[i] = 0;
-        for (int k = 0; k < 4; k++) row->q[i] += over[k] * row->part[k][i];
+        q[i] = 0;
+        for (int k = 0; k < 4; k++) q[i] += over[k] * row->part[k][i];
     }
+    if (row->all) memcpy(row->q, q, sizeof *q * (size_t)row->strips.n_lane);
 }
 
 /* what each tetrahedron counts, by what its region gives: nothing, E, Poisson's ratio, both [4][n_tet]; false: all are
@@ -94,6 +97,15 @@ static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
     return take_regions(row, build, weight);
 }
 
+static pal_err keep_all(pal_spring_row *row, pal_arena *arena)
+{
+    row->all = PAL_NEW(arena, double, row->strips.n_lane);
+    row->off = PAL_NEW(arena, int32_t, row->n_item);
+    if (!row->all || !row->off) return PAL_ERR_MEMORY;
+    memcpy(row->all, row->q, sizeof *row->q * (size_t)row->strips.n_lane);
+    return PAL_ERR_OK;
+}
+
 pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build)
 {
     if (build->body->tets && build->body->tets->n_tet > 0) return PAL_ERR_OK;
@@ -124,7 +136,7 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
     memcpy(out->item, item, n * sizeof *item);
     pal_err err = fill(out, build, weight);
     free(weight);
-    return err;
+    return err || !body->tangle ? err : keep_all(out, build->arena);
 }
 
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note)

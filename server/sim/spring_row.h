@@ -25,6 +25,11 @@ typedef struct pal_spring_row {
     /* with regions of other materials q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E and
      * factor, and what it would be without them; NULL: there are none [strips.n_lane] */
     double *part[4], *whole;
+    /* q as it is where nothing is turned over, and the springs that are off since something is (spring_tangle.h);
+     * NULL: the body never untangles [n_lane], [n_item] */
+    double *all;
+    int32_t *off;
+    int n_off;
 } pal_spring_row;
 
 /* REFUSED: the body is not made of tetrahedra */

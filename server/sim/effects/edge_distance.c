@@ -2,9 +2,10 @@
  * opposite on j, d from i to j (paper B 4.1, F_D).
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
- * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. */
+ * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
+ * are turned over its edges keep vectors (spring_tangle.h), whose forces and energy are this row's. */
 #include "server/sim/effect_list.h"
-#include "server/sim/spring_row.h"
+#include "server/sim/spring_tangle.h"
 
 #include <stdlib.h>
 
@@ -23,7 +24,8 @@ static void sum_bounds(edge_distance *e)
     for (int i = 0; i < e->n_dof; i++) e->node_bound[i] = 0;
     for (int i = 0; i < 2 * e->row.n_item; i++) {
         int lane = e->row.strips.place[i / 2];
-        e->node_bound[e->row.item[i]] += 2 * e->row.q[lane] * e->row.w[lane] * e->row.w[lane];
+        const double q = e->row.all ? e->row.all[lane] : e->row.q[lane];
+        e->node_bound[e->row.item[i]] += 2 * q * e->row.w[lane] * e->row.w[lane];
     }
 }
 
@@ -79,6 +81,11 @@ static void reopen(const pal_spring_row *row, const pal_body *body)
     }
 }
 
+static pal_spring_row *springs(void *self)
+{
+    return &((edge_distance *)self)->row;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     const edge_distance *e = self;
@@ -87,13 +94,22 @@ static pal_err run(void *self, pal_step *step)
     double least = pal_spring_run(&e->row, body->slots, kernel, 2);
     pal_slots_add(body->slots, body->f);
     if (least < LEAST_Q) reopen(&e->row, body);
+    if (e->row.n_off > 0) pal_spring_tangle_force(body->tangle, &e->row, body);
     if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    return pal_spring_energy(&((edge_distance *)self)->row, body, PAL_SPRING_DISTANCE);
+    const pal_spring_row *row = &((edge_distance *)self)->row;
+    const double sum = pal_spring_energy(row, body, PAL_SPRING_DISTANCE);
+    return row->n_off > 0 ? sum + pal_spring_tangle_energy(body->tangle, row, body) : sum;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)self;
+    if (body->tangle) pal_spring_tangle_reset(body->tangle);
 }
 
 /* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is never more for l > l0
@@ -107,7 +123,9 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const edge_distance *e = self;
-    for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += e->row.spring.c_Js * e->node_bound[i];
+    /* of patches: stiffness times their time; nodes of none have less */
+    const double c_Js = e->row.spring.c_Js + (e->row.n_off > 0 ? body->tangle->damp_s * e->row.spring.k_J : 0);
+    for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += c_Js * e->node_bound[i];
 }
 
 /* with regions the weights are others by now */
@@ -124,8 +142,9 @@ static void measure_regions(const pal_spring_row *row, double *sum, double *volu
 {
     for (int i = 0; i < 2 * row->n_item; i++) {
         int lane = row->strips.place[i / 2], node = row->item[i];
+        const double q = row->all ? row->all[lane] : row->q[lane];
         if (!(row->whole[lane] > 0)) continue;
-        sum[node] += row->spring.k_J * row->q[lane] / row->whole[lane];
+        sum[node] += row->spring.k_J * q / row->whole[lane];
         volume_m3[node] += 1;
     }
 }
@@ -154,6 +173,8 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .energy = energy,
                                              .stiffness = stiffness,
                                              .damping = damping,
+                                             .springs = springs,
+                                             .reset = reset,
                                              .material = edit,
                                              .measure = measure,
                                              .fields = 1u << PAL_FIELD_STIFFNESS_J};

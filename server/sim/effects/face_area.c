@@ -61,6 +61,11 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
 }
 
+static pal_spring_row *springs(void *self)
+{
+    return self;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     const pal_spring_row *row = self;
@@ -98,4 +103,5 @@ const pal_effect pal_effect_face_area = {.name = "face_area",
                                          .energy = energy,
                                          .stiffness = stiffness,
                                          .damping = damping,
+                                         .springs = springs,
                                          .material = pal_spring_row_material};

@@ -68,6 +68,11 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     bound[3] += c * (length[0] + length[1] + length[3]);
 }
 
+static pal_spring_row *springs(void *self)
+{
+    return self;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     const pal_spring_row *row = self;
@@ -105,4 +110,5 @@ const pal_effect pal_effect_tet_volume = {.name = "tet_volume",
                                           .energy = energy,
                                           .stiffness = stiffness,
                                           .damping = damping,
+                                          .springs = springs,
                                           .material = pal_spring_row_material};

@@ -5,7 +5,8 @@
  * c_area_Js, c_volume_Js (damping of the constraint, default 0), weights ("equal": every spring of a row has its
  * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
  * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
- * shares, weights by volume and masses count only what is inside, as model fem has it).
+ * shares, weights by volume and masses count only what is inside, as model fem has it), untangle (true: what is turned
+ * over comes back, spring_tangle.h; false: it may rest so).
  *
  * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own
  * (spring_law.h); constants that are given stand for all of them.
@@ -16,7 +17,7 @@
  * material's damping rate is given. */
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
-#include "server/sim/spring_law.h"
+#include "server/sim/spring_tangle.h"
 
 #include <math.h>
 #include <string.h>
@@ -117,6 +118,8 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_spring_grid_check(build->def, build->note));
     PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
+    bool untangle = true;
+    PAL_TRY(pal_item_bool(item, "untangle", &untangle, build->note));
     PAL_TRY(pal_item_done(item, build->note));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
@@ -131,6 +134,7 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     body->surface = &mesh->surface;
     body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->h_m = mesh->tets.h_m;
+    if (untangle) PAL_TRY(pal_spring_tangle_make(body->n_node, build->arena, &body->tangle));
     return pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots);
 }
 

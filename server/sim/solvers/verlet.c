@@ -6,10 +6,12 @@
  * K + t C <= m at every free node. The bound is taken again at the current state whenever a node may have moved a fifth
  * of an element since the last time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a
  * sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality is met
- * by adding mass to the nodes that break it. */
+ * by adding mass to the nodes that break it. Where the bound is taken, springs are looked at for what is turned over
+ * (spring_tangle.h). */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
+#include "server/sim/spring_tangle.h"
 
 #include <string.h>
 
@@ -66,7 +68,9 @@ static double limit(void *self, pal_step *step)
     verlet *row = self;
     const pal_body *body = step->body;
     bool contact = step->sub == 0 && has_bounds(step->contact, step->n_contact);
-    if (row->known && !contact && row->way_m <= most_way_h * body->h_m) return row->limit_s;
+    bool tangled = step->sub == 0 && body->tangle && body->tangle->n_patch > 0;
+    if (row->known && !contact && !tangled && row->way_m <= most_way_h * body->h_m) return row->limit_s;
+    if (body->tangle) (void)pal_spring_tangle_look(body->tangle, step);
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(row->stiff, 0, n_byte);
     memset(row->damp, 0, n_byte);
@@ -142,8 +146,9 @@ static pal_err run(void *self, pal_step *step)
 
 static void reset(void *self, const pal_body *body)
 {
-    (void)body;
     ((verlet *)self)->known = false;
+    /* rows or their constants may be others */
+    if (body->tangle) body->tangle->stale = true;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
