@@ -36,17 +36,18 @@ static double times(const pal_foresight *from, int side)
 
 static void sizes(const pal_foresight *from, pal_estimate *out)
 {
-    double shrink = exp2(-from->order);
+    double left[2] = {from->left[0] > 0 ? from->left[0] : exp2(from->order),
+                      from->left[1] > 0 ? from->left[1] : exp2(-from->order)};
     pal_setting to = from->setting;
     /* calibrated constants hold for the size that they were found for */
     if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
     to.size = from->setting.size / 2;
     if (to.size >= LEAST_SIZE && taken(from, &to, 1))
-        add(from, out, &to, out->ms * times(from, 0), out->discretisation_m * (1 / shrink - 1), from->nodes[0],
+        add(from, out, &to, out->ms * times(from, 0), out->discretisation_m * (left[0] - 1), from->nodes[0],
             from->substeps[0]);
     to.size = from->setting.size * 2;
     if (to.size <= MOST_SIZE && taken(from, &to, from->implicit ? 1 : 2))
-        add(from, out, &to, out->ms * times(from, 1), out->discretisation_m * (shrink - 1), from->nodes[1],
+        add(from, out, &to, out->ms * times(from, 1), out->discretisation_m * (left[1] - 1), from->nodes[1],
             from->substeps[1]);
 }
 

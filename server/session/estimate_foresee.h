@@ -4,12 +4,12 @@
  * ms is what a step of the scene takes, as it is now (setting.h: a shorter step is priced by two of them).
  * size: half and twice. `fixed` of a step's time is of what does not go with the mesh (what is shown, contact, guards)
  * and stays; the rest goes with the sub-steps and with what one of them takes (estimate_price.h). The part of
- * discretisation goes with h^order. None for calibrated springs, whose constants are of one size.
- * step (implicit solvers): half and twice; each of them takes as long, the part of time goes with step^solver order.
- * tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was
- * measured to cost.
- * What a switch would refuse is not offered: pal_switch_check, and more sub-steps in a step than the scene allows (of
- * explicit solvers as many more as elements are smaller; in a longer step as many more as it is longer). */
+ * discretisation goes with h^order, or as it was measured where many voxels are cut. None for calibrated springs, whose
+ * constants are of one size. step (implicit solvers): half and twice; each of them takes as long, the part of time goes
+ * with step^solver order. tolerance (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by
+ * what a decade was measured to cost. What a switch would refuse is not offered: pal_switch_check, and more sub-steps
+ * in a step than the scene allows (of explicit solvers as many more as elements are smaller; in a longer step as many
+ * more as it is longer). */
 #ifndef PAL_SESSION_ESTIMATE_FORESEE_H
 #define PAL_SESSION_ESTIMATE_FORESEE_H
 #include "server/session/estimate.h"
@@ -24,7 +24,10 @@ typedef struct pal_foresight {
     /* half and twice the size, over what is now: nodes as they are thought to be, sub-steps, time of a sub-step; NaN:
      * not known, no neighbour in size */
     double nodes[2], substeps[2], work[2];
-    double order;     /* of the elements */
+    double order; /* of the elements */
+    /* error of half and of twice as many voxels over this mesh's, as measured (estimate_family.h); 0: as `order` has it
+     */
+    double left[2];
     bool implicit;    /* the knobs step and tolerance mean something */
     int solver_order; /* in time */
     double tolerance; /* of the solver as it is */

@@ -200,6 +200,18 @@ void pal_rest_shape(const pal_body *b, const double local[4], double *shape)
         memcpy(shape, local, 4 * sizeof *shape);
 }
 
+/* what lies outside is taken where it is nearest: extrapolated, a load would become a pair of large ones */
+static void take_inside(const pal_body *b, double local[4])
+{
+    double sum = 0;
+    bool hex = b->n_corner == PAL_HEX_CORNERS;
+    for (int c = 0; c < (hex ? 3 : 4); c++) {
+        local[c] = hex ? fmin(fmax(local[c], -1), 1) : fmax(local[c], 0);
+        sum += local[c];
+    }
+    for (int c = 0; c < 4 && !hex; c++) local[c] /= sum;
+}
+
 static pal_err find_near(pal_rest *r, const pal_body *body)
 {
     const pal_body *own = pal_world_look(r->world, 0);
@@ -215,6 +227,7 @@ static pal_err find_near(pal_rest *r, const pal_body *body)
         double local[4];
         int e = pal_locate_point(locate, body->node_rest + 3 * i, local, NULL);
         double *weight = r->weight + (size_t)n * (size_t)i, most = 0;
+        if (r->sized) take_inside(own, local);
         pal_rest_shape(own, local, weight);
         for (int k = 0; k < n; k++) most = fmax(most, weight[k]);
         if (most > 1 - 1e-9) r->common[r->n_common++] = i;
@@ -255,6 +268,28 @@ pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const cha
     if (!err) err = merge(out, scene->body[0].mesh, note);
     if (!err) out->scene->body[0].mesh = &out->mesh;
     if (!err) err = open_world(out, note);
+    if (!err) err = find_near(out, body);
+    if (err) pal_rest_free(out);
+    return err;
+}
+
+pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_setting *setting, int size,
+                       const char *law, pal_rest *out)
+{
+    pal_set_scene *set = NULL;
+    pal_setting to = *setting;
+    *out = (pal_rest){.n_node = body->n_node, .sized = true};
+    to.size = size;
+    PAL_TRY(pal_setting_make(scene, 0, &to, NULL, &set));
+    pal_err err = make_scene(&set->scene, NULL, law, NULL, out);
+    if (!err && set->mesh.tets.n_node == 0) err = PAL_ERR_REFUSED;
+    if (!err) {
+        out->mesh = set->mesh;
+        memset(&set->mesh, 0, sizeof set->mesh);
+        out->scene->body[0].mesh = &out->mesh;
+        err = open_world(out, NULL);
+    }
+    pal_set_scene_free(set);
     if (!err) err = find_near(out, body);
     if (err) pal_rest_free(out);
     return err;

@@ -18,6 +18,7 @@ typedef struct pal_rest {
     double *x; /* its rest, at the nodes of the running body m [n_node][3] */
     int n_node;
     bool known; /* x holds */
+    bool sized; /* of other voxels, not of merged ones: nodes of the running body may lie outside */
 } pal_rest;
 
 /* scene: of one body, without tools (estimate_work.c); element, law: NULL keeps those of its model, which becomes fem
@@ -27,6 +28,10 @@ pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *
 /* the same on voxels of twice the edge. REFUSED as well: no voxels, none left to merge */
 pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                          pal_note *note, pal_rest *out);
+/* the same in so many voxels on the longest axis, as a switch to them makes it (setting.h); model fem alone. REFUSED as
+ * well: it has that mesh already */
+pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_setting *setting, int size,
+                       const char *law, pal_rest *out);
 void pal_rest_free(pal_rest *rest); /* a zeroed one is fine */
 /* shape functions of a body's elements at local coordinates (mesh/locate.h): shape [n_corner] */
 void pal_rest_shape(const pal_body *body, const double local[4], double *shape);

@@ -1,5 +1,6 @@
 /* The parts of the error of one body: its own scene, the steps ahead (time and algebraic parts), the rests (the other
  * parts). */
+#include "server/session/estimate_family.h"
 #include "server/session/estimate_price.h"
 #include "server/session/estimate_shown.h"
 
@@ -23,7 +24,7 @@ static const double usual_tolerance = 1e-2; /* of implicit solvers */
  * the first left 0.2 of the truth there, the second half of it to twice as much */
 static const double usual_order = 1.5, early_order = 1;
 /* voxels with less than that are cut; of the volume in them (tests/accuracy/test_effectivity.c, the gear) */
-static const double whole_fill = 0.98, much_cut = 0.1;
+static const double whole_fill = 0.98, much_cut = 0.1, few_across = 2.5;
 /* hexahedra with all points and tetrahedra of four nodes lock above */
 static const double locks_above = 0.47;
 
@@ -38,12 +39,14 @@ struct pal_estimate_work {
     /* springs: voxels that finite elements may stand on; n_hex 0: those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
+    bool cut, thin;                         /* many voxels are cut; there are two across, or one */
     bool skinned;                           /* what is shown hangs on nodes */
     pal_rest fine, coarse, coarsest, model; /* world NULL: there is none */
     pal_estimate_shown shown;               /* n 0: nothing is, or nodes are */
     pal_foresight foresight;
-    bool priced;     /* what more nodes cost has been measured, or cannot be */
-    double awake_ms; /* of a step of a body that was never seen awake; 0: not measured yet */
+    pal_family family; /* of cut voxels */
+    bool priced;       /* what more nodes cost has been measured, or cannot be */
+    double awake_ms;   /* of a step of a body that was never seen awake; 0: not measured yet */
     char note[160];
 };
 
@@ -197,6 +200,18 @@ static double cut_share(const pal_hexes *hexes)
     return all > 0 ? cut / all : 0;
 }
 
+static bool is_thin(const pal_tets *tets)
+{
+    double least = INFINITY;
+    for (int c = 0; c < 3; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int i = 0; i < tets->n_node; i++)
+            low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
+        least = fmin(least, high - low);
+    }
+    return least < few_across * tets->h_m;
+}
+
 /* a mesh or law that cannot be had leaves its part unknown */
 static pal_err make_rests(pal_estimate_work *w)
 {
@@ -223,7 +238,8 @@ static pal_err make_rests(pal_estimate_work *w)
     err = pal_rest_coarser(w->scene, body, element, law, &note, &w->coarse);
     if (err) say(w, note.text);
     if (stopped(w)) return PAL_ERR_STATE;
-    if (!err && cut_share(&def->mesh->hexes) > much_cut) say(w, "many voxels are cut: good to a factor of 3");
+    w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
+    w->thin = !err && hexes && is_thin(&def->mesh->tets);
     /* one that cannot be had tells nothing of the order */
     if (!err) (void)pal_rest_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
     if (stopped(w)) return PAL_ERR_STATE;
@@ -297,6 +313,7 @@ void pal_estimate_work_close(pal_estimate_work *w)
     free(w->scene), free(w->exact_scene);
     free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.outer), free(w->state.borne);
     free(w->first), free(w->second);
+    pal_family_free(&w->family);
     free(w);
 }
 
@@ -500,6 +517,11 @@ static bool find_borne(pal_estimate_work *w)
     return true;
 }
 
+static double known(double part)
+{
+    return isnan(part) ? 0 : part;
+}
+
 /* the largest distance between a rest and a coarser one, at nodes of the running body that the coarser one has */
 static double change(const pal_rest *rest, const pal_rest *coarser)
 {
@@ -520,6 +542,12 @@ static bool changes_grow(pal_estimate_work *w, const pal_body *body, double last
     return first > 0 && last >= first;
 }
 
+/* how the skin hangs off its elements; how that of springs does is in how far they are from elements */
+static double skin_off(pal_estimate_work *w)
+{
+    return w->shown.n > 0 && !w->springs ? pal_estimate_shown_off(&w->shown, w->fine.x, 0) : 0;
+}
+
 static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
     pal_zz zz;
@@ -530,12 +558,23 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
     }
     double last = w->shown.n > 0 ? pal_estimate_shown_change(&w->shown, PAL_SHOWN_FINE, PAL_SHOWN_COARSE)
                                  : change(&w->fine, &w->coarse);
+    if ((w->cut || w->thin) && !w->springs)
+        pal_family_refresh(w->scene, body, &w->foresight.setting, &w->state, w->shown.n > 0, !w->cut, w->stop,
+                           &w->family);
+    const pal_family *f = &w->family;
+    w->foresight.left[0] = f->known ? known(f->half) : 0, w->foresight.left[1] = f->known ? known(f->twice) : 0;
+    if (w->cut)
+        tell(out,
+             f->known ? "many voxels are cut: good to a factor of 2" : "many voxels are cut: good to a factor of 3");
+    if (f->known) {
+        w->foresight.order = usual_order;
+        out->discretisation_m = last * f->times + skin_off(w);
+        return;
+    }
     bool early = changes_grow(w, body, last);
     w->foresight.order = early ? early_order : usual_order;
     if (early) tell(out, "discretisation: still grows from mesh to mesh, so more may be left");
-    out->discretisation_m = last / (exp2(w->foresight.order) - 1);
-    /* how springs hang is in how far they are from elements */
-    if (w->shown.n > 0 && !w->springs) out->discretisation_m += pal_estimate_shown_off(&w->shown, w->fine.x, 0);
+    out->discretisation_m = last / (exp2(w->foresight.order) - 1) + skin_off(w);
 }
 
 /* Springs whose constants were fitted to converged finite elements stand nearer to these than to those of their own
@@ -596,11 +635,6 @@ static double largest_move(const pal_estimate_work *w)
 {
     const pal_body *body = pal_world_body(w->live, 0);
     return most_between(w->state.x, body->x_rest, w->state.n_dof);
-}
-
-static double known(double part)
-{
-    return isnan(part) ? 0 : part;
 }
 
 /* without the large parts a sum would pass for the whole, beside those of a study that are whole */

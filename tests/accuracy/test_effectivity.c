@@ -4,7 +4,9 @@
  * for elements that fit together and the linear law is the square of the error in energy, and for B-bar, whose stress
  * is not that of its displacement, over the distance of its stress from that of a finer mesh. The estimate is the one
  * of a running session (session/estimate_work.h). Where elements lock the estimate is too small, and says so; where
- * many voxels are cut it says that it holds within a factor of 3. */
+ * many voxels are cut (the gear) it is within a factor of 2 as well, from meshes of other sizes
+ * (session/estimate_family.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer cube and a
+ * finer gear too. */
 #include "server/lab/load_case.h"
 #include "server/lab/sample_points.h"
 #include "server/mesh/mesh_file.h"
@@ -17,11 +19,10 @@ typedef struct row {
     const char *name; /* of a reference, or of a load case when finer > 0 */
     const char *law, *element;
     int resolution;
-    double work_J; /* the reference's (work_f_dot_u of its file); 0: not compared                           */
-    int finer;     /* the truth is a mesh of our own, so many times as fine: of stress, and of displacement
-                    * where there is no reference; 0: none */
-    bool locks,
-        cut; /* cut: many voxels are, whose part goes up and down from mesh to mesh: a factor of 3 is asked for */
+    double work_J;   /* the reference's (work_f_dot_u of its file); 0: not compared                           */
+    int finer;       /* the truth is a mesh of our own, so many times as fine: of stress, and of displacement
+                      * where there is no reference; 0: none */
+    bool locks, cut; /* cut: many voxels are */
 } row;
 
 /* one problem, one of its cases and one material */
@@ -268,9 +269,8 @@ static void compare(const subject *s, const pal_samples *samples)
         /* references are neo-Hookean where bodies bend far: what another law makes of it is part of the error */
         double said_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
         tell(r, &e, said_m, true_m, percent);
-        double most = r->cut ? 3 : 2;
         CHECK(e.locking == r->locks && (strstr(e.note, "voxels are cut") != NULL) == r->cut);
-        CHECK(r->locks || (said_m >= true_m / most && said_m <= most * true_m));
+        CHECK(r->locks || (said_m >= true_m / 2 && said_m <= 2 * true_m));
         CHECK(percent == 0 || r->locks || (e.zz_percent >= 0.5 * percent && e.zz_percent <= 2 * percent));
         CHECK(isfinite(e.time_m) && isfinite(e.algebraic_m) && e.error_m >= e.discretisation_m);
     }
@@ -336,22 +336,12 @@ static void beam_nu_045(void)
     CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
 }
 
-static void finer_beams(void)
-{
-    static const row rows[] = {
-        {"linear_nu030", "linear", "hex8_bbar", 32, 0, 0, false, false},
-        {"linear_nu045", "linear", "hex8_bbar", 32, 0, 0, false, false},
-    };
-    CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
-}
-
 static void cube_nu_0499(void)
 {
     static const row rows[] = {
         {"linear", "linear", "hex8_bbar", 8, 0.0437455, 0, false, false},
         {"linear", "linear", "hex8", 8, 0.0437455, 0, true, false},
         {"linear", "linear", "tet4", 8, 0.0437455, 0, true, false},
-        {"linear", "linear", "hex8_bbar", 16, 0.0437455, 0, false, false},
     };
     CHECK_ROWS(check_shared("reference/cube/problem.json"), rows);
 }
@@ -361,7 +351,6 @@ static void gear(void)
     static const row rows[] = {
         {"twist_linear", "linear", "hex8_bbar", 15, 0, 0, false, true},
         {"twist_linear", "linear", "hex8_bbar", 20, 0, 0, false, true},
-        {"twist_linear", "linear", "hex8_bbar", 30, 0, 0, false, true},
     };
     CHECK_ROWS(check_shared("reference/gear/problem.json"), rows);
 }
@@ -369,7 +358,7 @@ static void gear(void)
 /* needs no reference */
 static void own_beam(void)
 {
-    static const row rows[] = {{"tip", "linear", "hex8_bbar", 32, 0, 3, false, false}};
+    static const row rows[] = {{"tip", "linear", "hex8_bbar", 16, 0, 3, false, false}};
     CHECK_ROWS("deploy/problems/beam.json", rows);
 }
 
@@ -382,15 +371,43 @@ static void own_bar(void)
     CHECK_ROWS("deploy/problems/bar.json", rows);
 }
 
+/* ---- PALPATE_LONG=1 ---- */
+
+static void finer_beams(void)
+{
+    static const row rows[] = {
+        {"linear_nu030", "linear", "hex8_bbar", 32, 0, 0, false, false},
+        {"linear_nu045", "linear", "hex8_bbar", 32, 0, 0, false, false},
+    };
+    static const row own[] = {{"tip", "linear", "hex8_bbar", 32, 0, 3, false, false}};
+    CHECK_ROWS(check_shared("reference/beam/problem.json"), rows);
+    CHECK_ROWS("deploy/problems/beam.json", own);
+}
+
+static void a_finer_cube(void)
+{
+    static const row rows[] = {{"linear", "linear", "hex8_bbar", 16, 0.0437455, 0, false, false}};
+    CHECK_ROWS(check_shared("reference/cube/problem.json"), rows);
+}
+
+static void a_finer_gear(void)
+{
+    static const row rows[] = {{"twist_linear", "linear", "hex8_bbar", 30, 0, 0, false, true}};
+    CHECK_ROWS(check_shared("reference/gear/problem.json"), rows);
+}
+
 int main(void)
 {
+    bool all = getenv("PALPATE_LONG") != NULL;
     printf("  | case | true mm | estimate mm | ratio | true energy %% | zz %% | ratio | |\n");
     RUN(beam_nu_030);
     RUN(beam_nu_045);
-    RUN_LONG(finer_beams);
     RUN(cube_nu_0499);
     RUN_LONG(gear);
     RUN(own_beam);
     RUN(own_bar);
+    if (all) RUN(finer_beams);
+    if (all) RUN(a_finer_cube);
+    if (all) RUN(a_finer_gear);
     return check_report();
 }

@@ -1,6 +1,8 @@
-/* What the live estimate foresees of half and twice the size (session/estimate_foresee.h) against what such meshes
- * leave: the same body, made in those sizes as a switch makes it, at rest under the same load, against a mesh that is
- * finer still. That one is off as well, by the share that order 1.5 gives it, which is added. */
+/* What the live estimate says of a body's error, and foresees of half and twice the size (session/estimate_foresee.h),
+ * against what such meshes leave: the same body, made in those sizes as a switch makes it, at rest under the same load,
+ * against a mesh that is finer still. That one is off as well, by the share that order 1.5 gives it, which is added.
+ * Both are asked for within a factor of 2, of organs too, whose voxels are cut (session/estimate_family.h). With
+ * PALPATE_LONG=1 in more and finer sizes (about a minute). */
 #include "server/base/vec3.h"
 #include "server/lab/load_case.h"
 #include "server/lab/study.h"
@@ -131,9 +133,15 @@ static double foreseen(const pal_estimate *e, int size)
     return NAN;
 }
 
-/* early: changes still grow from mesh to mesh there, and the display says so; then a factor of 3 is asked for, else 2
- */
-static void check_size(const char *name, const pal_scene *scene, int size, int finest, double pull, bool early)
+/* within a factor of 2 of what is left */
+static void compare(const char *name, int size, int at, double left, double told)
+{
+    printf("  | %s, %d voxels | %d | %.3f | %.3f | %.2f |\n", name, size, at, 1e3 * left, 1e3 * told, told / left);
+    CHECK(told >= left / 2 && told <= 2 * left);
+}
+
+/* cut: many voxels are, and the display says so */
+static void check_size(const char *name, const pal_scene *scene, int size, int finest, double pull, bool cut)
 {
     const int at[4] = {size, size / 2, 2 * size, finest};
     const pal_surface *surface = &scene->body[0].mesh->surface;
@@ -148,15 +156,11 @@ static void check_size(const char *name, const pal_scene *scene, int size, int f
     for (int k = 0; k < 4 && good; k++) good = rest(&other->scene, at[k], pull, &b[k]);
     good = good && estimate(&b[0], pull, &e);
     CHECK(good);
-    for (int k = 1; k < 3 && good; k++) {
-        double left = off(&b[k], &b[3], surface) + off(&b[2], &b[3], surface) / (pow(finest / (2.0 * size), order) - 1);
-        double told = foreseen(&e, at[k]);
-        printf("  | %s, %d voxels | %d | %.3f | %.3f | %.2f |\n", name, size, at[k], 1e3 * left, 1e3 * told,
-               told / left);
-        double most = early ? 3 : 2;
-        CHECK(told >= left / most && told <= most * left);
-    }
-    CHECK((strstr(e.note, "grows from mesh to mesh") != NULL) == early);
+    double rest_m = good ? off(&b[2], &b[3], surface) / (pow(finest / (2.0 * size), order) - 1) : 0;
+    for (int k = 0; k < 3 && good; k++)
+        compare(name, size, at[k], off(&b[k], &b[3], surface) + rest_m,
+                k == 0 ? e.discretisation_m : foreseen(&e, at[k]));
+    CHECK((strstr(e.note, "voxels are cut: good to a factor of 2") != NULL) == cut);
     for (int k = 0; k < 4; k++) body_free(&b[k]);
     pal_set_scene_free(other);
 }
@@ -186,35 +190,72 @@ static void a_bar_in_every_element(void)
     free(p);
 }
 
-/* cut voxels, few of them across where it is held */
-static void organ(const char *element)
+typedef struct organ {
+    const char *file, *element; /* file: of ../shared/data; NULL: our own organ */
+    double up[3], hold, pull;
+    int size, finest;
+} organ;
+
+static void check_organ(const organ *o)
 {
+    const char *path = o->file ? check_shared(o->file) : NULL;
     pal_loaded_scene *loaded = NULL;
     pal_note note = {""};
-    const pal_surface_scene o = {.label = -1, .hold = 0.3, .fem = true, .resolution = 14, .element = element};
-    pal_err err = pal_scene_procedural(&o, &loaded, NULL, &note);
+    const pal_surface_scene made = {.label = -1,
+                                    .hold = o->hold,
+                                    .fem = true,
+                                    .resolution = o->size,
+                                    .element = o->element,
+                                    .up = {o->up[0], o->up[1], o->up[2]}};
+    char name[64];
+    check_count++; /* an absent organ is no failure */
+    if (o->file && !path) return;
+    pal_err err = path ? pal_scene_from_surface(path, &made, &loaded, NULL, &note)
+                       : pal_scene_procedural(&made, &loaded, NULL, &note);
     if (err) CHECK_FAIL("%s", note.text);
-    char name[32];
-    snprintf(name, sizeof name, "organ, %s", element);
-    if (!err) check_size(name, &loaded->scene, 14, 40, 1e-3, true);
+    snprintf(name, sizeof name, "%s, %s", o->file ? strrchr(o->file, '/') + 1 : "our own organ", o->element);
+    if (!err) check_size(name, &loaded->scene, o->size, o->finest, o->pull, true);
     pal_scene_free(loaded);
 }
 
-static void an_organ_of_hexahedra(void)
+#define KIDNEY  "data/kidney_ct_6k.ply", "hex8_bbar", {0, -1, 0}, 0.15, 1e-4
+#define LIVER   "data/liver_ct_20k.ply", "hex8_bbar", {0, -1, 0}, 0.12, 1e-4
+#define STOMACH "data/stomach_human_11k.obj", "hex8_bbar", {0, 0, 1}, 0.15, 1e-4
+#define OURS    {0, 0, 1}, 0.3, 1e-3
+
+static void organs_of_cut_voxels(void)
 {
-    organ("hex8_bbar");
+    static const organ organs[] = {{NULL, "hex8_bbar", OURS, 10, 28},
+                                   {NULL, "tet4", OURS, 8, 24},
+                                   {KIDNEY, 10, 28},
+                                   {LIVER, 8, 24},
+                                   {STOMACH, 9, 24}};
+    for (size_t i = 0; i < sizeof organs / sizeof *organs; i++) check_organ(&organs[i]);
 }
 
-static void an_organ_of_tetrahedra(void)
+/* our own organ in 20 voxels is not among them: what 40 leave there is told 0.38 to 0.6 of what meshes of 64 and of 72
+ * voxels make of it, which do not agree themselves */
+static void organs_in_more_sizes(void)
 {
-    organ("tet4");
+    static const organ organs[] = {{NULL, "hex8_bbar", OURS, 14, 48},
+                                   {NULL, "tet4", OURS, 14, 40},
+                                   {NULL, "hex8", OURS, 10, 28},
+                                   {KIDNEY, 14, 40},
+                                   {KIDNEY, 20, 56},
+                                   {LIVER, 10, 32},
+                                   {LIVER, 14, 40},
+                                   {LIVER, 16, 48},
+                                   {LIVER, 20, 56},
+                                   {STOMACH, 12, 36},
+                                   {STOMACH, 14, 40}};
+    for (size_t i = 0; i < sizeof organs / sizeof *organs; i++) check_organ(&organs[i]);
 }
 
 int main(void)
 {
-    printf("  | case | neighbour | true mm | foreseen mm | ratio |\n");
+    printf("  | case | in voxels | true mm | told mm | ratio |\n");
     RUN(a_bar_in_every_element);
-    RUN_LONG(an_organ_of_hexahedra);
-    RUN_LONG(an_organ_of_tetrahedra);
+    RUN_LONG(organs_of_cut_voxels);
+    if (getenv("PALPATE_LONG")) RUN_LONG(organs_in_more_sizes);
     return check_report();
 }

@@ -1,0 +1,41 @@
+/* What a body of cut voxels, or of two across, leaves in other sizes, measured: its own mesh, half and twice as many
+ * voxels and a finer mesh yet (four times as many, or up to 16,000 nodes), made as a switch makes them
+ * (pal_setting_make), at rest by the linear law under the same loads.
+ *
+ * No power of h says it. Voxels that the surface cuts count by the share that lies inside: as stiff along the surface
+ * as they shall be, and 1 / share^2 too stiff to bend, so that thin parts of few voxels hardly move and the error is as
+ * large as the solution; and from the size on from which those less than a quarter full can be dropped (setting.h) the
+ * error falls to a third at once. Merged voxels do not see that: the error that was left was 0.2 to 6 times what they
+ * told, of four organs in 5 to 40 voxels. Here the error in size s is the largest distance at vertices of the shown
+ * surface from the finest one, of size r, over sqrt((1 - q) sqrt(1 + q^2)), q = (s / r)^2: between errors of the same
+ * sign and such that have nothing to do with each other. That of twice as many voxels, where these are too near to the
+ * finest to be told from it, goes on from half and this size, not faster than h^2.
+ *
+ * Of two voxels across, merged ones are one, which B-bar leaves next to nothing to bend with: a beam's error was told 8
+ * times too large.
+ *
+ * Private to estimate_*.c. Heap memory, slow: most of it is the factor of the finest mesh, up to two seconds. Thread:
+ * one at a time. */
+#ifndef PAL_SESSION_ESTIMATE_FAMILY_H
+#define PAL_SESSION_ESTIMATE_FAMILY_H
+#include "server/session/estimate_rest.h"
+
+typedef struct pal_family {
+    bool known;
+    double times;       /* error left over the change from merged voxels to this mesh                                 */
+    double half, twice; /* error of half and of twice as many voxels over this mesh's; NaN: none so coarse */
+    int finest;         /* voxels of the finest mesh */
+    /* what it was measured under, [n_node][3] of length 1, and the clock from which on it may be measured again */
+    double *loads, next_s;
+} pal_family;
+
+/* Measures it, the first time; again where loads are others, as soon as it has waited 20 times as long as that took.
+ * scene: of one body of model fem, without tools; body: the running one, as made from it; setting: as it is; state:
+ * what it bears; shown: `times` is of changes at vertices of the shown surface, else at nodes; fits:
+ * voxels fit the body, so that only whole multiples of their number do; out: begins zeroed.
+ * Stays unknown where this body has no such meshes (no surface, finer ones too large, no rest) or it was stopped */
+void pal_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
+                        const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
+                        pal_family *out);
+void pal_family_free(pal_family *family); /* a zeroed one is fine */
+#endif
