@@ -8,7 +8,9 @@
  *                   nodes that both have, over 2^1.5 - 1 (Richardson; for any true order from 1 to 2 that is off by a
  *                   factor of 0.55 to 1.64). Where that distance is no smaller than the one from there to voxels merged
  *                   once more, over 2^1 - 1, and the note says that more may be left: 0.4 to 2 times the truth was seen
- *                   where the other gave a fifth. Springs: of finite elements on their voxels
+ *                   where the other gave a fifth. Springs: of finite elements on their voxels.
+ *                   Of finite elements where many voxels are cut, or there are two across: that distance, times what
+ *                   meshes of other sizes that are made and solved beside it say is left (estimate_family.h)
  *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh; about
  *                   twice too large for tetrahedra of ten nodes
  *   model           the largest distance between the rest by the neo-Hookean law and by the body's own; of springs:
@@ -26,7 +28,7 @@
  * None of them is there (0) while nothing has moved by more than 1e-9 of the body's size.
  * error_m is their sum, which is above the truth where parts have opposite signs, and below it where elements lock or
  * a small part is not known. There is none where the discretisation is not known, or of springs the model.
- * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.5 where nothing locks. Rows that
+ * tests/accuracy/test_effectivity.c has what the estimate is over the truth: 0.6 to 1.7 where nothing locks. Rows that
  * are switched off are off in its worlds as well. A moving
  * support counts as standing where it is. Of control cells (subdivision_fem) time and algebraic part alone are known
  * and so no sum, of bodies that adapt nothing.

@@ -58,16 +58,19 @@ static double deflection_m(int n, int level, int q, int load, int op)
     return end;
 }
 
-/* polar is the default of the row: it is nearer in every row, most of all with few elements */
+/* polar is the default of the row: it is nearer in every row, most of all with few elements. Edges on 2,048 elements,
+ * which takes half of this file's time, with PALPATE_LONG=1 */
 static void deflection_of_the_end_is_within_5_percent_of_model_fem(void)
 {
     static const int beam[2][2] = {{3, 1}, {2, 2}};
     for (int k = 0; k < CHECK_REPEATS(2, 1); k++)
         for (int load = SMALL; load <= LARGE; load++) {
             double off[2];
-            for (int op = POLAR; op <= EDGES; op++)
+            bool both = k == 0 || getenv("PALPATE_LONG");
+            for (int op = POLAR; op <= (both ? EDGES : POLAR); op++)
                 off[op] = fabs(deflection_m(beam[k][0], beam[k][1], 0, load, op) / fem_m[0][load] - 1);
             CHECK_LE(off[POLAR], 0.03);
+            if (!both) continue;
             CHECK_LE(off[EDGES], 0.04);
             CHECK_LE(off[POLAR], off[EDGES]);
         }

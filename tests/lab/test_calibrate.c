@@ -1,6 +1,7 @@
 /* Calibration: slopes against differences, what a grid's weights are, constants found again that were known, what is
  * refused, and annealing that walks the same way on any number of cores. */
 #include "server/lab/calibrate_parts.h"
+#include "server/lab/study_parts.h"
 
 #include "server/base/vec3.h"
 #include "server/num/random.h"
@@ -401,6 +402,40 @@ static void volume_stiffness_has_a_floor_where_one_is_asked_for(void)
     bench_close(&truth);
 }
 
+/* a study's fit asks for that floor by itself, on loads of the same kind */
+static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(void)
+{
+    bench truth;
+    pal_samples s[3] = {{0}};
+    const pal_study_options options = {.quick = true};
+    pal_setting setting = {.size = 4};
+    bench_begin(&truth, 4, 3);
+    truth.options.without_area = true;
+    REQUIRE(bench_make(&truth));
+    truth.theta[1] += log(0.05);
+    for (int k = 0; k < 3; k++) REQUIRE(samples_of(&truth, truth.theta, k, &s[k]));
+    pal_prepared mesh = {.surface = truth.surface};
+    pal_scene *scene = calloc(1, sizeof *scene);
+    pal_study_job *job = calloc(1, sizeof *job);
+    REQUIRE(scene && job);
+    scene->body[0].mesh = &mesh;
+    *job = (pal_study_job){.scene = scene, .problem = &truth.problem, .options = &options, .n_load = 4, .note = &note};
+    job->n_probe = s[0].n, job->probe = s[0].x;
+    for (int i = 0; i < s[0].n; i++)
+        for (int c = 0; c < 3; c++) job->probe[3 * i + c] -= mesh.surface.origin_m[c];
+    /* the last one is not fitted to */
+    for (int k = 0; k < 4; k++) job->load[k] = &truth.problem.load_case[k % 3], job->still[k] = s[k % 3].u;
+    CHECK_INT(pal_study_fit(job, &setting, &note), 0);
+    const double start[2] = {exp(truth.info.start[0]), exp(truth.info.start[1])};
+    printf("  edges %.3g, volumes %.3g of the material's\n", setting.k_distance_J / start[0],
+           setting.k_volume_J / start[1]);
+    CHECK_NEAR(setting.k_volume_J / start[1], 0.1, 1e-6);
+    CHECK_NEAR(setting.k_distance_J / start[0], 1, 0.5);
+    for (int k = 0; k < 3; k++) pal_samples_free(&s[k]);
+    bench_close(&truth);
+    free(scene), free(job);
+}
+
 /* ---- annealing ---- */
 
 /* the walk as its caller sees it */
@@ -632,6 +667,7 @@ int main(void)
     RUN(grid_nodes_that_touch_nothing_are_no_parameters);
     RUN(constants_that_were_known_are_found_again);
     RUN(volume_stiffness_has_a_floor_where_one_is_asked_for);
+    RUN(a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness);
     RUN(annealing_walks_the_same_way_for_any_team);
     RUN(annealing_ends_as_it_is_told);
     RUN(points_may_be_evaluated_elsewhere);
