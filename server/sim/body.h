@@ -87,7 +87,7 @@ typedef struct pal_body {
     char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
     /* extra drag, and for how long yet, after a change that puts work in (brake.h); 0: none */
     double brake_1_s, brake_s;
-    /* what a corner of a full voxel weighs (pal_body_bears_N); 0: no voxels */
+    /* what a corner of a full voxel, or of a solid's mean cell, weighs (pal_body_bears_N); 0: of another body */
     double corner_kg;
 
     bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
@@ -134,11 +134,11 @@ static inline int pal_body_nodes(const pal_body *body)
 {
     return body->embed ? body->n_node : body->n_active;
 }
-/* most of a lasting load that a node bears: load_cap_N, and of that the part that the node is of a full voxel's corner,
- * as a sliver of a voxel is as much softer */
+/* most of a lasting load that a node bears: load_cap_N, and of that the part that the node is of the corner of a full
+ * voxel, or of a solid's mean cell, as a sliver is as much softer */
 static inline double pal_body_bears_N(const pal_body *body, int node)
 {
-    double part = body->corner_kg > 0 && !body->implicit ? body->node_mass_kg[node] / body->corner_kg : 1;
+    double part = body->corner_kg > 0 ? body->node_mass_kg[node] / body->corner_kg : 1;
     return part < 1 ? part * body->load_cap_N : body->load_cap_N;
 }
 /* how easily a node moves, 1/kg; 0: it is held */

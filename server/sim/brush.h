@@ -10,8 +10,9 @@
 
 typedef enum pal_brush_kind {
     PAL_BRUSH_NONE,    /* ends the slot's brush */
-    PAL_BRUSH_INFLATE, /* pressure along the normals of the shown triangles as they are now, times the weight at rest of
-                          their middle: that of a stroke (pal_stroke) of at_m, radius_m, soft */
+    PAL_BRUSH_INFLATE, /* pressure along the normals of the shown triangles as they are now, on twice their area at rest
+                          at most, times the weight at rest of their middle: that of a stroke (pal_stroke) of at_m,
+                          radius_m, soft */
     PAL_BRUSH_CURVE,   /* a handle from at_m to to_m (Fig. 9a): springs pull the shown nodes within radius_m of it at
                           rest to where they were when it began, plus lift 4 t (1 - t), t = 0..1 along it */
     PAL_BRUSH_COUNT

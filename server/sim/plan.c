@@ -137,7 +137,7 @@ static pal_err build_body(pal_wishes *s, const pal_scene *scene)
     if (body->solid) pal_solid_weigh(body);
     body->size_m = box_diagonal(body);
     body->load_cap_N = 10 * def->material.young_Pa * body->h_m * body->h_m;
-    if (body->tets && !body->embed) body->corner_kg = def->material.density_kg_m3 * pow(body->h_m, 3) / 8;
+    if (body->tets || body->solid) body->corner_kg = def->material.density_kg_m3 * pow(body->h_m, 3) / 8;
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
     for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
 

@@ -128,6 +128,52 @@ static void an_even_pressure_on_a_closed_surface_has_no_net_force(void)
     }
 }
 
+/* what is blown up pushes with its area up to twice that at rest, and with twice of it from there on */
+static void pressure_does_not_grow_with_what_it_blows_up_for_ever(void)
+{
+    static const double times[] = {1, 1.3, 1.6, 10};
+    for (int which = 0; which < 3; which++) {
+        tool_scene s;
+        pal_cells cells;
+        REQUIRE(open_body(&s, &cells, which, false));
+        const pal_brush b = everywhere(500);
+        REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL));
+        double rest_N = 0;
+        for (int k = 0; k < 4; k++) {
+            double sum_N = 0;
+            for (int i = 0; i < 3 * s.body->n_dof; i++) s.body->x[i] = times[k] * s.body->x_rest[i];
+            pal_body_place(s.body);
+            forces(&s, 10);
+            for (int i = 0; i < s.body->n_node; i++) sum_N += pal_norm3(s.body->load + 3 * (size_t)i);
+            if (k == 0) rest_N = sum_N;
+            CHECK_NEAR(sum_N / rest_N, fmin(2, times[k] * times[k]), 1e-9);
+        }
+        close_body(&s, &cells, which);
+    }
+}
+
+/* implicit or of control cells: a node bears 10 E h^2, and of that its mass over that of a whole corner */
+static void a_small_node_bears_less_of_a_lasting_load_whatever_the_solver(void)
+{
+    for (int which = 0; which < 3; which++) {
+        tool_scene s;
+        pal_cells cells;
+        REQUIRE(open_body(&s, &cells, which, true));
+        const pal_material *m = &s.scene->body[0].material;
+        const double h = s.body->h_m, corner_kg = m->density_kg_m3 * h * h * h / 8;
+        int thin = 0;
+        for (int i = 0; i < s.body->n_node; i++)
+            if (s.body->node_mass_kg[i] < s.body->node_mass_kg[thin]) thin = i;
+        const double part = s.body->node_mass_kg[thin] / corner_kg;
+        REQUIRE(!pal_world_load(s.world, 0, thin, (const double[3]){0, 0, 1e6}));
+        REQUIRE(!pal_world_step(s.world, 1e-4));
+        printf("  body %d: %.3g of a corner\n", which, part);
+        CHECK_NEAR(s.body->load[3 * thin + 2], fmin(1, part) * 10 * m->young_Pa * h * h, 1e-9 * s.body->load_cap_N);
+        CHECK(which == 1 || part < 0.9);
+        close_body(&s, &cells, which);
+    }
+}
+
 static void a_soft_brush_pushes_only_what_it_reaches_along_the_normals(void)
 {
     tool_scene s;
@@ -411,6 +457,8 @@ int main(void)
 {
     counting = true;
     RUN(an_even_pressure_on_a_closed_surface_has_no_net_force);
+    RUN(pressure_does_not_grow_with_what_it_blows_up_for_ever);
+    RUN(a_small_node_bears_less_of_a_lasting_load_whatever_the_solver);
     RUN(a_soft_brush_pushes_only_what_it_reaches_along_the_normals);
     RUN(a_handle_is_a_spring_of_its_stiffness);
     RUN(forces_come_and_go_over_ten_steps);

@@ -49,7 +49,7 @@ static void a_meganewton_on_a_node_is_capped_and_forgotten(void)
             CHECK(run.finite);
             /* v of the explicit solver is half a sub-step before x: a ripple where it moves fast */
             CHECK_LE(run.most, solid_kinds[k].explicit ? 1.3 : 1.01);
-            CHECK_INT(solid_inverted(&s), 0);
+            HARD_CASE("meganewton", "subdivision_fem", "turned over 2 s after", solid_inverted(&s), 0, "");
             HARD_CASE("meganewton", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 10, "s");
         }
         printf("  %s: pulled %.2g S away\n", solid_kinds[k].shown, far / s.body->size_m);

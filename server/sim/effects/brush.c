@@ -1,9 +1,10 @@
 /* Row brush (brush.h): what sculpting hands do to a body, at its shown nodes.
  *
  * INFLATE: a triangle with corners x and weight w gives each corner p w / 6 (x1 - x0) x (x2 - x0). With w = 1 over a
- * closed surface that is p times the gradient of its volume: no net force, no net moment. A pressure that follows
- * normals has no energy, and its stiffness, which is not symmetric, is left out of the tangent.
- * CURVE: f_i = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
+ * closed surface that is p times the gradient of its volume: no net force, no net moment. A triangle is pushed by two
+ * times its area at rest at most: what grows with what it blows up would have no rest from about E/3 on. A pressure
+ * that follows normals has no energy, and its stiffness, which is not symmetric, is left out of the tangent. CURVE: f_i
+ * = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
 #include "server/sim/brush.h"
 
 #include "server/base/vec3.h"
@@ -12,6 +13,9 @@
 #include <string.h>
 
 enum { RAMP = 10 };
+
+/* of a triangle's area at rest, that pressure acts on */
+static const double most_area = 2;
 
 /* a brush that acts; `now` is what it does now, on its way to `to` */
 typedef struct slot {
@@ -289,15 +293,23 @@ static double share(const slot *s)
     return (double)s->n_in / RAMP;
 }
 
+/* twice the area vector of a triangle at nodes x */
+static void area2(const pal_body *body, const double *x, int t, double n[3])
+{
+    double p[3], q[3];
+    pal_sub3(p, corner_at(body, x, t, 1), corner_at(body, x, t, 0));
+    pal_sub3(q, corner_at(body, x, t, 2), corner_at(body, x, t, 0));
+    pal_cross3(n, p, q);
+}
+
 static void inflate(const slot *s, const pal_body *body, double *load)
 {
     for (int k = 0; k < s->n; k++) {
         const int t = s->item[k];
-        const double *a = corner_at(body, body->d, t, 0);
-        double p[3], q[3], n[3], force = share(s) * s->now[0] * s->weight[k] / 6;
-        pal_sub3(p, corner_at(body, body->d, t, 1), a);
-        pal_sub3(q, corner_at(body, body->d, t, 2), a);
-        pal_cross3(n, p, q);
+        double n[3], rest[3], force = share(s) * s->now[0] * s->weight[k] / 6;
+        area2(body, body->d, t, n), area2(body, body->node_rest, t, rest);
+        const double now2 = pal_dot3(n, n), most2 = most_area * most_area * pal_dot3(rest, rest);
+        if (now2 > most2) force *= sqrt(most2 / now2);
         for (int c = 0; c < 3; c++)
             pal_axpy3(load + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]], force, n);
     }
