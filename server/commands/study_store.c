@@ -37,6 +37,7 @@ static const number_key number[] = {
     {"way_rms_m", AT(way_rms_m), 0, 1e300, true, false},
     {"way_most_m", AT(way_most_m), 0, 1e300, true, false},
     {"prepare_s", AT(prepare_s), 0, 1e12, true, false},
+    {"elements", AT(n_element), 0, 1e12, false, true},
     {"read_ms", AT(read_ms), 0, 1e12, false, true},
     {"predicted_ms", AT(predicted_ms), 0, 1e300, true, false},
     {"predicted_m", AT(predicted_m), 0, 1e300, true, false},

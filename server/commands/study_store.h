@@ -11,11 +11,11 @@
  *   "points": [{"model": "fem", "element": .., "law": .., "solver": .., "size": 16, "step_s": .., "tolerance": ..,
  *     "k_distance_J": .., "k_area_J": .., "k_volume_J": .., "ms": .., "error_m": .., "front": true, "err": "OK",
  *     "why": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_most_m": .., "way_rms_m": ..,
- *     "way_most_m": .., "prepare_s": .., "read_ms": .., "predicted_ms": .., "predicted_m": ..}]
+ *     "way_most_m": .., "prepare_s": .., "elements": .., "read_ms": .., "predicted_ms": .., "predicted_m": ..}]
  * }
- * Every key but read_ms is required; numbers have as many digits as give the same bits; null stands for what is not a
- * number. Beside the file NAME.json of a scene it is NAME_study.json, beside scene.json study.json; a table (.csv), a
- * drawing
+ * Every key but elements and read_ms is required; numbers have as many digits as give the same bits; null stands for
+ * what is not a number. Beside the file NAME.json of a scene it is NAME_study.json, beside scene.json study.json; a
+ * table (.csv), a drawing
  * (.svg) and a page (.html) of the same name may stand beside it. Thread: [load]. */
 #ifndef PAL_COMMANDS_STUDY_STORE_H
 #define PAL_COMMANDS_STUDY_STORE_H

@@ -42,6 +42,7 @@ typedef struct pal_study_point {
     double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
+    double n_element;                   /* finite elements; 0: it has none, or they were not kept */
     double read_ms; /* reading its solver's factor forwards and backwards, as fast as this machine reads as much as its
                        world holds: known before it runs; 0: there is none */
     double predicted_ms, predicted_m; /* by the models of cost and error fitted to the OTHER points of its method, once
@@ -116,13 +117,14 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
  * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
  * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
 bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
-/* Cost foreseen for a setting that is made and has not run: of n_node nodes and n_substep sub-steps in a step of its
- * own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known for that: what
- * the other points of its model took, leave_out (-1: none) being no part of them, with their knobs, nodes and
- * sub-steps; of the setting its own knobs and these; no time of it. A step of its own is a + n_substep (n_node + c
- * read_ms) r (study_cost.c). Of a surface that adapts neither count is looked at, as how much of it is refined is not
- * known before it runs: the share is that of what the other levels refined, sub-steps are those of its finest level.
- * false: fewer than three points of the model, none with such an element, law or solver, or none that adapts */
-bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, int n_substep,
-                            double read_ms, int leave_out, double *ms);
+/* Cost foreseen for a setting that is made and has not run: of n_node nodes, n_element elements and n_substep sub-steps
+ * in a step of its own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known
+ * for that: what the other points of its model took, leave_out (-1: none) being no part of them, with their knobs,
+ * nodes and sub-steps; of the setting its own knobs and these; no time of it. A step of its own is a + n_substep
+ * (n_element + c read_ms) r (study_cost.c). Of a surface that adapts neither count is looked at, as how much of it is
+ * refined is not known before it runs: the share is that of what the other levels refined, sub-steps are those of its
+ * finest level. false: fewer than three points of the model, none with such an element, law or solver, or none that
+ * adapts */
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, double n_element,
+                            int n_substep, double read_ms, int leave_out, double *ms);
 #endif

@@ -1,17 +1,19 @@
 /* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
  * it runs.
  *
- * A step of its own takes a + sub-steps (nodes e + c q) r: a is what a step takes whatever is solved (the skin above
- * all), e what an element takes beside others, q the time of reading its solver's factor on this machine (what no
- * longer fits into caches is read slower), r what a node takes in a sub-step, whose logarithm is a sum of what each
- * knob adds and of what grows with the nodes. a, c and the sum are fitted to the others by least squares of logarithms;
- * what the sum misses at those that are near in knobs and nodes is taken off. */
+ * A step of its own takes a + sub-steps (elements (e + t) + c q) r: a is what a step takes whatever is solved (the skin
+ * above all), e what an element takes beside others, t what is added where the law has an exact tangent (neo_hookean:
+ * matrices of all elements are made in every step), q the time of reading its solver's factor on this machine (what no
+ * longer fits into caches is read slower), r what an element takes in a sub-step, whose logarithm is a sum of what each
+ * knob adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to an
+ * element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
+ * least squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
 #include "server/lab/study_parts.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { LEAST = 3, FEATURES = 20, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
+enum { LEAST = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
 /* weight of "no effect" for each knob; of "off by nothing" beside settings that are near */
 static const double ridge = 3e-2, trust = 0.1;
 /* so many knobs that stand otherwise are as far as e times the nodes */
@@ -19,13 +21,14 @@ static const double knobs_per_e = 4, whole_nodes = 1000;
 
 typedef struct seen {
     const pal_setting *setting;
-    double n_node, n_substep, ms; /* of a step of its own */
+    double n_node, n_element, n_substep, ms; /* of a step of its own */
     double read_ms;
     double f[FEATURES];
 } seen;
 
+enum { TANGENT = 11 }; /* feature whose weight is t's logarithm */
 typedef struct cost_law {
-    double a, c, w[FEATURES], misfit; /* c: nodes a ms of reading */
+    double a, c, w[FEATURES], misfit; /* c: elements a ms of reading */
 } cost_law;
 
 static void features(const pal_setting *s, double n_node, double f[FEATURES])
@@ -40,8 +43,8 @@ static void features(const pal_setting *s, double n_node, double f[FEATURES])
         f[6 + k] =
             pal_study_is(s->element, word[k]) || pal_study_is(s->law, word[k]) || pal_study_is(s->solver, word[k]);
     f[15] = 0.3 * step * n, f[16] = 0.3 * tolerance * n;
-    /* quadratic elements, exact tangents and the second stage grow otherwise with the nodes */
-    f[17] = 0.5 * f[8] * n, f[18] = 0.5 * f[11] * n, f[19] = 0.5 * f[12] * n;
+    /* the second stage grows otherwise with the nodes */
+    f[17] = 0.5 * f[12] * n;
 }
 
 /* (F'F + ridge) w = F'y by elimination; the constant is not held back */
@@ -63,16 +66,19 @@ static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
 /* elements are nothing to a factor but its entries, which are counted; nor is a law that turns nothing */
 static bool is_of_elements(int feature)
 {
-    return feature == 6 || feature == 7 || feature == 8 || feature == 10 || feature == 17;
+    return feature == 6 || feature == 7 || feature == 8 || feature == 10;
 }
 
-/* what all sub-steps of a step take; *share: of it what goes with the elements */
-static double work_ms(const cost_law *law, const seen *p, double *share)
+/* what all sub-steps of a step take; slope (may be NULL): its logarithm's by each weight */
+static double work_ms(const cost_law *law, const seen *p, double slope[FEATURES])
 {
     double sum = 0, own = 0;
-    for (int r = 0; r < FEATURES; r++) *(is_of_elements(r) ? &own : &sum) += law->w[r] * p->f[r];
-    double nodes = p->n_node * exp(own), all = nodes + law->c * p->read_ms;
-    *share = nodes / all;
+    for (int r = 0; r < FEATURES; r++)
+        if (r != TANGENT) *(is_of_elements(r) ? &own : &sum) += law->w[r] * p->f[r];
+    double through = p->n_element * exp(own), tangent = p->f[TANGENT] * p->n_element * exp(law->w[TANGENT]),
+           all = through + tangent + law->c * p->read_ms;
+    for (int r = 0; r < FEATURES && slope; r++)
+        slope[r] = p->f[r] * (r == TANGENT ? tangent / all : is_of_elements(r) ? through / all : 1);
     return p->n_substep * all * exp(sum);
 }
 
@@ -80,16 +86,14 @@ static double work_ms(const cost_law *law, const seen *p, double *share)
 static cost_law fit(const seen *p, int n, double a, double c)
 {
     cost_law law = {.a = a, .c = c};
-    double share;
-    /* without reading it is linear in the logarithm; with it Gauss and Newton's way there is short */
-    for (int round = 0; round < (c > 0 ? ROUNDS : 1); round++) {
+    bool sums = c > 0;
+    for (int i = 0; i < n; i++) sums |= p[i].f[TANGENT] > 0;
+    /* of one product it is linear in the logarithm; of sums Gauss and Newton's way there is short */
+    for (int round = 0; round < (sums ? ROUNDS : 1); round++) {
         double A[FEATURES][FEATURES + 1] = {{0}};
         for (int i = 0; i < n; i++) {
-            double slope[FEATURES], y = log((p[i].ms - a) / work_ms(&law, &p[i], &share));
-            for (int r = 0; r < FEATURES; r++) {
-                slope[r] = p[i].f[r] * (is_of_elements(r) ? share : 1);
-                y += slope[r] * law.w[r];
-            }
+            double slope[FEATURES], y = log((p[i].ms - a) / work_ms(&law, &p[i], slope));
+            for (int r = 0; r < FEATURES; r++) y += slope[r] * law.w[r];
             for (int r = 0; r < FEATURES; r++) {
                 for (int k = 0; k < FEATURES; k++) A[r][k] += slope[r] * slope[k];
                 A[r][FEATURES] += slope[r] * y;
@@ -98,7 +102,7 @@ static cost_law fit(const seen *p, int n, double a, double c)
         solve(A, law.w);
     }
     for (int i = 0; i < n; i++) {
-        double off = log((a + work_ms(&law, &p[i], &share)) / p[i].ms);
+        double off = log((a + work_ms(&law, &p[i], NULL)) / p[i].ms);
         law.misfit += off * off;
     }
     for (int r = 1; r < FEATURES; r++) law.misfit += ridge * law.w[r] * law.w[r];
@@ -232,19 +236,32 @@ static bool has_words(const seen *p, int n, const pal_setting *s)
     return element && law && solver;
 }
 
-bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, int n_substep, double read_ms,
-                            int leave_out, double *ms)
+/* are the elements of all that count known? Else nodes stand for them: springs, studies kept before they were counted
+ */
+static bool are_counted(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    for (int i = 0; i < study->n_point; i++)
+        if (counts(study, i, leave_out, s) && !(study->point[i].n_element > 0)) return false;
+    return true;
+}
+
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, double n_element, int n_substep,
+                            double read_ms, int leave_out, double *ms)
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;
-    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust, share;
+    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
     double substeps = adapts(s) ? finest_substeps(study, leave_out, s) : n_substep;
+    const bool by_element = n_element > 0 && are_counted(study, leave_out, s);
     if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];
         if (!counts(study, i, leave_out, s)) continue;
-        p[n] = (seen){
-            .setting = &q->priced.setting, .n_node = q->n_node, .n_substep = q->n_substep, .read_ms = q->read_ms};
+        p[n] = (seen){.setting = &q->priced.setting,
+                      .n_node = q->n_node,
+                      .n_element = by_element ? q->n_element : q->n_node,
+                      .n_substep = q->n_substep,
+                      .read_ms = q->read_ms};
         p[n].ms = q->priced.ms * q->priced.setting.step_s / study->step_s;
         features(p[n].setting, p[n].n_node, p[n].f);
         n++;
@@ -253,11 +270,15 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_
     cost_law law = best_fit(p, n);
     for (int i = 0; i < n; i++) {
         double near = exp2(-2 * distance(&p[i], s, nodes));
-        off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], &share));
+        off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], NULL));
         weight += near;
     }
-    seen own = {.setting = s, .n_node = nodes, .n_substep = substeps, .read_ms = read_ms};
+    seen own = {.setting = s,
+                .n_node = nodes,
+                .n_element = by_element ? n_element : nodes,
+                .n_substep = substeps,
+                .read_ms = read_ms};
     features(s, nodes, own.f);
-    *ms = (law.a + work_ms(&law, &own, &share) * exp(off / weight)) * study->step_s / s->step_s;
+    *ms = (law.a + work_ms(&law, &own, NULL) * exp(off / weight)) * study->step_s / s->step_s;
     return true;
 }

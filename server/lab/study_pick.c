@@ -353,6 +353,7 @@ void pal_study_predict(pal_study *study)
         p->predicted_ms = p->predicted_m = NAN;
         if (!measured(p)) continue;
         pal_study_foresee(study, &p->priced.setting, i, &p->predicted_ms, &p->predicted_m);
-        pal_study_foresee_cost(study, &p->priced.setting, p->n_node, p->n_substep, p->read_ms, i, &p->predicted_ms);
+        pal_study_foresee_cost(study, &p->priced.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
+                               &p->predicted_ms);
     }
 }

@@ -148,6 +148,7 @@ pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*w
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
         facts->read_ms = read_ms(w.world);
+        if (pal_study_is(setting->model, "fem")) facts->n_element = w.body->n_element;
     }
     pal_study_close(&w);
     return err;

@@ -39,7 +39,8 @@ static void cost_and_error_are_foreseen_from_the_other_settings(void)
             if (p->err) continue;
             n++;
             if (!pal_study_foresee(s, &p->priced.setting, i, &ms, &error_m)) continue;
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_substep, p->read_ms, i, &ms));
+            CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
+                                         &ms));
             /* as it stands in the record */
             CHECK_NEAR(p->predicted_ms, ms, 1e-6 * ms);
             cost += ms <= 1.3 * p->priced.ms && ms >= p->priced.ms / 1.3;

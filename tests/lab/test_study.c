@@ -165,15 +165,41 @@ static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
         int nodes = 50 + 400 * k, substeps = 1 + 7 * k;
         pal_setting at = s->point[k % 2].priced.setting;
         s->point[8].err = PAL_ERR_FROZEN;
-        CHECK(pal_study_foresee_cost(s, &at, nodes, substeps, 0, 7, &ms));
+        CHECK(pal_study_foresee_cost(s, &at, nodes, 0, substeps, 0, 7, &ms));
         CHECK_NEAR(ms / ((overhead + node * nodes * substeps) * s->step_s / at.step_s), 1, 1e-4);
     }
     pal_setting at = s->point[0].priced.setting;
-    CHECK(!pal_study_foresee_cost(s, &at, 0, 3, 0, -1, &ms) && !pal_study_foresee_cost(s, &at, 300, 0, 0, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 0, 0, 3, 0, -1, &ms) &&
+          !pal_study_foresee_cost(s, &at, 300, 0, 0, 0, -1, &ms));
     snprintf(at.element, PAL_NAME, "tet10");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, 0, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 300, 0, 3, 0, -1, &ms));
     snprintf(at.model, PAL_NAME, "fem");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 3, 0, -1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &at, 300, 0, 3, 0, -1, &ms));
+    free(s);
+}
+
+/* a slender body has half as many elements to a node as a stout one, and exact tangents go with the elements alone */
+static void steps_go_with_elements_where_they_are_counted(void)
+{
+    const double element = 300e-6, tangent = 1200e-6, to_a_node[] = {0.4, 0.55, 0.6, 0.7, 0.78};
+    pal_study *s = new_study();
+    s->step_s = 1.0 / 60;
+    for (int i = 0; i < 20; i++) {
+        int k = i / 2 % 5;
+        bool neo = i % 2;
+        pal_study_point *p = put(s, "hex8_bbar", 16 + i / 10 + 8 * k, 0, 1e-3);
+        snprintf(p->priced.setting.law, PAL_NAME, neo ? "neo_hookean" : "corotational");
+        p->n_node = 150 << k, p->n_substep = 1, p->n_element = to_a_node[k] * p->n_node;
+        p->priced.ms = (element + (neo ? tangent : 0)) * p->n_element;
+    }
+    for (int left_out = 0; left_out < 20; left_out++) {
+        const pal_study_point *p = &s->point[left_out];
+        double ms, twice;
+        CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_element, 1, 0, left_out, &ms));
+        CHECK_NEAR(ms / p->priced.ms, 1, 0.02);
+        CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, 2 * p->n_element, 1, 0, left_out, &twice));
+        CHECK_NEAR(twice / ms, 2, 0.1);
+    }
     free(s);
 }
 
@@ -194,12 +220,12 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
         for (int told = 100; told < 5000; told += 2000) {
             bool adapts = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node,
+            CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node, 0,
                                          adapts ? told / 100 : p->n_substep, 0, i, &ms));
             CHECK_NEAR(ms / p->priced.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
-    CHECK(!pal_study_foresee_cost(s, &s->point[1].priced.setting, 248, 24, 0, 1, &ms));
+    CHECK(!pal_study_foresee_cost(s, &s->point[1].priced.setting, 248, 0, 24, 0, 1, &ms));
     free(s);
 }
 
@@ -428,6 +454,7 @@ int main(void)
     RUN(the_reference_bounds_what_is_named);
     RUN(power_laws_are_foreseen_exactly);
     RUN(costs_that_go_with_what_is_counted_are_foreseen_exactly);
+    RUN(steps_go_with_elements_where_they_are_counted);
     RUN(how_much_is_refined_is_seen_of_other_levels);
     RUN(a_beam_is_swept_and_taken_up_again);
     RUN(nearly_incompressible_and_against_samples);
