@@ -140,8 +140,9 @@ if [ -z "$fast" ]; then
     wait
     say "tests with sanitizers"
     {
-        # ranks of MPI are the release build's, and so are headers alone, which the same compiler reads there
-        [ ! -e "$build/built_asan" ] || compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|headers)$'
+        # ranks of MPI are the release build's, and so are headers alone and tables, of which a sanitizer sees nothing
+        [ ! -e "$build/built_asan" ] ||
+            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|headers|hard_cases|test_hard_table)$'
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
     } &
     built asan && waits asan

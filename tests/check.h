@@ -4,7 +4,8 @@
  *     int main(void) { RUN(restores_volume_after_squeeze); return check_report(); }
  *
  * A failed check prints file, line and the numbers, marks the test failed and goes on. check_report prints
- * "N passed, N failed" (tests, not checks) and is the exit code. A test that ran no check counts as failed.
+ * "N passed, N failed" (tests, not checks) and is the exit code. A test that ran no check counts as failed. What each
+ * took of the processor is printed for whoever looks for a slow one, and is never checked.
  * check_shared(path) gives the path of a file of ../shared (environment PAL_SHARED, default ../shared) or NULL after
  * saying that the test is left out because it is not there.
  * check_random(&seed) draws the same numbers everywhere, in [-1, 1); check_random01 in [0, 1). */
@@ -16,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 static int check_passed, check_failed, check_count;
@@ -97,9 +99,11 @@ static inline double check_random(uint64_t *seed)
     do {                                                                                                               \
         check_bad = false;                                                                                             \
         check_count = 0;                                                                                               \
+        const clock_t check_from = clock();                                                                            \
         test();                                                                                                        \
         if (check_count == 0) check_bad = true;                                                                        \
-        printf("%s %s (%d checks)\n", check_bad ? "FAIL" : "ok  ", #test, check_count);                                \
+        printf("%s %s (%d checks, %.2f s of processor)\n", check_bad ? "FAIL" : "ok  ", #test, check_count,            \
+               (double)(clock() - check_from) / CLOCKS_PER_SEC);                                                       \
         fflush(stdout);                                                                                                \
         if (check_bad)                                                                                                 \
             check_failed++;                                                                                            \

@@ -457,7 +457,7 @@ int main(void)
     RUN(steps_go_with_elements_where_they_are_counted);
     RUN(how_much_is_refined_is_seen_of_other_levels);
     RUN(a_beam_is_swept_and_taken_up_again);
-    RUN(nearly_incompressible_and_against_samples);
+    RUN_LONG(nearly_incompressible_and_against_samples);
     RUN(problems_that_no_live_body_can_be_are_refused);
     return check_report();
 }

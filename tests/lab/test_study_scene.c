@@ -87,7 +87,7 @@ static void a_full_organ_is_pressed(void)
     static const char *const method[] = {"fem", "tet_springs"};
     organ o;
     organ_make(&o, true);
-    pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = 2};
+    pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = CHECK_REPEATS(2, 1)};
     pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
     if (err) CHECK_FAIL("%s", o.note.text);
     const pal_study *s = o.study;
@@ -104,7 +104,7 @@ static void a_full_organ_is_pressed(void)
         if (!strcmp(q->model, "tet_springs") && q->k_distance_J > 0) fitted = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && !(q->k_distance_J > 0)) plain = p->static_rms_m;
     }
-    CHECK(fine < coarse && fitted < plain);
+    CHECK(fine < coarse && (CHECK_REPEATS(false, true) || fitted < plain));
     int n_sprung = 0;
     CHECK(pal_study_pick(s, NAN, 1e9) >= 0);
     for (int i = 0; i < s->n_point; i++) {
@@ -114,7 +114,7 @@ static void a_full_organ_is_pressed(void)
         CHECK(q->k_volume_J > 0.3 * q->k_distance_J);
         check_survives(&o, q);
     }
-    CHECK_INT(n_sprung, 1);
+    CHECK_INT(n_sprung, CHECK_REPEATS(1, 0));
     organ_free(&o);
 }
 

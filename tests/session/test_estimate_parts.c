@@ -335,7 +335,7 @@ static void rows_switched_off_are_off_for_the_estimate(void)
     fem->body[0].n_effect = 1;
     REQUIRE(!pal_world_create(fem, NULL, &w));
     REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
-    for (int round = 0; round < 2; round++) {
+    for (int round = 0; round < CHECK_REPEATS(2, 1); round++) {
         CHECK(!pal_world_switch_row(w, fem, 0, "gravity", false, NULL));
         fall(w, fem, 0);
         REQUIRE(estimate_again(work, w, &e));
@@ -448,7 +448,7 @@ static void a_body_at_rest_has_no_error(void)
 int main(void)
 {
     if (!estimate_scene(8)) return 1;
-    RUN(the_part_of_time_is_what_shorter_steps_change);
+    RUN_LONG(the_part_of_time_is_what_shorter_steps_change);
     RUN(a_looser_solver_leaves_more);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);

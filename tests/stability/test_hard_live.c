@@ -33,7 +33,7 @@ static void plausible_stiffness_stands_at_the_steps_of_documents(void)
 {
     static const double young_Pa[] = {5e4, 2e5, 1e6};
     for (int m = 0; m < FOUR_MODELS; m++)
-        for (int q = 0; q < 3; q++) {
+        for (int q = CHECK_REPEATS(0, 2); q < 3; q++) {
             double sag[2] = {0}, far[2] = {0};
             CHECK(hang(m, young_Pa[q], step_s, &sag[0], &far[0]) && hang(m, young_Pa[q], 1e-3, &sag[1], &far[1]));
             printf("  %s, E %g: sags by %.3g and %.3g %% S, swings to %.3g and %.3g\n", four_name[m], young_Pa[q],
@@ -57,7 +57,7 @@ static void stiffness_jumps_a_thousandfold_and_back(void)
         REQUIRE(four_step(&s, 30, step_s));
         const double bent = four_off(&s);
         double rise = 0;
-        for (int turn = 0; turn < 4; turn++) {
+        for (int turn = 0; turn < CHECK_REPEATS(4, 2); turn++) {
             to.young_Pa *= turn % 2 ? 1e-3 : 1e3;
             REQUIRE(!pal_world_material(s.world, 0, &to, &s.note));
             const double before = four_energy_J(&s);

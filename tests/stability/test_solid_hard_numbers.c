@@ -198,7 +198,7 @@ static void all_held_and_one_element_are_fine(void)
 {
     for (int k = 0; k < SOLID_KINDS; k++)
         for (int held = 0; held < 2; held++)
-            for (int level = 0; level < 2; level++) {
+            for (int level = 0; level < CHECK_REPEATS(2, 1); level++) {
                 solid_scene s;
                 const double size[3] = {0.02, 0.02, 0.02};
                 solid_scene_take(&s, solid_scene_box((const int32_t[3]){1, 1, 1}, size, false), level,

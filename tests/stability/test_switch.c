@@ -360,7 +360,7 @@ static void handles_hold_on(void)
 {
     const pal_setting s[] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"},
                              {.model = "subdivision_fem", .size = 2, .solver = "implicit_euler"}};
-    for (int n = 0; n < 2; n++) {
+    for (int n = 0; n < CHECK_REPEATS(2, 1); n++) {
         const pal_brush handle = {.kind = PAL_BRUSH_CURVE,
                                   .at_m = {0.13, 0.025, WIDTH},
                                   .to_m = {0.19, 0.025, WIDTH},

@@ -13,7 +13,7 @@ static void friction_holds_through_every_switch(void)
         const double was_N = pal_world_tools(w)->tool[0].mean_force_N[0];
         CHECK(was_N < -0.05); /* tissue pulls the tool back */
         for (int j = 0; j < N; j++) {
-            if (i == j) continue;
+            if (i == j || CHECK_REPEATS(false, (i + j) % 3 != 1)) continue;
             pal_world *next = open_world(&set[j]->scene);
             const double *force_N = pal_world_tools(next)->tool[0].mean_force_N;
             pal_transfer *x = carry(i, j, w, next, &r);

@@ -82,7 +82,7 @@ static void check_pairs(const pal_setting *list, int n, bool cells)
         pal_world *w = open_world(&b.set[i]->scene);
         CHECK(disturb(w, b.set[i]->scene.step_s));
         for (int j = 0; j < n; j++)
-            if (i != j) check_pair(&b, i, j, w);
+            if (i != j && CHECK_REPEATS(true, (i + j) % 3 == 1)) check_pair(&b, i, j, w);
         pal_world_destroy(w);
     }
     end(&b);

