@@ -147,3 +147,12 @@ pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_mate
     if (row->whole) weigh(row, material);
     return PAL_ERR_OK;
 }
+
+bool pal_springs_given(const pal_row *row, int n_row)
+{
+    for (int i = 0; i < n_row; i++) {
+        const pal_spring_row *springs = row[i].effect->springs ? row[i].effect->springs(row[i].self) : NULL;
+        if (springs && springs->spring.given) return true;
+    }
+    return false;
+}

@@ -8,6 +8,7 @@
 #include "server/sim/spring_law.h"
 #include "server/sim/strips.h"
 
+#include <math.h>
 #include <string.h>
 
 /* C and its gradient at each corner, 1/m; only the kind's own corners are set */
@@ -44,6 +45,17 @@ PAL_INLINE double pal_spring_measure(pal_spring_kind kind, const double *const x
     }
     pal_cross3(n, e[1], e[2]);
     return pal_dot3(e[0], n);
+}
+
+/* quality below which springs leave the volume of a tetrahedron alone (effects/tet_volume.c) */
+#define PAL_SPRING_SLIVER 0.01
+/* of a tetrahedron: 1 for a regular one, 0 for a flat one */
+PAL_INLINE double pal_spring_tet_quality(const double *const x[PAL_CORNERS])
+{
+    double mean2 = 0;
+    for (int a = 0; a < 4; a++)
+        for (int b = 0; b < a; b++) mean2 += pow(pal_dist3(x[a], x[b]), 2) / 6;
+    return mean2 > 0 ? sqrt(2) * fabs(pal_spring_measure(PAL_SPRING_VOLUME, x)) / (mean2 * sqrt(mean2)) : 0;
 }
 
 /* An edge below 1e-9 of its rest length, a face below 1e-12 of its rest area has no direction: zero gradient */

@@ -18,6 +18,8 @@ static const double still_share = 1e-3;
 static const double calm_share = 0.02;
 /* of the time that edges give to an explicit step */
 static const double damp_share = 0.25;
+/* of what is stored, that letting go a body that stands still may add */
+static const double little_share = 2e-3;
 enum { LOOSE_STEPS = 120, GROW_STEPS = 30 };
 
 /* a body's rows of springs; NULL: it has no such row */
@@ -44,6 +46,14 @@ void pal_spring_tangle_reset(pal_spring_tangle *t)
     for (int i = 0; i < t->n_node && t->n_patch > 0; i++) t->patch[i] = -1;
     t->stale = t->stale || t->n_patch > 0;
     t->n_patch = 0;
+}
+
+void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *from)
+{
+    memcpy(t->patch, from->patch, sizeof *t->patch * (size_t)t->n_node);
+    memcpy(t->of, from->of, sizeof t->of);
+    t->n_patch = from->n_patch, t->scale = from->scale, t->damp_s = from->damp_s, t->first_J = from->first_J;
+    t->stale = true;
 }
 
 static rows find_rows(const pal_step *step)
@@ -281,7 +291,7 @@ static double springs(const rows *r, const pal_body *body)
 }
 
 /* which patches become springs again; true: some do */
-static bool let_go(pal_spring_tangle *t, double spare_J, bool still, bool step_begins)
+static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, bool still, bool step_begins)
 {
     bool any = false;
     for (int p = 0; p < t->n_patch; p++) {
@@ -290,7 +300,7 @@ static bool let_go(pal_spring_tangle *t, double spare_J, bool still, bool step_b
         patch->age += step_begins;
         patch->loose = patch->bad || !still ? 0 : patch->loose + step_begins;
         const bool fits = rise <= spare_J && patch->spring_J <= calm_share * patch->size_J;
-        if (patch->bad || (!fits && patch->loose < LOOSE_STEPS)) continue;
+        if (patch->bad || (!fits && (patch->loose < LOOSE_STEPS || rise > little_J))) continue;
         spare_J -= rise;
         patch->n = 0;
         any = true;
@@ -470,7 +480,8 @@ bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
         before_J = springs(&r, body) + patches(t);
-        changed = let_go(t, t->first_J - kinetic_J - before_J, kinetic_J < still_share * patches(t), step_begins);
+        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J,
+                         kinetic_J < still_share * patches(t), step_begins);
     }
     changed |= take_in(t, &r, body, step_begins);
     if (first && changed) before_J = springs(&r, body);

@@ -19,8 +19,9 @@
  * s <= 1 is such that patches begin with no more energy than the springs had. A patch becomes springs again when all
  * its tetrahedra are between 0.2 and 20 of their volume, the springs would store little (a strain of 0.2 or so in
  * mean), and the body's motion and springs then have no more energy than when patches first were; or after 120 steps
- * of a body that stands still. A patch that nothing presses and that does not come loose takes in the nodes beside it
- * every 30 steps.
+ * of a body that stands still, where that adds next to nothing. A patch that nothing presses and that does not come
+ * loose takes in the nodes beside it every 30 steps. What a load presses or pulls, and what hangs on it, is not taken
+ * out: a tool goes on to feel springs.
  *
  * Verlet looks where it takes the bounds of stiffness anew, which is where a node may have moved a fifth of an element,
  * and in every step while there are patches: one pass over volumes, 8 lanes at a time. Rows and their loops are the
@@ -60,6 +61,8 @@ typedef struct pal_spring_tangle {
 pal_err pal_spring_tangle_make(int n_node, pal_arena *arena, pal_spring_tangle **out);
 /* no patches; rows are told at the next look */
 void pal_spring_tangle_reset(pal_spring_tangle *t);
+/* goes on where that of the same body in another world is: as many nodes, and the same ones */
+void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *from);
 /* looks at the tetrahedra and chooses what springs are off from now on: true: others than before. Counted in
  * body->rescue. No heap */
 bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step);

@@ -1,6 +1,7 @@
 /* A world that goes on where another is (pal_world_follow). */
 #include "server/base/vec3.h"
 #include "server/sim/shell_like.h"
+#include "server/sim/spring_tangle.h"
 #include "server/sim/world_parts.h"
 
 #include <string.h>
@@ -82,6 +83,8 @@ static void follow_body(pal_world *w, int b, const pal_body *from, const double 
     memcpy(to->why, from->why, sizeof to->why);
     to->rescue = from->rescue;
     to->brake_1_s = from->brake_1_s, to->brake_s = from->brake_s;
+    const bool same = to->tangle && from->tangle && to->n_node == from->n_node;
+    if (same && !memcmp(to->x_rest, from->x_rest, n_byte)) pal_spring_tangle_follow(to->tangle, from->tangle);
     pal_world_moved(w, b);
 }
 

@@ -197,6 +197,25 @@ static void what_may_not_untangle_has_nothing_for_it(void)
     bench_close(&b);
 }
 
+/* the same body in another world: patches, energy and the way back are those of the first */
+static void a_world_that_follows_goes_on_untangling(void)
+{
+    bench b;
+    REQUIRE(bench_open(&b, true, true, 8));
+    fold(&b, 0.015);
+    for (int i = 0; i < 3; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    REQUIRE(b.body->tangle->n_patch > 0);
+    pal_world *next;
+    REQUIRE(!pal_world_create(b.scene, &note, &next));
+    pal_world_follow(next, b.world, -1, NULL, NULL);
+    const pal_body *body = pal_world_body(next, 0);
+    CHECK_INT(body->tangle->n_patch, b.body->tangle->n_patch);
+    CHECK_NEAR(pal_world_energy_J(next) / pal_world_energy_J(b.world), 1, 1e-12);
+    CHECK_NEAR(body->tangle->first_J, b.body->tangle->first_J, 0);
+    pal_world_destroy(next);
+    bench_close(&b);
+}
+
 /* a load on a node leaves it and what hangs on it to the springs, as long as it is there */
 static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
 {
@@ -243,6 +262,7 @@ int main(void)
     RUN(untangling_keeps_momentum_and_angular_momentum);
     RUN(springs_are_what_they_were_once_it_is_back);
     RUN(what_may_not_untangle_has_nothing_for_it);
+    RUN(a_world_that_follows_goes_on_untangling);
     RUN(what_is_pressed_is_left_alone_until_it_is_let_go);
     RUN(what_is_never_turned_over_moves_to_the_same_bits);
     return check_report();

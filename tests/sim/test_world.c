@@ -448,6 +448,27 @@ static void a_sliver_bears_less_of_a_lasting_load(void)
     box_free(&box);
 }
 
+/* springs whose constants are given: an edit of E changes neither them nor what nodes bear */
+static void given_springs_bear_what_they_bore_after_an_edit_of_E(void)
+{
+    for (int given = 0; given < 2; given++) {
+        pal_prepared box;
+        REQUIRE(!box_make(3, 3, 3, 0.01, &box));
+        pal_scene *scene = box_scene(&box, true, false);
+        if (given) pal_item_put_number(&scene->body[0].model, "k_distance_J", 1e-3, NULL);
+        pal_world *world;
+        REQUIRE(!pal_world_create(scene, &note, &world));
+        const double cap_N = pal_world_body(world, 0)->load_cap_N;
+        pal_material to = scene->body[0].material;
+        to.young_Pa *= 4;
+        REQUIRE(!pal_world_material(world, 0, &to, &note));
+        CHECK_NEAR(pal_world_body(world, 0)->load_cap_N / cap_N, given ? 1 : 4, 1e-12);
+        pal_world_destroy(world);
+        free(scene);
+        box_free(&box);
+    }
+}
+
 int main(void)
 {
     RUN(goes_on_where_another_world_was);
@@ -464,5 +485,6 @@ int main(void)
     RUN(has_rows_only_for_what_the_scene_calls_for);
     RUN(spring_scenes_pay_nothing_for_finite_elements);
     RUN(a_sliver_bears_less_of_a_lasting_load);
+    RUN(given_springs_bear_what_they_bore_after_an_edit_of_E);
     return check_report();
 }

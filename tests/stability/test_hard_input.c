@@ -163,8 +163,7 @@ static void flatten_triangle(pal_surface *surface, double left)
     }
 }
 
-/* a sub-step as long as that of the body without it is asked for; springs of volume in a sliver are stiffer by its
- * aspect, and it is all they are there for: what that costs is on record */
+/* a sub-step as long as that of the body without it is asked for */
 static void slivers_are_borne_or_refused(void)
 {
     for (int m = 0; m < FOUR_MODELS; m++)
@@ -192,10 +191,7 @@ static void slivers_are_borne_or_refused(void)
                 REQUIRE(four_open(&s) && four_open(&plain));
                 REQUIRE(four_step(&s, 1, 1.0 / 60) && four_step(&plain, 1, 1.0 / 60));
                 const double times = (double)pal_world_substeps(s.world) / pal_world_substeps(plain.world);
-                if (m == FOUR_SPRINGS && !flat)
-                    HARD_CASE_MISSED("slivers", four_name[m], what, times, 1.1, 26, "");
-                else
-                    HARD_CASE("slivers", four_name[m], what, times, 1.1, "");
+                HARD_CASE("slivers", four_name[m], what, times, 1.1, "");
                 if (times < 2)
                     HARD_CASE("slivers", four_name[m], "pressed and let go: off rest after 10 s", pressed_and_left(&s),
                               0.1, "% S");

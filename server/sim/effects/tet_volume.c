@@ -2,8 +2,9 @@
  * E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B 4.1, F_V).
  *
  * Departures: errata B3, B4 (true gradients, area/3 each, not unit directions; 1/V0^2; V0 is the rest volume, signed by
- * the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is left out: it would set the sub-step of the whole
- * body. */
+ * the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is left out, and so is a sliver, of less than 0.01 of
+ * the volume that a regular one has with its edges: it would set the sub-step of the whole body for a volume that is
+ * none, and turn over at any touch. Their edges stay; a preflight counts and names them. */
 #include "server/sim/effect_list.h"
 #include "server/sim/spring_row.h"
 
@@ -20,9 +21,15 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         free(tet);
         return PAL_ERR_MEMORY;
     }
-    memcpy(tet, tets->tet, 4 * sizeof *tet * (size_t)tets->n_tet);
+    int n = 0;
+    for (int t = 0; t < tets->n_tet; t++) {
+        const double *x[PAL_CORNERS];
+        for (int c = 0; c < 4; c++) x[c] = build->body->x_rest + 3 * (size_t)tets->tet[4 * t + c];
+        if (pal_spring_tet_quality(x) < PAL_SPRING_SLIVER) continue;
+        memcpy(tet + 4 * (size_t)n++, tets->tet + 4 * (size_t)t, 4 * sizeof *tet);
+    }
     double h = build->body->h_m;
-    pal_err err = pal_spring_row_make(PAL_SPRING_VOLUME, item, build, tet, tets->n_tet, 6e-6 * h * h * h, row);
+    pal_err err = pal_spring_row_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row);
     free(tet);
     *self = row;
     return err;
