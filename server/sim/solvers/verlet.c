@@ -6,8 +6,9 @@
  * K + t C <= m at every free node. The bound is taken again at the current state whenever a node may have moved a fifth
  * of an element since the last time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a
  * sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality is met
- * by adding mass to the nodes that break it. Where the bound is taken, springs are looked at for what is turned over
- * (spring_tangle.h). */
+ * by adding mass to the nodes that break it; as it comes and goes it would bring energy with it, so these nodes lose up
+ * to a hundredth of their velocity in a sub-step. Where the bound is taken, springs are looked at for what is turned
+ * over (spring_tangle.h). */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
@@ -24,6 +25,8 @@ typedef struct verlet {
 } verlet;
 
 static const double most_way_h = 0.2, most_move_S = 0.2;
+/* of a velocity in a sub-step, times the share of the mass that was added */
+static const double heavy_loss = 0.01;
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
 {
@@ -123,8 +126,11 @@ static pal_err run(void *self, pal_step *step)
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
-        if (step->heavy) m = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
         double s = body->held[i] ? 0 : dt / m, k = !body->held[i] ? keep : body->held[i] == 2 ? 1 : 0;
+        if (step->heavy && !body->held[i]) {
+            double heavy = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
+            s = dt / heavy, k *= 1 - heavy_loss * (1 - m / heavy);
+        }
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
         most2 = v2 > most2 ? v2 : most2;
