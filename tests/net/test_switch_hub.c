@@ -215,8 +215,8 @@ int main(void)
     setting(2, "subdivision_fem", "", 2);
     RUN(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
-    RUN(a_pressure_goes_on);
-    RUN(a_handle_goes_on);
+    RUN_SERIAL(a_pressure_goes_on);
+    RUN_SERIAL(a_handle_goes_on);
     RUN(what_cannot_be_is_refused_with_a_sentence);
     RUN(a_server_that_ends_in_the_middle_ends);
     clay_free(&clay);

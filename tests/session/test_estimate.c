@@ -268,8 +268,8 @@ int main(void)
     RUN(looking_changes_nothing);
     RUN(who_looks_goes_on_looking_at_what_follows);
     RUN(a_pressed_body_is_estimated_while_it_runs);
-    RUN(a_sleeping_body_is_looked_at_once);
-    RUN(nothing_is_known_of_a_frozen_body);
+    RUN_SERIAL(a_sleeping_body_is_looked_at_once);
+    RUN_SERIAL(nothing_is_known_of_a_frozen_body);
     pal_prepared_free(&mesh);
     return check_report();
 }
