@@ -56,6 +56,7 @@ cJSON *pal_preflight_json(const pal_preflight *preflight)
         }
         add_weak(body, "short_edges", &b->edge);
         add_weak(body, "flat_elements", &b->flat);
+        if (b->n_sliver > 0) cJSON_AddNumberToObject(body, "slivers", b->n_sliver);
         add_weak(body, "thin_elements", &b->thin);
         add_weak(body, "light_nodes", &b->light);
         add_number(body, "condition", b->condition);

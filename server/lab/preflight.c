@@ -7,6 +7,7 @@
 #include "server/num/lanczos.h"
 #include "server/sim/shell.h"
 #include "server/sim/solid.h"
+#include "server/sim/spring_shape.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -85,6 +86,7 @@ static void look_at_elements(const pal_body *body, pal_preflight_body *out)
         double shape = shape_of(body->x_rest, corner, n, mean2);
         middle(body->x_rest, corner, n, at);
         if (shape < least_shape) weak(&out->flat, e, shape, at, body);
+        if (tets && !body->element) out->n_sliver += shape < PAL_SPRING_SLIVER;
     }
     int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
     const int32_t *element = body->element ? body->element : simplex;
@@ -369,6 +371,9 @@ int pal_preflight_say(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES
     }
     say_weak(&b->edge, "edges have next to no length", 1e3, " mm", &n, line);
     say_weak(&b->flat, "elements are badly shaped", 1, " of a regular one", &n, line);
+    if (b->n_sliver > 0)
+        snprintf(line[n++], PAL_PREFLIGHT_LINE, "%d of them %s: springs leave the volume out", b->n_sliver,
+                 b->n_sliver == 1 ? "is a sliver" : "are slivers");
     say_weak(&b->thin, "elements are hardly filled", 100, " %", &n, line);
     say_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
     if (isfinite(b->condition))

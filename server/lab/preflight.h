@@ -23,6 +23,7 @@ typedef struct pal_preflight_body {
     int limit_node;
     double limit_at_m[3], limit_edge_m, limit_mass_kg; /* its place, shortest edge and mass */
     pal_weak flat;  /* tetrahedra or triangles of shape below 0.1 (1: regular), value: shape; 0: no volume or area */
+    int n_sliver;   /* of these the tetrahedra whose volume springs leave out (effects/tet_volume.c)              */
     pal_weak edge;  /* edges shorter than 1e-6 S, value: m                                                       */
     pal_weak thin;  /* elements filled by less than 5 %, value: share                                            */
     pal_weak light; /* points lighter than 1/1000 of the mean, value: kg                                         */
@@ -46,6 +47,6 @@ enum { PAL_PREFLIGHT_FULL = 250, PAL_PREFLIGHT_QUICK = 40 };
 pal_err pal_preflight_look(const pal_scene *scene, int most_cg, pal_preflight *out, pal_note *note);
 /* sentences for people about one body, one a line, worst first; returns how many lines (at most `most`). Nothing weak:
  * limit and conditioning alone */
-enum { PAL_PREFLIGHT_LINE = 200, PAL_PREFLIGHT_LINES = 7 };
+enum { PAL_PREFLIGHT_LINE = 200, PAL_PREFLIGHT_LINES = 8 };
 int pal_preflight_say(const pal_preflight_body *body, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE]);
 #endif

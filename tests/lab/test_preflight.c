@@ -34,9 +34,17 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     CHECK(n_line >= 3 && strstr(line[0], name) == line[0] && strstr(line[0], "an edge of 0.1 mm") != NULL);
     /* both ends at one place: no length is told too */
     box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-9;
-    scene->most_substep = 2000000000;
+    scene->most_substep = 1000000;
     if (!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note))
         CHECK(p.body[0].edge.n > 0 && p.body[0].edge.value < 2e-9);
+    /* slivers are counted and told, and set no sub-step */
+    box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-5;
+    REQUIRE(!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note));
+    CHECK(p.body[0].n_sliver > 0 && p.body[0].n_sliver <= p.body[0].flat.n);
+    n_line = pal_preflight_say(b, line);
+    bool told = false;
+    for (int i = 0; i < n_line; i++) told |= strstr(line[i], "springs leave the volume out") != NULL;
+    CHECK(told);
     free(scene);
     box_free(&box);
 }
