@@ -136,6 +136,7 @@ static void measure(family *f, bool shown, pal_family *out)
     int size = f->setting->size, r = finest_size(f);
     out->known = false;
     if (r > 0 && solve(f, r, &finest)) {
+        pal_rest_free(&finest.rest); /* its places are kept, its factor is the largest thing here */
         double own = left(f, size, &finest), last = change(f, shown);
         if (own > 0 && last > 0) {
             out->times = fmin(fmax(own / last, 1 / most_times), most_times);

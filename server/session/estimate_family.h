@@ -11,11 +11,14 @@
  * sign and such that have nothing to do with each other. That of twice as many voxels, where these are too near to the
  * finest to be told from it, goes on from half and this size, not faster than h^2.
  *
+ * What is random in the finest mesh stays in it: the gear in 30 voxels was told 0.44, 1.5 and 2 times its error by
+ * finest meshes of 42, 46 and none.
+ *
  * Of two voxels across, merged ones are one, which B-bar leaves next to nothing to bend with: a beam's error was told 8
  * times too large.
  *
- * Private to estimate_*.c. Heap memory, slow: most of it is the factor of the finest mesh, up to two seconds. Thread:
- * one at a time. */
+ * Private to estimate_*.c. Heap memory, slow: most of it is the factor of the finest mesh, up to two seconds and, while
+ * it lasts, 800 MB. Thread: one at a time. */
 #ifndef PAL_SESSION_ESTIMATE_FAMILY_H
 #define PAL_SESSION_ESTIMATE_FAMILY_H
 #include "server/session/estimate_rest.h"
