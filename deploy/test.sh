@@ -146,18 +146,18 @@ if [ -z "$fast" ]; then
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
     } &
     built asan && waits asan
-    built tsan && waits tsan
+    built tsan && waits tsan -LE same_threads
     wait
     idle=
     for preset in asan tsan; do [ ! -e "$build/built_$preset" ] || count $preset; done
     if built fuzz; then
         # two at a time
         ls "$build"/fuzz/tests/fuzz | sed -n 's/^fuzz_\([a-z0-9_]*\)$/\1/p' | xargs -P 2 -I % sh -c 'cd "$0" && mkdir -p corpus/% &&
-            fuzz/tests/fuzz/fuzz_% -max_total_time=5 -timeout=20 -rss_limit_mb=2048 -artifact_prefix="$0/crash_" corpus/% "$1/%" \
+            fuzz/tests/fuzz/fuzz_% -max_total_time=3 -timeout=20 -rss_limit_mb=2048 -artifact_prefix="$0/crash_" corpus/% "$1/%" \
                 >fuzz_%.log 2>&1; echo $? >fuzz_%.code' "$build" "$tree/tests/data/fuzz"
         for code in "$build"/fuzz_*.code; do
             thing=$(basename "$code" .code)
-            step "$(echo "$thing" | tr _ ' ') for 5 s" sh -c 'cat "$0/$1.log"; exit $(cat "$0/$1.code")' "$build" "$thing"
+            step "$(echo "$thing" | tr _ ' ') for 3 s" sh -c 'cat "$0/$1.log"; exit $(cat "$0/$1.code")' "$build" "$thing"
         done
     fi
 fi

@@ -7,6 +7,7 @@
 #include "server/num/shape.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,6 +18,7 @@ static const double told_apart = 1.35, order = 2, far_order = 1.75, least_ratio 
 /* cosine of two loads from which on what was measured under one is taken for the other; times that measuring took, to
  * wait before the next */
 static const double same_loads = 0.8, waits = 20;
+static atomic_flag busy = ATOMIC_FLAG_INIT; /* one family is measured at a time, whatever the sessions */
 
 typedef struct sized {
     pal_rest rest;
@@ -76,9 +78,15 @@ static bool probe(const family *f, sized *m)
     return true;
 }
 
+static bool stopped(const family *f)
+{
+    return f->stop && atomic_load_explicit(f->stop, memory_order_acquire);
+}
+
 /* size 0: merged voxels; that of the setting: the body's own mesh */
 static bool solve(const family *f, int size, sized *m)
 {
+    if (stopped(f)) return false;
     pal_err err = size == 0                  ? pal_rest_coarser(f->scene, f->body, NULL, "linear", NULL, &m->rest)
                   : size == f->setting->size ? pal_rest_make(f->scene, f->body, NULL, "linear", NULL, &m->rest)
                                              : pal_rest_sized(f->scene, f->body, f->setting, size, "linear", &m->rest);
@@ -144,7 +152,7 @@ static void measure(family *f, bool shown, pal_family *out)
             out->twice = left(f, 2 * size, &finest) / own;
             double seen = out->half > 0 ? 0.5 * (far_order + log2(out->half)) : far_order;
             out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, least_ratio);
-            out->finest = r, out->known = !(f->stop && atomic_load_explicit(f->stop, memory_order_acquire));
+            out->finest = r, out->known = !stopped(f);
         }
     }
     sized_free(&finest);
@@ -184,9 +192,16 @@ void pal_family_refresh(const pal_scene *scene, const pal_body *body, const pal_
         free(now);
         return;
     }
+    /* hundreds of megabytes: bodies that are watched at the same time wait for one another */
+    if (atomic_flag_test_and_set_explicit(&busy, memory_order_acquire)) {
+        out->next_s = began + 1;
+        free(now);
+        return;
+    }
     free(out->loads);
     out->loads = now;
     measure(&f, shown, out);
+    atomic_flag_clear_explicit(&busy, memory_order_release);
     double end = pal_clock_s();
     out->next_s = end + waits * (end - began);
 }

@@ -442,6 +442,7 @@ bool pal_rest_find(pal_rest *r, const pal_estimate_state *state, const pal_body 
         last = part, last_J = got_J, part = next;
         if (!find(r, state, body, r->n_near > 0 ? NULL : r->x, part, stop)) return find(r, state, body, from, 1, stop);
         got_J = pressed_J(state, body, r->x);
+        if (!(fabs(got_J - want_J) < fabs(last_J - want_J))) return find(r, state, body, from, 1, stop);
     }
     return true;
 }

@@ -362,13 +362,16 @@ static double fixed_ms(const pal_world *world, int body)
     return 1e-6 * sum_ns;
 }
 
-static bool is_touched(const pal_world *world)
+/* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
+static bool is_touched(const pal_world *world, const pal_body *body)
 {
     const pal_tools *tools = pal_world_tools(world);
-    bool any = false;
+    bool any = false, borne = false;
     for (int t = 0; t < tools->n_tool; t++)
         any = any || pal_dot3(tools->tool[t].mean_force_N, tools->tool[t].mean_force_N) > 0;
-    return any;
+    for (int i = 0; i < 3 * body->n_node && any && !borne; i++)
+        borne = body->load[i] != (body->outer ? body->outer[i] : 0);
+    return borne;
 }
 
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
@@ -380,7 +383,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     memcpy(state->x, from->x, n_byte);
     memcpy(state->v, from->v, n_byte);
     memcpy(state->load, from->load, 3 * sizeof(double) * (size_t)from->n_node);
-    state->touched = is_touched(world);
+    state->touched = is_touched(world, from);
     if (from->outer)
         memcpy(state->outer, from->outer, 3 * sizeof(double) * (size_t)from->n_node);
     else

@@ -27,6 +27,7 @@ static void weigh(pal_spring_row *row, const pal_material *material)
         for (int k = 0; k < 4; k++) q[i] += over[k] * row->part[k][i];
     }
     if (row->all) memcpy(row->q, q, sizeof *q * (size_t)row->strips.n_lane);
+    for (int k = 0; row->all && k < row->n_off; k++) row->q[row->strips.place[row->off[k]]] = 0;
 }
 
 /* what each tetrahedron counts, by what its region gives: nothing, E, Poisson's ratio, both [4][n_tet]; false: all are

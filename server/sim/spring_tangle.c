@@ -53,6 +53,7 @@ void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *fro
     memcpy(t->patch, from->patch, sizeof *t->patch * (size_t)t->n_node);
     memcpy(t->of, from->of, sizeof t->of);
     t->n_patch = from->n_patch, t->scale = from->scale, t->damp_s = from->damp_s, t->first_J = from->first_J;
+    t->k_J = from->k_J;
     t->stale = true;
 }
 
@@ -330,28 +331,15 @@ static void join(pal_spring_tangle *t, const pal_spring_row *edges)
     }
 }
 
-/* what is new stays out where something presses or pulls it or a node beside it: a tool that turns tetrahedra over
- * goes on to feel springs. True: some stays in */
-static bool leave_pressed(pal_spring_tangle *t, const pal_spring_row *edges, const pal_body *body)
+/* nothing new while anything presses or pulls the body: patches are softer than springs, so that a load would draw them
+ * out, and a tool that turns tetrahedra over goes on to feel springs. True: what is new stays in */
+static bool leave_pressed(pal_spring_tangle *t, const pal_body *body)
 {
-    double *pressed = t->room;
-    bool any = false;
-    join(t, edges);
-    memset(pressed, 0, sizeof *pressed * (size_t)t->n_node);
-    for (int i = 0; i < edges->n_item; i++) {
-        const int32_t *node = corners(edges, i);
-        if (!loaded(body, node[0]) && !loaded(body, node[1])) continue;
-        for (int c = 0; c < 2; c++)
-            if (t->patch[node[c]] != NOT) pressed[find_root(t, node[c])] = 1;
-    }
-    for (int i = 0; i < t->n_node; i++) {
-        if (t->patch[i] != NEW) continue;
-        const bool out = pressed[find_root(t, i)] > 0;
-        /* roots stay what they are: only the marks change */
-        if (out) t->patch[i] = NOT;
-        any |= !out;
-    }
-    return any;
+    bool pressed = false;
+    for (int i = 0; i < t->n_node && !pressed; i++) pressed = loaded(body, i);
+    for (int i = 0; i < t->n_node && pressed; i++)
+        if (t->patch[i] == NEW) t->patch[i] = NOT;
+    return !pressed;
 }
 
 /* nodes of what is turned over join, and those beside patches that do not come loose; true: some do */
@@ -381,7 +369,7 @@ static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body, b
             t->patch[node[1 - c]] = NEW;
             any = true;
         }
-    return any && leave_pressed(t, edges, body);
+    return any && leave_pressed(t, body);
 }
 
 /* patches anew of all nodes that are in one, connected by edges */
@@ -443,11 +431,27 @@ static void begin(pal_spring_tangle *t, const rows *r, const pal_body *body, dou
         if (t->of[p].held) memcpy(t->of[p].turn, held, sizeof held);
     }
     t->scale = 1;
+    t->k_J = r->of[PAL_SPRING_DISTANCE]->spring.k_J;
     t->damp_s = damp_share * edge_time_s(t, r->of[PAL_SPRING_DISTANCE], body);
     weigh(t, r, body);
     const double all_J = patches(t), left_J = before_J - springs(r, body);
     if (all_J > left_J) t->scale = left_J > least_scale * all_J ? left_J / all_J : least_scale;
     for (int p = 0; p < t->n_patch; p++) t->of[p].patch_J *= t->scale;
+}
+
+/* supports may turn or be taken off, and constants may be others than when patches began */
+static void keep_up(pal_spring_tangle *t, const pal_spring_row *edges, const pal_body *body)
+{
+    double held[9];
+    const bool led = pal_held_turn(body, held);
+    for (int p = 0; p < t->n_patch; p++) {
+        t->of[p].held = t->of[p].held && led;
+        if (t->of[p].held) memcpy(t->of[p].turn, held, sizeof held);
+    }
+    if (edges->spring.k_J == t->k_J) return;
+    t->first_J *= edges->spring.k_J / t->k_J;
+    t->k_J = edges->spring.k_J;
+    t->damp_s = damp_share * edge_time_s(t, edges, body);
 }
 
 /* what is in patches has changed; before_J: of the springs and the patches that were */
@@ -477,6 +481,7 @@ bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
     bool changed = false;
     double before_J = 0;
     if (!first) {
+        keep_up(t, r.of[PAL_SPRING_DISTANCE], body);
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
         before_J = springs(&r, body) + patches(t);

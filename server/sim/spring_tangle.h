@@ -20,8 +20,9 @@
  * its tetrahedra are between 0.2 and 20 of their volume, the springs would store little (a strain of 0.2 or so in
  * mean), and the body's motion and springs then have no more energy than when patches first were; or after 120 steps
  * of a body that stands still, where that adds next to nothing. A patch that nothing presses and that does not come
- * loose takes in the nodes beside it every 30 steps. What a load presses or pulls, and what hangs on it, is not taken
- * out: a tool goes on to feel springs.
+ * loose takes in the nodes beside it every 30 steps. While anything presses or pulls
+ * the body nothing is taken out, since patches are softer than springs: a tool goes on to feel springs. A body with a
+ * row gravity or with another solver than verlet has no patches at all.
  *
  * Verlet looks where it takes the bounds of stiffness anew, which is where a node may have moved a fifth of an element,
  * and in every step while there are patches: one pass over volumes, 8 lanes at a time. Rows and their loops are the
@@ -50,10 +51,11 @@ typedef struct pal_spring_tangle {
     int n_node;
     int32_t *patch, *root; /* of each node, -1: it is in none; of nodes that hang together [n_node] */
     double *room;          /* for sums at nodes                                             [n_node] */
-    pal_spring_patch of[PAL_SPRING_PATCHES], old[PAL_SPRING_PATCHES];
+    pal_spring_patch of[PAL_SPRING_PATCHES];
     int n_patch;
     double scale, damp_s; /* s, tau                                                                        */
     double first_J;       /* of motion and springs when there first were patches: what may be again   */
+    double k_J;           /* of the edges then                                                        */
     bool stale;           /* rows may have others switched off than nodes say                         */
 } pal_spring_tangle;
 

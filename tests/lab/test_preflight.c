@@ -35,8 +35,8 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     /* both ends at one place: no length is told too */
     box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-9;
     scene->most_substep = 1000000;
-    if (!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note))
-        CHECK(p.body[0].edge.n > 0 && p.body[0].edge.value < 2e-9);
+    REQUIRE(!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note));
+    CHECK(p.body[0].edge.n > 0 && p.body[0].edge.value < 2e-9);
     /* slivers are counted and told, and set no sub-step */
     box.tets.x[3 * near] = box.tets.x[3 * box_node(n, 1, 1, 2)] + 1e-5;
     REQUIRE(!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note));

@@ -269,7 +269,7 @@ int main(void)
     RUN(who_looks_goes_on_looking_at_what_follows);
     RUN(a_pressed_body_is_estimated_while_it_runs);
     RUN_SERIAL(a_sleeping_body_is_looked_at_once);
-    RUN_SERIAL(nothing_is_known_of_a_frozen_body);
+    RUN(nothing_is_known_of_a_frozen_body);
     pal_prepared_free(&mesh);
     return check_report();
 }

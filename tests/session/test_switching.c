@@ -359,7 +359,7 @@ int main(void)
     RUN(a_switch_is_rehearsed_while_the_session_runs_on);
     RUN(a_row_that_is_off_stays_off_through_a_method_without_it);
     RUN(what_cannot_be_made_is_refused_with_a_sentence);
-    RUN_SERIAL(what_is_not_taken_changes_nothing);
+    RUN(what_is_not_taken_changes_nothing);
     pal_prepared_free(&mesh);
     return check_report();
 }

@@ -198,6 +198,37 @@ static void what_may_not_untangle_has_nothing_for_it(void)
 }
 
 /* the same body in another world: patches, energy and the way back are those of the first */
+/* patches would be drawn out by a weight: soft as it is the cube hangs where its springs hold it, and stays there */
+static void what_hangs_by_its_weight_is_left_to_its_springs(void)
+{
+    pal_prepared box;
+    pal_world *world = NULL;
+    REQUIRE(!box_make(3, 3, 8, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    scene->body[0].material.young_Pa = 300;
+    REQUIRE(!pal_item_put_number(&scene->body[0].effect[0], "acceleration_m_s2", -9.81, &note));
+    scene->body[0].support[0].low_m[2] = 0.075, scene->body[0].support[0].high_m[2] = 1;
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    pal_body *body = pal_world_body(world, 0);
+    CHECK(body->tangle == NULL);
+    double far[2] = {0, 0};
+    for (int i = 0; i < 400; i++) {
+        REQUIRE(!pal_world_step(world, 1.0 / 60));
+        if (i == 199 || i == 399)
+            for (int k = 0; k < body->n_dof; k++)
+                far[i > 199] = fmax(far[i > 199], pal_dist3(body->x + 3 * k, body->x_rest + 3 * k));
+    }
+    printf("  hangs %.3g, then %.3g m low\n", far[0], far[1]);
+    CHECK(far[0] > 0.02 && !body->frozen);
+    CHECK_NEAR(far[1] / far[0], 1, 0.05);
+    pal_world_destroy(world);
+    REQUIRE(!pal_item_put_bool(&scene->body[0].model, "untangle", true, &note));
+    CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
+    CHECK(strstr(note.text, "untangle: goes with solver verlet and without gravity only") != NULL);
+    free(scene);
+    box_free(&box);
+}
+
 static void a_world_that_follows_goes_on_untangling(void)
 {
     bench b;
@@ -262,6 +293,7 @@ int main(void)
     RUN(untangling_keeps_momentum_and_angular_momentum);
     RUN(springs_are_what_they_were_once_it_is_back);
     RUN(what_may_not_untangle_has_nothing_for_it);
+    RUN(what_hangs_by_its_weight_is_left_to_its_springs);
     RUN(a_world_that_follows_goes_on_untangling);
     RUN(what_is_pressed_is_left_alone_until_it_is_let_go);
     RUN(what_is_never_turned_over_moves_to_the_same_bits);

@@ -112,6 +112,12 @@ static void reset(void *self, const pal_body *body)
     if (body->tangle) pal_spring_tangle_reset(body->tangle);
 }
 
+/* what untangles does not sleep, however still it stands */
+static double settled_s(const void *self)
+{
+    return ((const edge_distance *)self)->row.n_off > 0 ? INFINITY : 0;
+}
+
 /* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is never more for l > l0
  * and is none for l < l0 */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -171,6 +177,7 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .make = make,
                                              .run = run,
                                              .energy = energy,
+                                             .settled_s = settled_s,
                                              .stiffness = stiffness,
                                              .damping = damping,
                                              .springs = springs,
