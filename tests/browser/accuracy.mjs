@@ -99,7 +99,7 @@ try {
     if (before.front[place] === before.estimate?.point) continue;
     const making = await slide(ada, place);
     check(`let go at ${what}, the panel says what is made`, making.busy && /^Making /.test(making.said), making.said);
-    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.point === s.front[place]);
+    const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.point === s.front[place] && s.tick >= before.tick);
     check(`${what} runs, and what the switch did is said`, /^Switched: energy [+−][\d.]+ %/.test(after.said) && after.estimate?.point === after.front[place], `${after.said} ${after.setting}`);
     const seen = await until(() => shown(ben), (s) => s.epoch === after.epoch && s.drawn && s.estimate?.point === after.front[place]);
     check("who looks on sees the same setting and shape", seen.epoch === after.epoch && seen.setting === after.setting, seen.setting);
