@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +29,9 @@ typedef struct bridge {
     char rt_refused[160];
 } bridge;
 
-static volatile sig_atomic_t main_signal;
-static pal_servo *main_servo; /* for the emergency stop */
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int main_signal;
+static pal_servo *_Atomic main_servo; /* for the emergency stop */
 
 static void main_on_signal(int number)
 {

@@ -5,9 +5,11 @@
 #include "server/base/log.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 
-static volatile sig_atomic_t main_signal;
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int main_signal;
 
 static void main_on_signal(int number)
 {

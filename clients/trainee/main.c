@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +22,8 @@ typedef struct crowd {
     char (*name)[PAL_WIRE_MEMBER_NAME];
 } crowd;
 
-static volatile sig_atomic_t main_signal;
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int main_signal;
 
 static void main_on_signal(int number)
 {

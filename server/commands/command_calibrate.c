@@ -9,6 +9,7 @@
 #include <limits.h>
 #include <math.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,7 +39,8 @@ typedef struct words {
 
 /* ---- Ctrl-C ---- */
 
-static volatile sig_atomic_t stop_asked;
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int stop_asked;
 
 static void on_stop(int number)
 {
