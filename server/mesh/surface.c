@@ -5,6 +5,7 @@
 #include "server/mesh/surface.h"
 
 #include "server/base/vec3.h"
+#include "server/num/roots.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -185,36 +186,15 @@ static pal_err sides_of(const pal_surface *surface, int32_t **row_out, side **si
     return PAL_ERR_OK;
 }
 
-/* root of a union-find forest, halving the path on the way */
-static int32_t root_of(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    return i;
-}
-
-/* joins two sets under the smaller root, so that the result does not depend on the order of joins */
-static void unite(int32_t *parent, int32_t a, int32_t b)
-{
-    a = root_of(parent, a);
-    b = root_of(parent, b);
-    if (a < b)
-        parent[b] = a;
-    else
-        parent[a] = b;
-}
-
 pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *n_component)
 {
     int32_t *row;
     side *sides;
     PAL_TRY(sides_of(surface, &row, &sides));
-    for (int32_t t = 0; t < surface->n_tri; t++) label[t] = t;
+    pal_roots_clear(label, surface->n_tri);
     for (int i = 0; i < surface->n_vertex; i++)
         for (int k = row[i] + 1; k < row[i + 1]; k++)
-            if (sides[k].high == sides[k - 1].high) unite(label, sides[k].corner / 3, sides[k - 1].corner / 3);
+            if (sides[k].high == sides[k - 1].high) pal_roots_join(label, sides[k].corner / 3, sides[k - 1].corner / 3);
     free(row);
     free(sides);
     /* a root comes before its members: one pass finds the roots, one numbers them (as -1 - number) and hands these on
@@ -235,8 +215,8 @@ static void unite_corners(const pal_surface *surface, int32_t *parent, int32_t o
         c = d;
         d = other;
     }
-    unite(parent, a, c);
-    unite(parent, b, d);
+    pal_roots_join(parent, a, c);
+    pal_roots_join(parent, b, d);
 }
 
 pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out)

@@ -6,6 +6,7 @@
 #include "server/mesh/tets.h"
 
 #include "server/base/vec3.h"
+#include "server/num/roots.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -273,12 +274,6 @@ pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face)
     return PAL_ERR_OK;
 }
 
-static int32_t find_root(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_component)
 {
     sides s;
@@ -288,17 +283,11 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
         sides_free(&s);
         return PAL_ERR_MEMORY;
     }
-    for (int t = 0; t < tets->n_tet; t++) parent[t] = t;
+    pal_roots_clear(parent, tets->n_tet);
     for (int i = 0; i < tets->n_node; i++)
         for (int64_t a = s.start[i]; a + 1 < s.start[i + 1]; a++) {
             if (same_sides(&s, a, a + 2) < 2) continue;
-            int32_t p = find_root(parent, (int32_t)(s.item[a].from >> 2));
-            int32_t q = find_root(parent, (int32_t)(s.item[a + 1].from >> 2));
-            /* the smaller index becomes the root, so roots come before their members */
-            if (p < q)
-                parent[q] = p;
-            else
-                parent[p] = q;
+            pal_roots_join(parent, (int32_t)(s.item[a].from >> 2), (int32_t)(s.item[a + 1].from >> 2));
         }
     sides_free(&s);
     int n = 0;
@@ -306,7 +295,7 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
     if (label) {
         int next = 0;
         for (int t = 0; t < tets->n_tet; t++) {
-            int32_t root = find_root(parent, t);
+            int32_t root = pal_root(parent, t);
             label[t] = root == t ? next++ : label[root];
         }
     }

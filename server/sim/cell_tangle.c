@@ -2,6 +2,7 @@
 #include "server/sim/cell_tangle.h"
 
 #include "server/base/vec3.h"
+#include "server/num/roots.h"
 #include "server/sim/best_turn.h"
 #include "server/sim/cell_kernel.h"
 #include "server/sim/elastic_law.h"
@@ -215,12 +216,6 @@ static void weigh(pal_cell_tangle *t, const struct pal_cells_elastic *c, const d
     }
 }
 
-static int find_root(pal_cell_tangle *t, int node)
-{
-    while (t->root[node] != node) node = t->root[node] = t->root[t->root[node]];
-    return node;
-}
-
 static double patches(const pal_cell_tangle *t)
 {
     double sum = 0;
@@ -302,15 +297,12 @@ static void take_whole_cells(pal_cell_tangle *t, const struct pal_cells_elastic 
 static void number(pal_cell_tangle *t, const pal_solid *solid)
 {
     int32_t node[8];
-    for (int i = 0; i < t->n_node; i++) t->root[i] = i;
+    pal_roots_clear(t->root, t->n_node);
     for (int cell = 0; cell < t->n_cell; cell++) {
         if (t->patch[cell] == NOT) continue;
-        for (int k = corners(t, solid, cell, node) - 1; k > 0; k--) {
-            int a = find_root(t, node[0]), b = find_root(t, node[k]);
-            t->root[a < b ? b : a] = a < b ? a : b;
-        }
+        for (int k = corners(t, solid, cell, node) - 1; k > 0; k--) pal_roots_join(t->root, node[0], node[k]);
     }
-    for (int i = 0; i < t->n_node; i++) t->root[i] = find_root(t, i);
+    for (int i = 0; i < t->n_node; i++) t->root[i] = pal_root(t->root, i);
     t->n_patch = t->n_away = 0;
     /* roots are the least nodes of their patches: -1 - number once they have one */
     for (int cell = 0; cell < t->n_cell; cell++) {

@@ -3,6 +3,7 @@
 
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
+#include "server/num/roots.h"
 #include "server/sim/solid_mass.h"
 
 #include <stdlib.h>
@@ -285,19 +286,12 @@ double pal_system_drag(const pal_system *system)
 
 /* ---- supports ---- */
 
-static int32_t root_of(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 static void join_parts(const pal_cliques *list, int n_list, int32_t *parent)
 {
     for (int l = 0; l < n_list; l++)
         for (int e = 0; e < list[l].n_item; e++) {
             const int32_t *node = list[l].node + (size_t)list[l].n_corner * (size_t)e;
-            int32_t root = root_of(parent, node[0]);
-            for (int c = 1; c < list[l].n_corner; c++) parent[root_of(parent, node[c])] = root;
+            for (int c = 1; c < list[l].n_corner; c++) pal_roots_join(parent, node[0], node[c]);
         }
 }
 
@@ -330,9 +324,9 @@ static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supp
     *out = (pal_supports){.loose_node = -1};
     for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
     for (int i = 0; i < n; i++)
-        if (body->held[i]) take_far(body, &s[root_of(parent, i)], i);
+        if (body->held[i]) take_far(body, &s[pal_root(parent, i)], i);
     for (int i = 0; i < n; i++)
-        if (body->held[i]) take_off(body, &s[root_of(parent, i)], i);
+        if (body->held[i]) take_off(body, &s[pal_root(parent, i)], i);
     for (int i = 0; i < n; i++) {
         if (parent[i] != i) continue;
         out->n_part++;
@@ -356,7 +350,7 @@ pal_err pal_system_supports(const pal_system *system, pal_supports *out)
         if (!a) join_parts(list, n_list, parent);
         for (int32_t j = 0; a && j < n; j++)
             for (int32_t k = a->start[j]; k < a->start[j + 1]; k++)
-                parent[root_of(parent, a->row[k])] = root_of(parent, j);
+                parent[pal_root(parent, a->row[k])] = pal_root(parent, j);
         count_parts(system->body, parent, s, out);
     }
     free(list), free(parent), free(s);
