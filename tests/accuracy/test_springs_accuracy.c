@@ -4,48 +4,27 @@
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
 
-static pal_note note;
 static bool without_area; /* tests run with and without the row face_area */
 
-/* world of one box held by a box of space, weightless unless gravity, small loads so that the answer is linear */
-typedef struct bench {
-    pal_prepared box;
-    pal_scene *scene;
-    pal_world *world;
-    pal_body *body;
-} bench;
-
-static bool bench_open(bench *b, const int n[3], double h_m, double young_Pa, double poisson, double rate_1_s, int axis)
+/* a box held by a box of space, weightless unless gravity, small loads so that the answer is linear */
+static bool bench_open(box_bench *b, const int n[3], double h_m, double young_Pa, double poisson, double rate_1_s,
+                       int axis)
 {
-    if (box_make(n[0], n[1], n[2], h_m, &b->box)) return false;
-    b->scene = box_scene(&b->box, true, true);
+    if (!box_bench_make(b, n, h_m, true, true)) return false;
     b->scene->gravity_m_s2 = 0.01;
     pal_body_def *def = &b->scene->body[0];
     def->material =
         (pal_material){.young_Pa = young_Pa, .poisson = poisson, .density_kg_m3 = 1000, .damping_1_s = rate_1_s};
     def->output.name[0] = 0;
     if (without_area) pal_item_put_number(&def->model, "k_area_J", 0, NULL);
-    def->n_effect = 1;
     def->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
     def->support[0].high_m[axis] = 1e-9;
     for (int c = 0; c < 3; c++) b->scene->up[c] = c == axis;
-    if (pal_world_create(b->scene, &note, &b->world)) {
-        printf("  %s\n", note.text);
-        return false;
-    }
-    b->body = pal_world_body(b->world, 0);
-    return true;
-}
-
-static void bench_close(bench *b)
-{
-    pal_world_destroy(b->world);
-    free(b->scene);
-    box_free(&b->box);
+    return box_bench_start(b);
 }
 
 /* mean displacement along z of the nodes of layer k */
-static double layer_z(const bench *b, const int n[3], int k)
+static double layer_z(const box_bench *b, const int n[3], int k)
 {
     double sum = 0;
     for (int j = 0; j <= n[1]; j++)
@@ -61,7 +40,7 @@ static void bar(int wide, double poisson, double *young_ratio, double *poisson_f
 {
     const int n[3] = {wide, wide, 6 * wide};
     const double young = 5000, length = 0.12, h = length / n[2];
-    bench b;
+    box_bench b;
     *young_ratio = *poisson_found = NAN;
     if (!bench_open(&b, n, h, young, poisson, 30, 2)) return;
     for (int i = 0; i < 150; i++)
@@ -75,7 +54,7 @@ static void bar(int wide, double poisson, double *young_ratio, double *poisson_f
     double along = (layer_z(&b, n, k + 1) - layer_z(&b, n, k - 1)) / (2 * h);
     *young_ratio = exact / found;
     *poisson_found = -across / along;
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void a_bar_under_its_weight_shows_its_young_modulus_at_any_resolution(void)
@@ -101,7 +80,7 @@ static void a_bar_shows_its_poisson_ratio(void)
 }
 
 /* RMS of the displacement error over the largest displacement of the reference, percent */
-static double beam_error(bench *b, const int n[3], FILE *csv, double load_part)
+static double beam_error(box_bench *b, const int n[3], FILE *csv, double load_part)
 {
     char line[256];
     double sum = 0, most = 0, h = b->body->h_m;
@@ -133,7 +112,7 @@ static void a_cantilever_bends_like_the_reference(void)
     FILE *csv = path ? fopen(path, "r") : NULL;
     const int n[3] = {16, 4, 4};
     const double part = 0.1, h = 0.0125;
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, n, h, 1e5, 0.45, 24, 0));
     /* 100 Pa downwards on the end, by the share of each node */
     for (int j = 0; j <= n[1]; j++)
@@ -155,7 +134,7 @@ static void a_cantilever_bends_like_the_reference(void)
         CHECK_LE(error, 10);
         fclose(csv);
     }
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 int main(void)

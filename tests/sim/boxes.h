@@ -1,10 +1,13 @@
 /* Boxes of voxels for tests: nx x ny x nz voxels of edge h, five tetrahedra each, as a pal_prepared whose shown surface
  * is the boundary of the tetrahedra. Nodes are numbered x fastest. box_make gives a box without skin (output
- * "surface_out"), box_free frees it. Also a scene with one body from a box. */
+ * "surface_out"), box_free frees it. Also a scene with one body from a box, and the world of one: box_bench_make, then
+ * what a test changes of the scene, box_bench_start, box_bench_close. */
 #ifndef TESTS_SIM_BOXES_H
 #define TESTS_SIM_BOXES_H
 #include "server/sim/def.h"
+#include "server/sim/world.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -125,5 +128,41 @@ static inline pal_scene *box_scene(const pal_prepared *box, bool held, bool grav
     if (gravity) pal_item_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
     pal_item_init(&def->effect[def->n_effect++], "effects[1]", "finite_guard");
     return scene;
+}
+
+typedef struct box_bench {
+    pal_prepared box;
+    pal_scene *scene;
+    pal_world *world;
+    pal_body *body;
+} box_bench;
+
+/* the box and its scene, without finite_guard */
+static inline bool box_bench_make(box_bench *b, const int n[3], double h_m, bool held, bool gravity)
+{
+    memset(b, 0, sizeof *b);
+    if (box_make(n[0], n[1], n[2], h_m, &b->box)) return false;
+    b->scene = box_scene(&b->box, held, gravity);
+    b->scene->body[0].n_effect = gravity;
+    return true;
+}
+
+/* false: says why */
+static inline bool box_bench_start(box_bench *b)
+{
+    pal_note note = {""};
+    if (pal_world_create(b->scene, &note, &b->world)) {
+        printf("  %s\n", note.text);
+        return false;
+    }
+    b->body = pal_world_body(b->world, 0);
+    return true;
+}
+
+static inline void box_bench_close(box_bench *b)
+{
+    pal_world_destroy(b->world);
+    free(b->scene);
+    box_free(&b->box);
 }
 #endif

@@ -10,24 +10,15 @@ static const double step_s = 1.0 / 120;
 static const int n[3] = {8, 3, 3};
 static pal_note note;
 
-typedef struct bent {
-    pal_prepared box;
-    pal_scene *scene;
-    pal_world *world;
-    pal_body *body;
-} bent;
-
 /* a bar held below in z, pulled sideways at an upper corner for a quarter of a second */
-static bool bent_make(bent *b, double force_N)
+static bool bent_make(box_bench *b, double force_N)
 {
-    memset(b, 0, sizeof *b);
-    if (box_make(n[0], n[1], n[2], 0.01, &b->box)) return false;
-    b->scene = box_scene(&b->box, true, false);
+    if (!box_bench_make(b, n, 0.01, true, false)) return false;
+    pal_item_init(&b->scene->body[0].effect[b->scene->body[0].n_effect++], "effects[0]", "finite_guard");
     b->scene->step_s = step_s;
     b->scene->body[0].material =
         (pal_material){.young_Pa = 5e3, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
-    if (pal_world_create(b->scene, &note, &b->world)) return false;
-    b->body = pal_world_body(b->world, 0);
+    if (!box_bench_start(b)) return false;
     if (pal_world_load(b->world, 0, box_node(n, n[0], n[1], n[2]), (const double[3]){force_N, 0, force_N}))
         return false;
     for (int i = 0; i < 30; i++)
@@ -35,35 +26,28 @@ static bool bent_make(bent *b, double force_N)
     return true;
 }
 
-static void bent_free(bent *b)
-{
-    pal_world_destroy(b->world);
-    free(b->scene);
-    box_free(&b->box);
-}
-
-static bool run(bent *b, int n_step)
+static bool run(box_bench *b, int n_step)
 {
     for (int i = 0; i < n_step; i++)
         if (pal_world_step(b->world, step_s) || b->body->frozen) return false;
     return true;
 }
 
-static pal_err stiffen(bent *b, double times)
+static pal_err stiffen(box_bench *b, double times)
 {
     pal_material to = b->scene->body[0].material;
     to.young_Pa *= times;
     return pal_world_material(b->world, 0, &to, &note);
 }
 
-static double off_S(const bent *b)
+static double off_S(const box_bench *b)
 {
     double sum = 0;
     for (int i = 0; i < 3 * b->body->n_dof; i++) sum += pow(b->body->x[i] - b->body->x_rest[i], 2);
     return sqrt(sum / b->body->n_dof) / b->body->size_m;
 }
 
-static int turned_over(const bent *b)
+static int turned_over(const box_bench *b)
 {
     int count = 0;
     for (int t = 0; t < b->body->tets->n_tet; t++) {
@@ -78,7 +62,7 @@ static int turned_over(const bent *b)
 
 static void the_work_of_a_thousandfold_change_is_taken_away(void)
 {
-    bent b;
+    box_bench b;
     REQUIRE(bent_make(&b, 0.15));
     const double bent_S = off_S(&b);
     REQUIRE(!stiffen(&b, 1000));
@@ -109,33 +93,33 @@ static void the_work_of_a_thousandfold_change_is_taken_away(void)
     CHECK_LE(most_S, 2 * bent_S);
     CHECK_LE(off_S(&b), 1e-3);
     CHECK_INT(turned_over(&b), 0);
-    bent_free(&b);
+    box_bench_close(&b);
 }
 
 /* at rest there is no work to take away, and where little is put in the motion is what it was */
 static void little_work_is_left_alone(void)
 {
-    bent b;
+    box_bench b;
     REQUIRE(bent_make(&b, 0));
     REQUIRE(!stiffen(&b, 1000));
     CHECK(b.body->brake_1_s == 0 && b.body->brake_s == 0);
-    bent_free(&b);
+    box_bench_close(&b);
     REQUIRE(bent_make(&b, 0.15));
     REQUIRE(!stiffen(&b, 9));
     CHECK(pal_world_energy_J(b.world) > 0.01);
     CHECK(b.body->brake_1_s == 0 && b.body->brake_s == 0);
-    bent_free(&b);
+    box_bench_close(&b);
 }
 
 static void a_reset_lets_go_of_the_brake(void)
 {
-    bent b;
+    box_bench b;
     REQUIRE(bent_make(&b, 0.15));
     REQUIRE(!stiffen(&b, 1000));
     CHECK(b.body->brake_1_s > 0);
     pal_world_reset(b.world);
     CHECK(b.body->brake_1_s == 0 && b.body->brake_s == 0);
-    bent_free(&b);
+    box_bench_close(&b);
 }
 
 /* w = sqrt(2 U / sum m u^2), c = 2 w for 8 / w, from numbers */

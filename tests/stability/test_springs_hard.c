@@ -16,38 +16,12 @@ static double uniform(void) /* in [0, 1) */
     return check_random01(&seed);
 }
 
-typedef struct bench {
-    pal_prepared box;
-    pal_scene *scene;
-    pal_world *world;
-    pal_body *body;
-} bench;
-
-static bool bench_make(bench *b, bool held)
+static bool bench_make(box_bench *b, bool held)
 {
     seed = 11;
-    if (box_make(4, 3, 3, 0.01, &b->box)) return false;
-    b->scene = box_scene(&b->box, held, false);
-    b->scene->body[0].n_effect = 0;
+    if (!box_bench_make(b, (const int[3]){4, 3, 3}, 0.01, held, false)) return false;
     if (without_area) pal_item_put_number(&b->scene->body[0].model, "k_area_J", 0, NULL);
     return true;
-}
-
-static bool bench_start(bench *b)
-{
-    if (pal_world_create(b->scene, &note, &b->world)) {
-        printf("  %s\n", note.text);
-        return false;
-    }
-    b->body = pal_world_body(b->world, 0);
-    return true;
-}
-
-static void bench_close(bench *b)
-{
-    pal_world_destroy(b->world);
-    free(b->scene);
-    box_free(&b->box);
 }
 
 static int count_inverted(const pal_body *body)
@@ -103,7 +77,7 @@ static double extent(const pal_body *body)
 }
 
 /* runs and checks after every step that state is finite and energy no more than at the start */
-static void run_bounded(bench *b, double seconds)
+static void run_bounded(box_bench *b, double seconds)
 {
     double start = pal_world_energy_J(b->world), most = 0;
     for (int i = 0; i < (int)(seconds * 60); i++) {
@@ -117,9 +91,9 @@ static void run_bounded(bench *b, double seconds)
 
 static void an_inverted_corner_turns_back(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     /* the top corner goes through its tetrahedron */
     double *x = b.body->x + 3 * box_node((const int[]){4, 3, 3}, 4, 3, 3);
     pal_add3(x, x, (const double[3]){-0.012, -0.012, -0.012});
@@ -129,10 +103,10 @@ static void an_inverted_corner_turns_back(void)
     CHECK_INT(count_inverted(b.body), 0);
     HARD_CASE("inverted", "tet_springs", "off rest after 2 s", 100 * rms_from_rest(b.body) / b.body->size_m, 0.1,
               "% S");
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
-static void insult(bench *b, int kind)
+static void insult(box_bench *b, int kind)
 {
     double *x = b->body->x;
     for (int i = 0; i < b->body->n_dof; i++, x += 3) {
@@ -166,9 +140,9 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_come_back(
                 printf("  left out under sanitizers: free, x 100, and that the held one is back after 5 s\n");
                 continue;
             }
-            bench b;
+            box_bench b;
             REQUIRE(bench_make(&b, held));
-            REQUIRE(bench_start(&b));
+            REQUIRE(box_bench_start(&b));
             insult(&b, kind);
             double before = extent(b.body);
             const bool goes_back = (held && kind <= 1) || CHECK_REPEATS(true, false);
@@ -187,18 +161,18 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_come_back(
             if (goes_back && !held)
                 HARD_CASE(names[kind], "tet_springs", "free: distances off those at rest after 5 s",
                           100 * rms_of_shape(b.body) / b.body->size_m, 0.1, "% S");
-            bench_close(&b);
+            box_bench_close(&b);
         }
 }
 
 static void blown_up_without_area_springs_the_guard_freezes_the_last_good_state(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
     pal_body_def *def = &b.scene->body[0];
     if (!without_area) pal_item_put_number(&def->model, "k_area_J", 0, NULL);
     pal_item_init(&def->effect[def->n_effect++], "effects[0]", "finite_guard");
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     insult(&b, 4);
     CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_FROZEN);
@@ -209,15 +183,15 @@ static void blown_up_without_area_springs_the_guard_freezes_the_last_good_state(
     pal_world_reset(b.world);
     CHECK(!b.body->frozen);
     CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_OK);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void a_meganewton_on_a_vertex_is_shortened_and_forgotten(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
     b.scene->body[0].material.damping_1_s = 10;
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     int node = box_node((const int[]){4, 3, 3}, 2, 1, 3);
     for (int axis = CHECK_REPEATS(0, 2); axis < 3; axis++) {
         pal_world_reset(b.world);
@@ -237,16 +211,16 @@ static void a_meganewton_on_a_vertex_is_shortened_and_forgotten(void)
         HARD_CASE("meganewton", "tet_springs", "off rest 5 s after", 100 * rms_from_rest(b.body) / b.body->size_m, 0.1,
                   "% S");
     }
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused(void)
 {
-    bench b, c;
+    box_bench b, c;
     REQUIRE(bench_make(&b, true));
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     REQUIRE(bench_make(&c, true));
-    REQUIRE(bench_start(&c));
+    REQUIRE(box_bench_start(&c));
     b.body->v[3 * 40] = c.body->v[3 * 40] = 0.2;
     REQUIRE(!pal_world_step(b.world, 10.0 / 60));
     for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(c.world, 1.0 / 60));
@@ -262,15 +236,15 @@ static void a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused(voi
     CHECK_INT(pal_world_step(b.world, NAN), PAL_ERR_REFUSED);
     CHECK_INT(pal_world_step(b.world, -1), PAL_ERR_REFUSED);
     CHECK(hash == pal_world_hash(b.world));
-    bench_close(&b);
-    bench_close(&c);
+    box_bench_close(&b);
+    box_bench_close(&c);
 }
 
 static void a_material_beyond_the_budget_is_refused_and_changes_nothing(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     pal_material soft = b.scene->body[0].material, hard = soft;
     double limit = pal_world_limit_s(b.world);
     hard.young_Pa = 1e12;
@@ -286,13 +260,13 @@ static void a_material_beyond_the_budget_is_refused_and_changes_nothing(void)
     pal_world *none = NULL;
     CHECK_INT(pal_world_create(b.scene, &note, &none), PAL_ERR_BUDGET);
     CHECK(!none);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 /* a box in its own units of length h, stress E and mass: the scaled answer after a number of scaled steps */
 static bool scaled(double h, double young, double x[3])
 {
-    bench b;
+    box_bench b;
     seed = 5;
     if (box_make(3, 2, 2, h, &b.box)) return false;
     b.scene = box_scene(&b.box, true, false);
@@ -301,7 +275,7 @@ static bool scaled(double h, double young, double x[3])
     b.scene->body[0].material =
         (pal_material){.young_Pa = young, .poisson = 0.45, .density_kg_m3 = young * 5e-6 / (h * h), .damping_1_s = 4};
     for (int i = 0; i < 3; i++) x[i] = NAN;
-    if (!bench_start(&b)) return false;
+    if (!box_bench_start(&b)) return false;
     for (int i = 0; i < 3 * b.body->n_dof; i++)
         if (!b.body->held[i / 3]) b.body->x[i] += 0.2 * h * (uniform() - 0.5);
     pal_world_moved(b.world, 0);
@@ -309,7 +283,7 @@ static bool scaled(double h, double young, double x[3])
     for (int i = 0; i < 20; i++) ok = ok && !pal_world_step(b.world, 1.0 / 60);
     int node = 3 * (b.body->n_dof - 1);
     for (int i = 0; i < 3; i++) x[i] = (b.body->x[node + i] - b.body->x_rest[node + i]) / h;
-    bench_close(&b);
+    box_bench_close(&b);
     return ok;
 }
 
@@ -330,10 +304,10 @@ static void any_scale_of_length_and_stiffness_gives_the_same_scaled_answer(void)
 
 static void huge_drag_creeps_and_no_drag_keeps_moving(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
     b.scene->body[0].material.damping_1_s = 1e8;
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     for (int i = 0; i < b.body->n_dof; i++) b.body->x[3 * i + 2] *= 0.9;
     pal_world_moved(b.world, 0);
     double before = pal_world_energy_J(b.world);
@@ -343,22 +317,22 @@ static void huge_drag_creeps_and_no_drag_keeps_moving(void)
         HARD_CASE("drag", "tet_springs", "energy over that of the step before", now / before, 1, "");
         before = now;
     }
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void constraint_damping_far_beyond_critical_stays_stable(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
     pal_item_put_number(&b.scene->body[0].model, "c_distance_Js", 1e-5, NULL);
     pal_item_put_number(&b.scene->body[0].model, "c_area_Js", 1e-5, NULL);
     pal_item_put_number(&b.scene->body[0].model, "c_volume_Js", 1e-5, NULL);
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     for (int i = 0; i < 3 * b.body->n_dof; i++)
         if (!b.body->held[i / 3]) b.body->x[i] += 0.005 * (uniform() - 0.5);
     pal_world_moved(b.world, 0);
     run_bounded(&b, CHECK_REPEATS(2, 1));
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void held_and_single_element_bodies_step(void)
@@ -391,12 +365,12 @@ static void held_and_single_element_bodies_step(void)
 
 static void a_body_that_is_no_number_freezes_and_the_other_goes_on(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_make(&b, true));
     b.scene->n_body = 2;
     b.scene->body[1] = b.scene->body[0];
     snprintf(b.scene->body[1].name, PAL_NAME, "other");
-    REQUIRE(bench_start(&b));
+    REQUIRE(box_bench_start(&b));
     pal_body *other = pal_world_body(b.world, 1);
     b.body->x[3 * 40] = NAN;
     pal_world_moved(b.world, 0);
@@ -418,7 +392,7 @@ static void a_body_that_is_no_number_freezes_and_the_other_goes_on(void)
     CHECK_INT(err, PAL_ERR_FROZEN);
     CHECK(b.body->frozen);
     for (int i = 0; i < 3 * b.body->n_shown; i++) REQUIRE(isfinite(b.body->shown[i]));
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 int main(void)
