@@ -102,6 +102,12 @@ typedef struct pal_stress_point {
 } pal_stress_point;
 typedef void pal_stress_take(void *user, const pal_stress_point *point);
 
+/* what a row says that was asked for what is turned over */
+enum {
+    PAL_TANGLED = 1, /* something runs on what untangles it: to be asked in the coming step, however little moved */
+    PAL_TANGLE_CHANGED = 2 /* forces and stiffness are others than before */
+};
+
 typedef struct pal_effect {
     const char *name; /* as written in scene files */
     pal_stage stage;
@@ -131,9 +137,9 @@ typedef struct pal_effect {
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
     /* FORCE: the row's springs, which others switch off where they are turned over (spring_tangle.h) */
     struct pal_spring_row *(*springs)(void *self);
-    /* FORCE: looks for elements that are turned over and chooses what they run on from now on; true: forces and
-     * stiffness are others than before. Solvers ask between sub-steps, never within one */
-    bool (*untangle)(void *self, const pal_body *body);
+    /* FORCE: looks for elements that are turned over and chooses what they run on from now on; PAL_TANGLED,
+     * PAL_TANGLE_CHANGED or both, 0: nothing is turned over. Solvers ask between sub-steps, never within one */
+    unsigned (*untangle)(void *self, pal_step *step);
     /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h):
      * `place` has the nodes of `from` as weighted sums of this body's; NULL: they are the same nodes. Both bodies stand
      * still */

@@ -508,7 +508,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     }
     pal_system_place(&core->system);
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->untangle) (void)step->force[i].effect->untangle(step->force[i].self, body);
+        if (step->force[i].effect->untangle) (void)step->force[i].effect->untangle(step->force[i].self, step);
     memcpy(core->x0, body->x, bytes3(core));
     memcpy(core->v0, body->v, bytes3(core));
     core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;

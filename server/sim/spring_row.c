@@ -2,6 +2,7 @@
 #include "server/sim/spring_row.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/spring_tangle.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -98,11 +99,13 @@ static pal_err fill(pal_spring_row *row, const pal_build *build, double *weight)
     return take_regions(row, build, weight);
 }
 
-static pal_err keep_all(pal_spring_row *row, pal_arena *arena)
+static pal_err keep_all(pal_spring_row *row, pal_spring_tangle *tangle, pal_arena *arena)
 {
     row->all = PAL_NEW(arena, double, row->strips.n_lane);
     row->off = PAL_NEW(arena, int32_t, row->n_item);
     if (!row->all || !row->off) return PAL_ERR_MEMORY;
+    /* a row that is switched on again knows nothing of what is off */
+    tangle->stale = true;
     memcpy(row->all, row->q, sizeof *row->q * (size_t)row->strips.n_lane);
     return PAL_ERR_OK;
 }
@@ -137,7 +140,7 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
     memcpy(out->item, item, n * sizeof *item);
     pal_err err = fill(out, build, weight);
     free(weight);
-    return err || !body->tangle ? err : keep_all(out, build->arena);
+    return err || !body->tangle ? err : keep_all(out, body->tangle, build->arena);
 }
 
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note)

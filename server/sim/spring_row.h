@@ -38,6 +38,8 @@ pal_err pal_spring_row_check(const pal_item *entry, const pal_build *build);
  * least; its corners reordered), with w = 1 / measure */
 pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *build, int32_t *item, int n_item,
                             double least, pal_spring_row *out);
+/* least and most of the volumes of a row of these over those at rest, and 1, whatever springs are off; d [n_node][3] */
+void pal_spring_extremes(const pal_spring_row *row, pal_slots *slots, const double *d, double out[2]);
 /* do these FORCE rows have springs whose constants the scene gives, which no edit of the material changes? */
 bool pal_springs_given(const pal_row *row, int n_row);
 /* a live edit: k_J, and with regions q too */

@@ -3,6 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/num/polar.h"
+#include "server/num/roots.h"
 #include "server/sim/best_turn.h"
 
 #include <math.h>
@@ -20,7 +21,9 @@ static const double calm_share = 0.02;
 static const double damp_share = 0.25;
 /* of what is stored, that letting go a body that stands still may add */
 static const double little_share = 2e-3;
-enum { LOOSE_STEPS = 120, GROW_STEPS = 30 };
+/* a patch that stands still is let go after, one that does not come loose grows every; of what is short of that by
+ * rounding */
+static const double loose_after_s = 2, grow_every_s = 0.5, nearly = 1 - 1e-9;
 
 /* a body's rows of springs; NULL: it has no such row */
 typedef struct rows {
@@ -53,7 +56,7 @@ void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *fro
     memcpy(t->patch, from->patch, sizeof *t->patch * (size_t)t->n_node);
     memcpy(t->of, from->of, sizeof t->of);
     t->n_patch = from->n_patch, t->scale = from->scale, t->damp_s = from->damp_s, t->first_J = from->first_J;
-    t->k_J = from->k_J;
+    t->k_J = from->k_J, t->seen_s = from->seen_s;
     t->stale = true;
 }
 
@@ -192,36 +195,6 @@ double pal_spring_tangle_energy(pal_spring_tangle *t, const pal_spring_row *row,
 
 /* ---- looking ---- */
 
-/* least and most of the volumes over those at rest, whatever rows are on */
-static void extremes(const pal_spring_row *row, pal_slots *slots, const double *d, double out[2])
-{
-    const pal_v8 one = 1 - (pal_v8){0};
-    const int n_strip = row->strips.n_strip, n_slot = slots->n_slot;
-    pal_v8 least = one, most = one;
-    const double *p[PAL_CORNERS][3];
-    pal_slots_load(slots, d);
-    for (int b = 0; b < n_strip + row->strips.n_loose; b++) {
-        double x[PAL_CORNERS][3][PAL_LANES];
-        const bool loose = b >= n_strip;
-        if (loose) pal_loose_load(slots, row->strips.node + 4 * PAL_LANES * (b - n_strip), 4, x);
-        for (int c = 0; c < 4; c++)
-            for (int k = 0; k < 3; k++) p[c][k] = loose ? x[c][k] : slots->x + k * n_slot + row->strips.base[4 * b + c];
-        pal_v8 e[3][3], w = pal_load8(row->w + PAL_LANES * b);
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++) e[c][k] = pal_load8(p[c + 1][k]) - pal_load8(p[0][k]);
-        pal_v8 v =
-            w * (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
-                 e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
-        v = pal_pick8(w * w > 0, v, one);
-        least = pal_pick8(v < least, v, least), most = pal_pick8(v > most, v, most);
-    }
-    for (int l = 1; l < PAL_LANES; l++) {
-        least[0] = least[l] < least[0] ? least[l] : least[0];
-        most[0] = most[l] > most[0] ? most[l] : most[0];
-    }
-    out[0] = least[0], out[1] = most[0];
-}
-
 static double volume_ratio(const pal_spring_row *row, int i, const double *d)
 {
     const double *x[PAL_CORNERS];
@@ -292,16 +265,16 @@ static double springs(const rows *r, const pal_body *body)
 }
 
 /* which patches become springs again; true: some do */
-static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, bool still, bool step_begins)
+static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, bool still, double passed_s)
 {
     bool any = false;
     for (int p = 0; p < t->n_patch; p++) {
         pal_spring_patch *patch = &t->of[p];
         const double rise = patch->spring_J - patch->patch_J;
-        patch->age += step_begins;
-        patch->loose = patch->bad || !still ? 0 : patch->loose + step_begins;
+        patch->grow_s += passed_s;
+        patch->loose_s = patch->bad || !still ? 0 : patch->loose_s + passed_s;
         const bool fits = rise <= spare_J && patch->spring_J <= calm_share * patch->size_J;
-        if (patch->bad || (!fits && (patch->loose < LOOSE_STEPS || rise > little_J))) continue;
+        if (patch->bad || (!fits && (patch->loose_s < nearly * loose_after_s || rise > little_J))) continue;
         spare_J -= rise;
         patch->n = 0;
         any = true;
@@ -313,21 +286,13 @@ static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, bool s
 
 enum { NOT = -1, NEW = -2 };
 
-static int find_root(pal_spring_tangle *t, int node)
-{
-    while (t->root[node] != node) node = t->root[node] = t->root[t->root[node]];
-    return node;
-}
-
 /* roots of all nodes that are in patches, as edges join them: the least node of each */
 static void join(pal_spring_tangle *t, const pal_spring_row *edges)
 {
-    for (int i = 0; i < t->n_node; i++) t->root[i] = i;
+    pal_roots_clear(t->root, t->n_node);
     for (int i = 0; i < edges->n_item; i++) {
         const int32_t *node = corners(edges, i);
-        if (t->patch[node[0]] == NOT || t->patch[node[1]] == NOT) continue;
-        int a = find_root(t, node[0]), b = find_root(t, node[1]);
-        t->root[a < b ? b : a] = a < b ? a : b;
+        if (t->patch[node[0]] != NOT && t->patch[node[1]] != NOT) pal_roots_join(t->root, node[0], node[1]);
     }
 }
 
@@ -343,7 +308,7 @@ static bool leave_pressed(pal_spring_tangle *t, const pal_body *body)
 }
 
 /* nodes of what is turned over join, and those beside patches that do not come loose; true: some do */
-static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body, bool step_begins)
+static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body)
 {
     const pal_spring_row *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
     bool any = false, grows = false;
@@ -358,8 +323,9 @@ static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body, b
     }
     for (int p = 0; p < t->n_patch; p++) {
         pal_spring_patch *patch = &t->of[p];
-        const bool on = patch->n > 0 && patch->bad && !patch->pressed;
-        patch->bad = on && step_begins && patch->age >= GROW_STEPS && patch->age % GROW_STEPS == 0;
+        const bool due = patch->grow_s >= nearly * grow_every_s;
+        if (due) patch->grow_s = fmax(0, fmin(patch->grow_s - grow_every_s, grow_every_s));
+        patch->bad = due && patch->n > 0 && patch->bad && !patch->pressed;
         grows |= patch->bad;
     }
     for (int i = 0; i < edges->n_item && grows; i++)
@@ -372,22 +338,29 @@ static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body, b
     return any && leave_pressed(t, body);
 }
 
-/* patches anew of all nodes that are in one, connected by edges */
+/* patches anew of all nodes that are in one, connected by edges. What has changed elsewhere does not set back the times
+ * of those that stay as they are */
 static void number(pal_spring_tangle *t, const pal_spring_row *edges)
 {
+    double grow_s[PAL_SPRING_PATCHES], loose_s[PAL_SPRING_PATCHES];
+    for (int p = 0; p < t->n_patch; p++) grow_s[p] = t->of[p].grow_s, loose_s[p] = t->of[p].loose_s;
     join(t, edges);
     t->n_patch = 0;
     for (int i = 0; i < t->n_node; i++) {
-        if (t->patch[i] == NOT) continue;
-        const int root = find_root(t, i);
-        if (root == i) {
-            if (t->n_patch < PAL_SPRING_PATCHES)
-                t->of[t->n_patch++] = (pal_spring_patch){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-            t->patch[i] = t->n_patch - 1;
-        } else {
+        const int was = t->patch[i];
+        if (was == NOT) continue;
+        const int root = pal_root(t->root, i);
+        if (root != i)
             t->patch[i] = t->patch[root];
+        else {
+            if (t->n_patch < PAL_SPRING_PATCHES)
+                t->of[t->n_patch++] = (pal_spring_patch){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .loose_s = INFINITY};
+            t->patch[i] = t->n_patch - 1;
         }
-        t->of[t->patch[i]].n++;
+        pal_spring_patch *patch = &t->of[t->patch[i]];
+        patch->n++;
+        patch->grow_s = fmax(patch->grow_s, was >= 0 ? grow_s[was] : 0);
+        patch->loose_s = fmin(patch->loose_s, was >= 0 ? loose_s[was] : 0);
     }
 }
 
@@ -462,7 +435,13 @@ static void change(pal_spring_tangle *t, rows *r, const pal_body *body, double b
     if (t->n_patch > 0) begin(t, r, body, before_J);
 }
 
-bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
+/* what solvers are told; stale: rows were, too */
+static unsigned seen(const pal_spring_tangle *t, bool changed)
+{
+    return (t->n_patch > 0 ? PAL_TANGLED : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
+}
+
+unsigned pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
 {
     pal_body *body = step->body;
     rows r = find_rows(step);
@@ -471,13 +450,13 @@ bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
     if (stale) switch_rows(t, &r);
     t->stale = false;
     /* asked for the limit at rest, and of a state that is no number, it says nothing */
-    if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return stale;
+    if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return seen(t, stale);
     double ratio[2] = {1, 1};
-    if (t->n_patch == 0) extremes(r.of[PAL_SPRING_VOLUME], body->slots, body->d, ratio);
-    if (t->n_patch == 0 && !(ratio[0] < least_in || ratio[1] > most_in)) return stale;
-    if (!pal_body_finite(body)) return stale;
+    if (t->n_patch == 0) pal_spring_extremes(r.of[PAL_SPRING_VOLUME], body->slots, body->d, ratio);
+    if (t->n_patch == 0 && !(ratio[0] < least_in || ratio[1] > most_in)) return seen(t, stale);
+    if (!pal_body_finite(body)) return seen(t, stale);
     const uint64_t began = pal_clock_ns();
-    const bool first = t->n_patch == 0, step_begins = step->sub == 0;
+    const bool first = t->n_patch == 0;
     bool changed = false;
     double before_J = 0;
     if (!first) {
@@ -486,14 +465,23 @@ bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
         const double kinetic_J = pal_body_kinetic_J(body);
         before_J = springs(&r, body) + patches(t);
         changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J,
-                         kinetic_J < still_share * patches(t), step_begins);
+                         kinetic_J < still_share * patches(t), fmax(0, step->time_s - t->seen_s));
     }
-    changed |= take_in(t, &r, body, step_begins);
+    t->seen_s = step->time_s;
+    changed |= take_in(t, &r, body);
     if (first && changed) before_J = springs(&r, body);
     if (changed) change(t, &r, body, before_J);
     if (first && changed) t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + patches(t);
     body->rescue.n_split += changed;
     body->rescue.n_tangled += changed || t->n_patch > 0;
     body->rescue.ns += pal_clock_ns() - began;
-    return changed || stale;
+    return seen(t, changed || stale);
+}
+
+unsigned pal_spring_tangle_ask(void *self, pal_step *step)
+{
+    for (int i = 0; i < step->n_force && step->body->tangle; i++)
+        if (step->force[i].effect->springs)
+            return step->force[i].self == self ? pal_spring_tangle_look(step->body->tangle, step) : 0;
+    return 0;
 }

@@ -18,16 +18,16 @@
  *
  * s <= 1 is such that patches begin with no more energy than the springs had. A patch becomes springs again when all
  * its tetrahedra are between 0.2 and 20 of their volume, the springs would store little (a strain of 0.2 or so in
- * mean), and the body's motion and springs then have no more energy than when patches first were; or after 120 steps
- * of a body that stands still, where that adds next to nothing. A patch that nothing presses and that does not come
- * loose takes in the nodes beside it every 30 steps. While anything presses or pulls
- * the body nothing is taken out, since patches are softer than springs: a tool goes on to feel springs. A body with a
- * row gravity or with another solver than verlet has no patches at all.
+ * mean), and the body's motion and springs then have no more energy than when patches first were; or after 2 s of a
+ * body that stands still, where that adds next to nothing. A patch that nothing presses and that does not come loose
+ * takes in the nodes beside it every half second. What another patch does leaves its times as they are. While anything
+ * presses or pulls the body nothing is taken out, since patches are softer than springs: a tool goes on to feel
+ * springs. A body with a row gravity or with another solver than verlet and rk4 has no patches at all.
  *
- * Verlet looks where it takes the bounds of stiffness anew, which is where a node may have moved a fifth of an element,
- * and in every step while there are patches: one pass over volumes, 8 lanes at a time. Rows and their loops are the
- * same as without, constants of what is off are 0. Springs without a row of volumes are not looked at: turned over is
- * as good a rest to them as any. Memory: the body's arena. Thread: make [load], else [sim]. */
+ * These look where they take the bounds of stiffness anew, which is where a node may have moved a fifth of an element,
+ * and in every step while there are patches (effect.h, untangle): one pass over volumes, 8 lanes at a time. Rows and
+ * their loops are the same as without, constants of what is off are 0. Springs without a row of volumes are not looked
+ * at: turned over is as good a rest to them as any. Memory: the body's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_SPRING_TANGLE_H
 #define PAL_SIM_SPRING_TANGLE_H
 #include "server/sim/effect.h"
@@ -43,8 +43,8 @@ typedef struct pal_spring_patch {
     double sum[9]; /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best                               */
     double patch_J, spring_J, size_J; /* at the last look: its energy, that of its springs, sum of k q   */
     int n;                            /* nodes                                                           */
-    int age, loose;                   /* steps since it grew; in a row in which nothing was bad or moved */
-    bool bad, pressed; /* a tetrahedron is too much turned over to leave; a load acts on a node          */
+    double grow_s, loose_s; /* since it could grow; for which nothing in it was bad and the body stood still */
+    bool bad, pressed;      /* a tetrahedron is too much turned over to leave; a load acts on a node          */
 } pal_spring_patch;
 
 typedef struct pal_spring_tangle {
@@ -56,6 +56,7 @@ typedef struct pal_spring_tangle {
     double scale, damp_s; /* s, tau                                                                        */
     double first_J;       /* of motion and springs when there first were patches: what may be again   */
     double k_J;           /* of the edges then                                                        */
+    double seen_s;        /* world time of the last look                                              */
     bool stale;           /* rows may have others switched off than nodes say                         */
 } pal_spring_tangle;
 
@@ -65,9 +66,11 @@ pal_err pal_spring_tangle_make(int n_node, pal_arena *arena, pal_spring_tangle *
 void pal_spring_tangle_reset(pal_spring_tangle *t);
 /* goes on where that of the same body in another world is: as many nodes, and the same ones */
 void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *from);
-/* looks at the tetrahedra and chooses what springs are off from now on: true: others than before. Counted in
- * body->rescue. No heap */
-bool pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step);
+/* looks at the tetrahedra and chooses what springs are off from now on, step->time_s being the time at which the body
+ * is as it is. Counted in body->rescue. Returns what the hook `untangle` does. No heap */
+unsigned pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step);
+/* the hook `untangle` of the three rows of springs (self: a pal_spring_row): the first of the body's looks for all */
+unsigned pal_spring_tangle_ask(void *self, pal_step *step);
 /* forces of the patches to body->f; row: the body's edges. Timed in body->rescue */
 void pal_spring_tangle_force(pal_spring_tangle *t, const pal_spring_row *row, pal_body *body);
 /* energy of the patches, J */

@@ -4,7 +4,7 @@
 /* as force and energy of a row, after a look */
 static bool look(cell_body *b)
 {
-    return cell_effect->untangle(b->row, &b->body);
+    return cell_effect->untangle(b->row, &(pal_step){.body = &b->body}) & PAL_TANGLE_CHANGED;
 }
 
 static double edge_m(const cell_body *b)

@@ -139,7 +139,7 @@ static void patches_take_whole_control_cells(void)
     for (int m = 0; m < b.body.n_node; m++)
         if (b.body.d[3 * m] + b.body.d[3 * m + 1] > b.body.d[3 * far] + b.body.d[3 * far + 1]) far = m;
     b.body.d[3 * far] -= 2;
-    CHECK(cell_effect->untangle(b.row, &b.body));
+    CHECK(cell_effect->untangle(b.row, &(pal_step){.body = &b.body}) & PAL_TANGLE_CHANGED);
     int of[2] = {0, 0}, all[2] = {0, 0};
     for (int e = 0; e < b.row->tangle.n_cell; e++) {
         int kind = e >= b.row->tangle.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;

@@ -7,39 +7,26 @@
 #include "tests/check.h"
 #include "tests/sim/boxes.h"
 
-typedef struct bench {
-    pal_prepared box;
-    pal_scene *scene;
-    pal_world *world;
-    pal_body *body;
-} bench;
-
 static uint64_t seed;
 static pal_note note;
 
-static bool bench_open(bench *b, bool held, bool untangle, double drag_1_s)
+static bool open_box(box_bench *b, const int n[3], bool held, bool untangle, double drag_1_s)
 {
     seed = 3;
-    if (box_make(4, 3, 3, 0.01, &b->box)) return false;
-    b->scene = box_scene(&b->box, held, false);
-    b->scene->body[0].n_effect = 0;
+    if (!box_bench_make(b, n, 0.01, held, false)) return false;
     b->scene->body[0].material.damping_1_s = drag_1_s;
     pal_item_put_number(&b->scene->body[0].model, "k_area_J", 0, NULL);
     if (!untangle) pal_item_put_bool(&b->scene->body[0].model, "untangle", false, NULL);
-    if (pal_world_create(b->scene, &note, &b->world)) return false;
-    b->body = pal_world_body(b->world, 0);
-    return true;
+    return box_bench_start(b);
 }
 
-static void bench_close(bench *b)
+static bool bench_open(box_bench *b, bool held, bool untangle, double drag_1_s)
 {
-    pal_world_destroy(b->world);
-    free(b->scene);
-    box_free(&b->box);
+    return open_box(b, (const int[3]){4, 3, 3}, held, untangle, drag_1_s);
 }
 
 /* part of the body, x > from, mirrored and stirred */
-static void fold(bench *b, double from_m)
+static void fold(box_bench *b, double from_m)
 {
     for (int i = 0; i < b->body->n_dof; i++) {
         double *x = b->body->x + 3 * i;
@@ -50,7 +37,7 @@ static void fold(bench *b, double from_m)
     pal_world_moved(b->world, 0);
 }
 
-static const pal_spring_row *edges_of(const bench *b)
+static const pal_spring_row *edges_of(const box_bench *b)
 {
     for (int i = 0; i < pal_world_rows(b->world); i++) {
         const pal_row *row = pal_world_effect(b->world, i);
@@ -61,7 +48,7 @@ static const pal_spring_row *edges_of(const bench *b)
 }
 
 /* forces of patches at the nodes as they are */
-static void forces(bench *b)
+static void forces(box_bench *b)
 {
     memset(b->body->f, 0, 3 * sizeof(double) * (size_t)b->body->n_node);
     pal_spring_tangle_force(b->body->tangle, edges_of(b), b->body);
@@ -69,7 +56,7 @@ static void forces(bench *b)
 
 static void patches_push_by_the_gradient_of_their_energy(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
     fold(&b, 0.02);
     pal_spring_tangle *t = b.body->tangle;
@@ -90,13 +77,13 @@ static void patches_push_by_the_gradient_of_their_energy(void)
     }
     printf("  off by %.2g of the largest force, scale %.3g\n", worst / most, t->scale);
     CHECK_LE(worst, 1e-6 * most);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 /* with damping, whatever the velocities: the sums of forces and moments, and the power that damping takes */
 static void patches_have_no_net_force_or_torque_and_only_take_energy(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
     fold(&b, 0.02);
     REQUIRE(b.body->tangle->n_patch > 0 && b.body->tangle->damp_s > 0);
@@ -119,7 +106,7 @@ static void patches_have_no_net_force_or_torque_and_only_take_energy(void)
     CHECK_LE(pal_norm3(force), 1e-13 * size);
     CHECK_LE(pal_norm3(moment), 1e-13 * arm);
     CHECK(power < 0);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 static void spin(const pal_body *body, double out[3])
@@ -135,7 +122,7 @@ static void spin(const pal_body *body, double out[3])
 /* free, without drag, turning: from folded until it is springs again */
 static void untangling_keeps_momentum_and_angular_momentum(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
     fold(&b, 0.02);
     for (int i = 0; i < b.body->n_dof; i++)
@@ -155,13 +142,13 @@ static void untangling_keeps_momentum_and_angular_momentum(void)
     CHECK_LE(pal_dist3(p[1], p[0]), 1e-12 * pal_norm3(p[0]));
     CHECK_LE(pal_dist3(l[1], l[0]), 1e-10 * pal_norm3(l[0]));
     CHECK_LE(energy[1], 1.01 * energy[0]);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 /* every constant is what it was, to the bit, also where the material was edited meanwhile */
 static void springs_are_what_they_were_once_it_is_back(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, true, true, 8));
     const pal_spring_row *edges = edges_of(&b);
     const size_t n_byte = sizeof(double) * (size_t)edges->strips.n_lane;
@@ -182,22 +169,21 @@ static void springs_are_what_they_were_once_it_is_back(void)
     CHECK(edges->n_off > 0);
     REQUIRE(!pal_world_reset_body(b.world, 0));
     CHECK(edges->n_off == 0 && !memcmp(edges->q, edges->all, n_byte) && b.body->rescue.n_tangled == 0);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 /* what is not asked for is not there */
 static void what_may_not_untangle_has_nothing_for_it(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, true, false, 8));
     fold(&b, 0.015);
     CHECK(!b.body->tangle && !edges_of(&b)->all && !edges_of(&b)->off && edges_of(&b)->n_off == 0);
     for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     CHECK(b.body->rescue.n_tangled == 0 && b.body->rescue.n_split == 0);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
-/* the same body in another world: patches, energy and the way back are those of the first */
 /* patches would be drawn out by a weight: soft as it is the cube hangs where its springs hold it, and stays there */
 static void what_hangs_by_its_weight_is_left_to_its_springs(void)
 {
@@ -224,33 +210,152 @@ static void what_hangs_by_its_weight_is_left_to_its_springs(void)
     pal_world_destroy(world);
     REQUIRE(!pal_item_put_bool(&scene->body[0].model, "untangle", true, &note));
     CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "untangle: goes with solver verlet and without gravity only") != NULL);
+    CHECK(strstr(note.text, "untangle: goes with solver verlet or rk4 and without gravity only") != NULL);
     free(scene);
     box_free(&box);
 }
 
+/* a support that is put through its element: what hangs on it stays turned over, and its patch takes in a ring of nodes
+ * every half second, whatever the length of a step */
+static bool open_bent(box_bench *b)
+{
+    if (!open_box(b, (const int[3]){8, 2, 2}, true, true, 8)) return false;
+    double *x = b->body->x + 3 * box_node((const int[3]){8, 2, 2}, 0, 0, 0);
+    for (int c = 0; c < 3; c++) x[c] += 0.012;
+    pal_world_moved(b->world, 0);
+    return true;
+}
+
+/* the same body in another world: patches, energy and the way back are those of the first, to the bit */
 static void a_world_that_follows_goes_on_untangling(void)
 {
-    bench b;
-    REQUIRE(bench_open(&b, true, true, 8));
+    for (int stays = 0; stays < 2; stays++) {
+        box_bench b;
+        REQUIRE(stays ? open_bent(&b) : bench_open(&b, true, true, 8));
+        if (!stays) fold(&b, 0.015);
+        for (int i = 0; i < (stays ? 20 : 1); i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        REQUIRE(b.body->tangle->n_patch > 0);
+        pal_world *next;
+        REQUIRE(!pal_world_create(b.scene, &note, &next));
+        pal_world_follow(next, b.world, -1, NULL, NULL);
+        const pal_body *body = pal_world_body(next, 0);
+        CHECK_INT(body->tangle->n_patch, b.body->tangle->n_patch);
+        CHECK_NEAR(pal_world_energy_J(next) / pal_world_energy_J(b.world), 1, 1e-12);
+        CHECK_NEAR(body->tangle->first_J, b.body->tangle->first_J, 0);
+        int n_tangled = 0, n_same = 0;
+        for (int i = 0; i < 60; i++) {
+            REQUIRE(!pal_world_step(b.world, 1.0 / 60) && !pal_world_step(next, 1.0 / 60));
+            n_tangled += b.body->tangle->n_patch > 0;
+            n_same += pal_world_hash(next) == pal_world_hash(b.world);
+        }
+        printf("  %d steps with patches after it, the same bits after %d of 60, %d nodes of %d\n", n_tangled, n_same,
+               stays ? body->tangle->of[0].n : 0, stays ? b.body->tangle->of[0].n : 0);
+        CHECK(stays ? n_tangled == 60 : n_tangled > 0 && n_tangled < 60);
+        CHECK_INT(n_same, 60);
+        pal_world_destroy(next);
+        box_bench_close(&b);
+    }
+}
+
+static void patches_grow_by_seconds_not_by_steps(void)
+{
+    static const int per_s[] = {60, 240, 20};
+    int n[3][4];
+    for (int k = 0; k < 3; k++) {
+        box_bench b;
+        REQUIRE(open_bent(&b));
+        for (int i = 0, seen = 0; seen < 4; i++) {
+            /* in the middle of each half second */
+            if (4 * i == (2 * seen + 1) * per_s[k]) n[k][seen++] = b.body->tangle->of[0].n;
+            REQUIRE(!pal_world_step(b.world, 1.0 / per_s[k]));
+        }
+        CHECK_INT(b.body->tangle->n_patch, 1);
+        printf("  %d steps a second: %d, %d, %d, %d nodes\n", per_s[k], n[k][0], n[k][1], n[k][2], n[k][3]);
+        for (int i = 0; i < 4; i++) CHECK_INT(n[k][i], n[0][i]);
+        for (int i = 1; i < 4; i++) CHECK(n[k][i] > n[k][i - 1]);
+        box_bench_close(&b);
+    }
+}
+
+/* what happens at the other end leaves a patch its times: it grows when it would have grown */
+static void a_patch_keeps_its_times_while_another_changes(void)
+{
+    const int n[3] = {8, 2, 2};
+    box_bench b;
+    REQUIRE(open_bent(&b));
+    for (int i = 0; i < 12; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    const pal_spring_tangle *t = b.body->tangle;
+    REQUIRE(t->n_patch == 1);
+    const int n_node = t->of[0].n;
+    for (int turn = 0; turn < 5; turn++) {
+        const uint64_t n_split = b.body->rescue.n_split;
+        double *x = b.body->x + 3 * box_node(n, 8, 2 * (turn % 2), 2);
+        x[0] -= 0.015, x[2] -= 0.015;
+        pal_world_moved(b.world, 0);
+        CHECK(b.body->rescue.n_split > n_split && t->n_patch == 2);
+        CHECK_NEAR(t->of[0].grow_s, (12 + 3 * turn) / 60.0, 1e-9);
+        CHECK_INT(t->of[0].n, n_node);
+        CHECK_LE(t->of[1].loose_s, 0);
+        for (int i = 0; i < 3; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    }
+    for (int i = 0; i < 6; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    CHECK(t->of[0].n > n_node);
+    box_bench_close(&b);
+}
+
+/* rows that are switched off while there are patches leave none behind, and come back as they were */
+static void rows_that_go_take_their_patches_with_them(void)
+{
+    static const char *const row[] = {"edge_distance", "tet_volume"};
+    for (int k = 0; k < 2; k++) {
+        box_bench b;
+        REQUIRE(bench_open(&b, true, true, 8));
+        fold(&b, 0.015);
+        REQUIRE(b.body->tangle->n_patch > 0);
+        REQUIRE(!pal_world_switch_row(b.world, b.scene, 0, row[k], false, &note));
+        CHECK_INT(b.body->tangle->n_patch, 0);
+        for (int i = 0; i < pal_world_rows(b.world); i++) {
+            const pal_row *r = pal_world_effect(b.world, i);
+            const pal_spring_row *springs = r->effect->springs ? r->effect->springs(r->self) : NULL;
+            if (springs) CHECK_INT(springs->n_off, 0);
+        }
+        REQUIRE(!pal_world_switch_row(b.world, b.scene, 0, row[k], true, &note));
+        CHECK(b.body->tangle->n_patch > 0 && edges_of(&b)->n_off > 0);
+        box_bench_close(&b);
+    }
+}
+
+/* solver rk4 asks its rows as verlet does */
+static void rk4_untangles_too(void)
+{
+    box_bench b;
+    REQUIRE(box_bench_make(&b, (const int[3]){4, 3, 3}, 0.01, true, false));
+    b.scene->body[0].material.damping_1_s = 8;
+    pal_item_init(&b.scene->body[0].solver, "solver", "rk4");
+    REQUIRE(box_bench_start(&b));
+    seed = 3;
     fold(&b, 0.015);
-    for (int i = 0; i < 3; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-    REQUIRE(b.body->tangle->n_patch > 0);
-    pal_world *next;
-    REQUIRE(!pal_world_create(b.scene, &note, &next));
-    pal_world_follow(next, b.world, -1, NULL, NULL);
-    const pal_body *body = pal_world_body(next, 0);
-    CHECK_INT(body->tangle->n_patch, b.body->tangle->n_patch);
-    CHECK_NEAR(pal_world_energy_J(next) / pal_world_energy_J(b.world), 1, 1e-12);
-    CHECK_NEAR(body->tangle->first_J, b.body->tangle->first_J, 0);
-    pal_world_destroy(next);
-    bench_close(&b);
+    REQUIRE(b.body->tangle && b.body->tangle->n_patch > 0);
+    const double first_J = pal_world_energy_J(b.world);
+    double most_J = 0;
+    for (int i = 0; i < 240; i++) {
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        most_J = fmax(most_J, pal_world_energy_J(b.world));
+    }
+    double sum = 0;
+    for (int i = 0; i < b.body->n_dof; i++) sum += pow(pal_dist3(b.body->x + 3 * i, b.body->x_rest + 3 * i), 2);
+    printf("  rk4: energy %.3g of the first at most, %.2g of its size off rest\n", most_J / first_J,
+           sqrt(sum / b.body->n_dof) / b.body->size_m);
+    CHECK_INT(b.body->tangle->n_patch, 0);
+    CHECK_LE(most_J, 1.01 * first_J);
+    CHECK_LE(sqrt(sum / b.body->n_dof), 1e-3 * b.body->size_m);
+    box_bench_close(&b);
 }
 
 /* a load on a node leaves it and what hangs on it to the springs, as long as it is there */
 static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
 {
-    bench b;
+    box_bench b;
     REQUIRE(bench_open(&b, true, true, 8));
     const int node = b.body->n_dof - 1;
     REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 1e-4}));
@@ -260,7 +365,7 @@ static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
     REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 0}));
     for (int i = 0; i < 2; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     CHECK(b.body->rescue.n_tangled > 0);
-    bench_close(&b);
+    box_bench_close(&b);
 }
 
 /* shaken at strains of 0.2, never turned over: the same bits, and what it costs in memory */
@@ -270,7 +375,7 @@ static void what_is_never_turned_over_moves_to_the_same_bits(void)
     size_t n_byte[2];
     int n_spring = 0;
     for (int untangle = 0; untangle < 2; untangle++) {
-        bench b;
+        box_bench b;
         REQUIRE(bench_open(&b, true, untangle, 1));
         for (int i = 0; i < b.body->n_dof; i++) b.body->x[3 * i + 2] *= 1.2;
         pal_world_moved(b.world, 0);
@@ -279,7 +384,7 @@ static void what_is_never_turned_over_moves_to_the_same_bits(void)
         CHECK(b.body->rescue.n_tangled == 0 && b.body->rescue.n_split == 0);
         n_byte[untangle] = pal_world_bytes(b.world);
         n_spring = edges_of(&b)->n_item + b.body->tets->n_tet;
-        bench_close(&b);
+        box_bench_close(&b);
     }
     CHECK(hash[0] == hash[1]);
     printf("  %zu bytes more for %d springs\n", n_byte[1] - n_byte[0], n_spring);
@@ -295,6 +400,10 @@ int main(void)
     RUN(what_may_not_untangle_has_nothing_for_it);
     RUN(what_hangs_by_its_weight_is_left_to_its_springs);
     RUN(a_world_that_follows_goes_on_untangling);
+    RUN(patches_grow_by_seconds_not_by_steps);
+    RUN(a_patch_keeps_its_times_while_another_changes);
+    RUN(rows_that_go_take_their_patches_with_them);
+    RUN(rk4_untangles_too);
     RUN(what_is_pressed_is_left_alone_until_it_is_let_go);
     RUN(what_is_never_turned_over_moves_to_the_same_bits);
     return check_report();

@@ -76,13 +76,13 @@ static bool couple(void *self, pal_cliques *out)
     return row->volume.n > 0;
 }
 
-static bool untangle(void *self, const pal_body *body)
+static unsigned untangle(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    if (!pal_cell_tangle_look(&row->tangle, row, body)) return false;
-    pal_kept_forget(&row->kept);
-    return true;
+    const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body);
+    if (changed) pal_kept_forget(&row->kept);
+    return (row->tangle.n_patch > 0 ? PAL_TANGLED : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
 }
 
 /* at rest, which solvers ask for between steps, there are no patches */

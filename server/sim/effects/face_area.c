@@ -4,7 +4,7 @@
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
  * momentum). Below 1e-12 of its rest area a triangle has no normal and its force fades to nothing. */
 #include "server/sim/effect_list.h"
-#include "server/sim/spring_row.h"
+#include "server/sim/spring_tangle.h"
 
 #include <stdlib.h>
 
@@ -104,4 +104,5 @@ const pal_effect pal_effect_face_area = {.name = "face_area",
                                          .stiffness = stiffness,
                                          .damping = damping,
                                          .springs = springs,
+                                         .untangle = pal_spring_tangle_ask,
                                          .material = pal_spring_row_material};

@@ -6,7 +6,7 @@
  * the volume that a regular one has with its edges: it would set the sub-step of the whole body for a volume that is
  * none, and turn over at any touch. Their edges stay; a preflight counts and names them. */
 #include "server/sim/effect_list.h"
-#include "server/sim/spring_row.h"
+#include "server/sim/spring_tangle.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -118,4 +118,5 @@ const pal_effect pal_effect_tet_volume = {.name = "tet_volume",
                                           .stiffness = stiffness,
                                           .damping = damping,
                                           .springs = springs,
+                                          .untangle = pal_spring_tangle_ask,
                                           .material = pal_spring_row_material};

@@ -118,15 +118,15 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_spring_grid_check(build->def, build->note));
     PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
-    /* patches are softer than springs: what hangs by its weight would be drawn out; and it is verlet that looks */
+    /* patches are softer than springs: what hangs by its weight would be drawn out; and explicit solvers look */
     const char *solver = build->def->solver.name;
-    bool can = !solver[0] || !strcmp(solver, "verlet");
+    bool can = !solver[0] || !strcmp(solver, "verlet") || !strcmp(solver, "rk4");
     for (int i = 0; i < build->def->n_effect; i++) can = can && strcmp(build->def->effect[i].name, "gravity") != 0;
     bool untangle = can;
     PAL_TRY(pal_item_bool(item, "untangle", &untangle, build->note));
     if (untangle && !can)
         return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s.untangle: goes with solver verlet and without gravity only", item->path);
+                            "%s.untangle: goes with solver verlet or rk4 and without gravity only", item->path);
     PAL_TRY(pal_item_done(item, build->note));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));

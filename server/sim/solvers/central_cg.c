@@ -349,17 +349,17 @@ static bool untangle(central *row, pal_step *step)
 {
     pal_body *body = step->body;
     double *d = body->d;
-    bool changed = false;
+    unsigned seen = 0;
     if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
     row->n_unseen = 0;
     pal_point_rows_place(body->embed, body->x, row->d);
     body->d = row->d;
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->untangle) changed |= step->force[i].effect->untangle(step->force[i].self, body);
+        if (step->force[i].effect->untangle) seen |= step->force[i].effect->untangle(step->force[i].self, step);
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
-    if (changed) row->dt_s = 0;
-    return changed;
+    if (seen & PAL_TANGLE_CHANGED) row->dt_s = 0;
+    return seen & PAL_TANGLE_CHANGED;
 }
 
 /* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */

@@ -15,7 +15,8 @@
  * Cox and Matthews (2002, eq. 26-29), which is the classical one for r = 0, of order 4 for every r, stable for all r
  * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Held nodes stand, led ones
  * (held 2) keep their velocity. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
- * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. */
+ * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are
+ * taken, rows look for what is turned over, and in every step while something is. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
@@ -52,7 +53,8 @@ typedef struct rk4 {
     /* of the body when they were taken */
     uint64_t revision;
     double ramp[2];
-    bool known; /* limit_s holds */
+    bool known;   /* limit_s holds */
+    bool tangled; /* rows are to be asked again in the coming step */
 
     /* Lanczos' bound on omega^2 of the FORCE rows, 1/s^2, at which common factors it was taken, and sub-steps since */
     double sharp2, sharp_ramp[2];
@@ -357,11 +359,21 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     return fmin(most, grown * row->sharp2);
 }
 
+/* true: something runs on what untangles it */
+static bool untangle(pal_step *step)
+{
+    unsigned seen = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->untangle) seen |= step->force[i].effect->untangle(step->force[i].self, step);
+    return seen & PAL_TANGLED;
+}
+
 static double limit(void *self, pal_step *step)
 {
     rk4 *row = self;
     const pal_body *body = step->body;
-    if (still_known(row, step)) return row->limit_s;
+    if (!(step->sub == 0 && row->tangled) && still_known(row, step)) return row->limit_s;
+    row->tangled = untangle(step);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         row->stiff[i] = row->damp[i] = 0;

@@ -7,12 +7,11 @@
  * of an element since the last time. Held nodes keep the velocity they are led with. A node moves at most 0.2 S in a
  * sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy), the same inequality is met
  * by adding mass to the nodes that break it; as it comes and goes it would bring energy with it, so these nodes lose up
- * to a hundredth of their velocity in a sub-step. Where the bound is taken, springs are looked at for what is turned
- * over (spring_tangle.h). */
+ * to a hundredth of their velocity in a sub-step. Where the bound is taken, rows look for what is turned over, and in
+ * every step while something is. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/effect_list.h"
-#include "server/sim/spring_tangle.h"
 
 #include <string.h>
 
@@ -22,6 +21,7 @@ typedef struct verlet {
     double limit_s;
     double way_m; /* no node has moved farther since the bound was taken */
     bool known;   /* limit_s holds                                       */
+    bool tangled; /* rows are to be asked again in the coming step       */
 } verlet;
 
 static const double most_way_h = 0.2, most_move_S = 0.2;
@@ -65,15 +65,24 @@ static bool has_bounds(const pal_row *rows, int n)
     return false;
 }
 
+/* true: something runs on what untangles it */
+static bool untangle(pal_step *step)
+{
+    unsigned seen = 0;
+    for (int i = 0; i < step->n_force; i++)
+        if (step->force[i].effect->untangle) seen |= step->force[i].effect->untangle(step->force[i].self, step);
+    return seen & PAL_TANGLED;
+}
+
 /* the smallest over free nodes of 2 safety t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
     verlet *row = self;
     const pal_body *body = step->body;
     bool contact = step->sub == 0 && has_bounds(step->contact, step->n_contact);
-    bool tangled = step->sub == 0 && body->tangle && body->tangle->n_patch > 0;
+    bool tangled = step->sub == 0 && row->tangled;
     if (row->known && !contact && !tangled && row->way_m <= most_way_h * body->h_m) return row->limit_s;
-    if (body->tangle) (void)pal_spring_tangle_look(body->tangle, step);
+    row->tangled = untangle(step);
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(row->stiff, 0, n_byte);
     memset(row->damp, 0, n_byte);
@@ -152,9 +161,8 @@ static pal_err run(void *self, pal_step *step)
 
 static void reset(void *self, const pal_body *body)
 {
+    (void)body;
     ((verlet *)self)->known = false;
-    /* rows or their constants may be others */
-    if (body->tangle) body->tangle->stale = true;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
