@@ -108,6 +108,16 @@ enum {
     PAL_TANGLE_CHANGED = 2 /* forces and stiffness are others than before */
 };
 
+/* how the body `from` of a row goes over to another one in its place */
+typedef struct pal_hand {
+    const pal_body *from;
+    const pal_point_rows *place; /* its nodes as weighted sums of the new ones; NULL: they are the same nodes */
+    bool same_shown;             /* shown vertices of the same number mean the same place on both             */
+    /* += forces that the row had on nodes, by place, less those it begins with on new ones, N [n_node][3]: what is to
+     * be let go (ease.h); NULL: nobody asks */
+    double *left_N;
+} pal_hand;
+
 typedef struct pal_effect {
     const char *name; /* as written in scene files */
     pal_stage stage;
@@ -140,11 +150,9 @@ typedef struct pal_effect {
     /* FORCE: looks for elements that are turned over and chooses what they run on from now on; PAL_TANGLED,
      * PAL_TANGLE_CHANGED or both, 0: nothing is turned over. Solvers ask between sub-steps, never within one */
     unsigned (*untangle)(void *self, pal_step *step);
-    /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h):
-     * `place` has the nodes of `from` as weighted sums of this body's; NULL: they are the same nodes. Both bodies stand
-     * still */
-    void (*hand)(void *self, const pal_body *body, const void *before, const pal_body *from,
-                 const pal_point_rows *place);
+    /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h). Both
+     * bodies stand still */
+    void (*hand)(void *self, const pal_body *body, const void *before, const pal_hand *by);
     /* optional, for implicit solvers; a body with an implicit solver refuses `internal` rows without it */
     const pal_tangent *tangent;
     bool implicit;   /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */

@@ -518,8 +518,8 @@ static const pal_row *find_row(const pal_world *w, int body, const pal_effect *e
     return NULL;
 }
 
-/* rows that can go on where those of before are */
-static void hand_over(const pal_transfer *t, pal_world *next, const pal_world *before)
+/* rows that can go on where those of before are; forces that they put on other nodes now are to be let go as well */
+static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
 {
     for (int i = 0; i < next->plan.n_row; i++) {
         const pal_row *row = &next->plan.row[i];
@@ -527,8 +527,11 @@ static void hand_over(const pal_transfer *t, pal_world *next, const pal_world *b
         const pal_row *from = row->effect->hand ? find_row(before, b, row->effect) : NULL;
         bool known = b == t->body ? t->back.n_row > 0 : next->plan.body[b].n_node == before->plan.body[b].n_node;
         if (from && known)
-            row->effect->hand(row->self, &next->plan.body[b], from->self, &before->plan.body[b],
-                              b == t->body ? force_rows(t) : NULL);
+            row->effect->hand(row->self, &next->plan.body[b], from->self,
+                              &(pal_hand){.from = &before->plan.body[b],
+                                          .place = b == t->body ? force_rows(t) : NULL,
+                                          .same_shown = pal_transfer_same_shown(next, before, b),
+                                          .left_N = b == t->body ? t->pull : NULL});
     }
 }
 
@@ -591,8 +594,8 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     memcpy(t->x, to->x, n_byte);
     memcpy(t->v, to->v, n_byte);
     pal_world_follow(next, before, t->body, t->x, t->v);
-    if (t->back.n_row > 0) ease(t, next);
     hand_over(t, next, before);
+    if (t->back.n_row > 0) ease(t, next);
     pal_brush_rows_hand(&next->brushes, &next->plan, &before->brushes, &before->plan);
     out->energy_after_J = world_J(next);
     out->body_move_m = pal_transfer_body_move(t, from, to);

@@ -29,6 +29,8 @@ struct pal_transfer {
 /* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);
+/* do shown vertices of body b of the same number mean the same place in both worlds? */
+bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int b);
 /* the new body is shown where the old one was, and how far it is to be let go from there; body_move_m is known */
 void pal_transfer_show(pal_transfer *t, pal_world *next, const pal_world *before, pal_transfer_report *out);
 #endif

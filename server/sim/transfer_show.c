@@ -42,9 +42,10 @@ double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const
 
 /* ---- what is shown ---- */
 
-/* do vertices of the same number mean the same place? */
-static bool same_vertices(const pal_world_part *a, const pal_world_part *b, double size_m)
+bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int body)
 {
+    const pal_world_part *a = &before->part[body], *b = &next->part[body];
+    double size_m = next->plan.body[body].size_m;
     if (a->n_vertex != b->n_vertex) return false;
     for (int i = 0; i < 3 * a->n_vertex; i++)
         if (!(fabs((double)a->rest_m[i] - (double)b->rest_m[i]) <= SAME_PLACE * size_m)) return false;
@@ -100,7 +101,7 @@ static void go_on_others(const pal_transfer *t, pal_world *next, const pal_world
 void pal_transfer_show(pal_transfer *t, pal_world *next, const pal_world *before, pal_transfer_report *out)
 {
     const pal_body *from = &before->plan.body[t->body], *to = &next->plan.body[t->body];
-    bool same = same_vertices(&before->part[t->body], &next->part[t->body], to->size_m) && !t->shell;
+    bool same = pal_transfer_same_shown(next, before, t->body) && !t->shell;
     out->most_move_m = out->frame_move_m = out->body_move_m;
     go_on_others(t, next, before);
     if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->shell && to->skin)) return;

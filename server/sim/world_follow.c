@@ -65,7 +65,8 @@ static void follow_shell(pal_world *w, int b, const pal_world *before)
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
         const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
         const pal_row *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
-        if (row->effect == was->effect && row->effect->hand) row->effect->hand(row->self, to, was->self, from, NULL);
+        if (row->effect == was->effect && row->effect->hand)
+            row->effect->hand(row->self, to, was->self, &(pal_hand){.from = from});
     }
 }
 

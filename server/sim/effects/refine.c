@@ -544,20 +544,19 @@ static void reset(void *self, const pal_body *body)
 }
 
 /* clocks, patience and factors of the same surface in another world; of another number of levels they begin anew */
-static void hand(void *self, const pal_body *body, const void *before, const pal_body *from,
-                 const pal_point_rows *place)
+static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
 {
     refine *row = self;
     const refine *was = before;
     const pal_levels *levels = &row->shell->levels;
-    if (place || levels->n_level != was->shell->levels.n_level) return;
+    if (by->place || levels->n_level != was->shell->levels.n_level) return;
     const size_t n_face = (size_t)levels->first_face[levels->n_level];
     memcpy(row->switched_s, was->switched_s, n_face * sizeof *row->switched_s);
     memcpy(row->patience, was->patience, n_face * sizeof *row->patience);
     row->clock_s = was->clock_s, row->wait_s = was->wait_s, row->way_m = was->way_m;
     row->spring_slope = was->spring_slope, row->shape_slope = was->shape_slope;
     row->seen_s = was->seen_s, row->seen_load2 = was->seen_load2;
-    row->seen_revision = was->seen_revision == from->revision + 1 ? body->revision + 1 : 0;
+    row->seen_revision = was->seen_revision == by->from->revision + 1 ? body->revision + 1 : 0;
     memcpy(row->measure.frame.quat, was->measure.frame.quat, sizeof row->measure.frame.quat);
 }
 

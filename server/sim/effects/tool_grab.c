@@ -16,13 +16,14 @@
  * so tissue follows a faster tool late. Where caps leave less than the spring's force, it becomes a constant force and
  * the solver goes round once more (pal_tangent.settle).
  *
- * Another body in this one's place (hand): weights go to the nodes around, o changes so that the force stays.
+ * Another body in this one's place (hand): where it shows the same surface the grip holds the very vertices that it
+ * took, by its own skin, else the nodes around those that it held. o changes by what the patch's place at rest does,
+ * so that it stays the hold of that tissue, however often; the force goes over without a jump (handed.h).
  *
  * On a body that adapts (sim/shell.h) weights go with the masses of the nodes as well, so that fine and coarse parts of
- * the patch come along alike, and a grip goes on when nodes come and go: a new midpoint weighs as its edge's ends do in
- * the mean, one that goes leaves the others their weights, and its own to the ends of its edge where neither was held.
- * The force is the same on both sides of the change: o goes with y, and F = k (tool + o + shift - y), where shift makes
- * up for another k and fades in SHIFT_S.
+ * the patch come along alike, and a grip goes on when nodes come and go (shell_grip.h). The force is the same on both
+ * sides of the change: o goes with y, and F = k (tool + o + shift - y), where shift makes up for another k and fades in
+ * SHIFT_S.
  *
  * For a haptic bridge the tool's bilateral part is published as f0 - K (x - x0) - b v, K = k_s 1: k_s starts as this
  * spring in series with the tissue under the patch, 2 E R / (1 - nu^2), and follows least squares on the tool's moves
@@ -33,8 +34,9 @@
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
 #include "server/sim/effect.h"
+#include "server/sim/handed.h"
 #include "server/sim/patch.h"
-#include "server/sim/shell.h"
+#include "server/sim/shell_grip.h"
 #include "server/sim/touch.h"
 
 #include <math.h>
@@ -49,6 +51,7 @@
 #define RISE_S       0.02
 #define BELOW_CAP    0.98
 #define SHIFT_S      0.15
+#define WHOLE        65535.0
 
 /* what a grip needs beside with an implicit solver */
 typedef struct firm_grip {
@@ -67,17 +70,14 @@ typedef struct live_grip {
     bool renewed;                       /* other nodes since then                         */
 } live_grip;
 
-/* a grip that was handed over: its patch then, force on tissue */
-typedef struct handed {
-    bool due;
-    double y[3], force_N[3], k_N_m;
-} handed;
-
 typedef struct grip {
     bool held, button; /* has tissue; button in the last step                              */
+    bool by_vertex;    /* share is that of the patch                                       */
     int n_node;
     int32_t *node;                  /* [n_node]                                                         */
     double *weight;                 /* sum 1 [n_node]                                                   */
+    uint16_t *share;                /* of each shown vertex, WHOLE: 1; NULL on bodies that adapt [n_shown] */
+    double quat[4];                 /* of the tool when it closed                                       */
     double offset[3];               /* patch minus tool in the tool's axes at quaternion 1              */
     double k_most_N_m, c_most_Ns_m; /* explicit limits in this sub-step                    */
     double force[3];                /* on the tool, this sub-step                                       */
@@ -88,23 +88,15 @@ typedef struct grip {
     firm_grip *firm; /* implicit solvers only, else NULL */
 } grip;
 
-/* points of a body that adapts that were in use when its grips were last looked at */
-typedef struct in_use {
-    uint64_t revision;
-    int n;
-    int32_t *point; /* [n] */
-    uint8_t *known; /* 1: in the list [n_node] */
-} in_use;
-
 typedef struct tool_grab {
     int n_tool;
-    grip grip[PAL_TOOL_MAX];
+    grip *grip;         /* [n_tool] */
     double *sum_weight; /* of all tools that hold a node [n_node] */
     double *gather;     /* weights of a new grab [n_node], 0 between grabs */
     double asked_N_m, damping_s, asked_reach_m;
     double young_Pa, poisson;
-    in_use *use;    /* bodies that adapt only, else NULL */
-    handed *handed; /* heap, after hand; else NULL [n_tool] */
+    pal_in_use *use;    /* bodies that adapt only, else NULL */
+    pal_handed *handed; /* heap, after hand; else NULL [n_tool] */
 } tool_grab;
 
 static double reach_m(const tool_grab *grab, const pal_tool *tool)
@@ -148,31 +140,23 @@ static void reset(void *self, const pal_body *body)
     memset(grab->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
 }
 
-static void look(in_use *use, const pal_body *body)
-{
-    for (int i = 0; i < use->n; i++) use->known[use->point[i]] = 0;
-    use->n = body->n_active;
-    for (int i = 0; i < use->n; i++) use->known[use->point[i] = body->active[i]] = 1;
-    use->revision = body->revision;
-}
-
-static pal_err make_use(tool_grab *grab, pal_build *build)
-{
-    size_t n_node = (size_t)build->body->n_node;
-    grab->use = PAL_NEW(build->arena, in_use, 1);
-    if (!grab->use) return PAL_ERR_MEMORY;
-    grab->use->point = PAL_NEW(build->arena, int32_t, n_node);
-    grab->use->known = PAL_NEW(build->arena, uint8_t, n_node);
-    if (!grab->use->point || !grab->use->known) return PAL_ERR_MEMORY;
-    look(grab->use, build->body);
-    return PAL_ERR_OK;
-}
-
 static pal_err make_live(grip *g, size_t n_node, pal_arena *arena)
 {
     g->live = PAL_NEW(arena, live_grip, 1);
     if (g->live) g->live->even = PAL_NEW(arena, double, n_node);
     return g->live && g->live->even ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make_grip(grip *g, const pal_body *body, pal_arena *arena)
+{
+    size_t n_node = (size_t)body->n_node;
+    g->node = PAL_NEW(arena, int32_t, n_node);
+    g->weight = PAL_NEW(arena, double, n_node);
+    if (!g->node || !g->weight) return PAL_ERR_MEMORY;
+    if (body->implicit && !(g->firm = PAL_NEW(arena, firm_grip, 1))) return PAL_ERR_MEMORY;
+    if (body->shell) return make_live(g, n_node, arena);
+    g->share = PAL_NEW(arena, uint16_t, (size_t)body->n_shown);
+    return g->share ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -195,18 +179,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     grab->n_tool = build->scene->n_tool;
     grab->sum_weight = PAL_NEW(build->arena, double, n_node);
     grab->gather = PAL_NEW(build->arena, double, n_node);
-    if (!grab->sum_weight || !grab->gather) return PAL_ERR_MEMORY;
-    for (int t = 0; t < grab->n_tool; t++) {
-        grab->grip[t].node = PAL_NEW(build->arena, int32_t, n_node);
-        grab->grip[t].weight = PAL_NEW(build->arena, double, n_node);
-        if (!grab->grip[t].node || !grab->grip[t].weight) return PAL_ERR_MEMORY;
-        if (build->body->shell) PAL_TRY(make_live(&grab->grip[t], n_node, build->arena));
-        if (!build->body->implicit) continue;
-        grab->grip[t].firm = PAL_NEW(build->arena, firm_grip, 1);
-        if (!grab->grip[t].firm) return PAL_ERR_MEMORY;
-    }
+    grab->grip = PAL_NEW(build->arena, grip, grab->n_tool);
+    if (!grab->sum_weight || !grab->gather || !grab->grip) return PAL_ERR_MEMORY;
+    for (int t = 0; t < grab->n_tool; t++) PAL_TRY(make_grip(&grab->grip[t], build->body, build->arena));
     material(grab, build->body, &build->def->material, NULL);
-    if (build->body->shell) PAL_TRY(make_use(grab, build));
+    if (build->body->shell) PAL_TRY(pal_in_use_make(build->body, build->arena, &grab->use));
     *self = grab;
     return PAL_ERR_OK;
 }
@@ -219,12 +196,20 @@ static void add_vertex(tool_grab *grab, const pal_body *body, int vertex, double
     for (int k = 0; k < n; k++) grab->gather[node[k]] += share * weight[k];
 }
 
+static void take_vertex(tool_grab *grab, grip *g, const pal_body *body, int vertex, double share)
+{
+    add_vertex(grab, body, vertex, share);
+    if (g->share) g->share[vertex] = (uint16_t)(WHOLE * share + 0.5);
+}
+
 /* node weights of what lies within reach of p (body frame), left in gather; false: nothing there */
-static bool close_on(tool_grab *grab, const pal_body *body, const double p[3], double reach)
+static bool close_on(tool_grab *grab, grip *g, const pal_body *body, const double p[3], double reach)
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
     int nearest = -1;
     int n_shown = body->shell ? body->n_active : body->n_shown;
+    g->by_vertex = g->share != NULL;
+    if (g->share) memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
     for (int k = 0; k < n_shown; k++) {
         int i = body->shell ? body->active[k] : k;
         const float *s = body->shown + 3 * (size_t)i;
@@ -232,11 +217,11 @@ static bool close_on(tool_grab *grab, const pal_body *body, const double p[3], d
         double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
         if (d2 <= nearest2) nearest2 = d2, nearest = i;
         if (!(fall > 0)) continue;
-        add_vertex(grab, body, i, fall * fall);
+        take_vertex(grab, g, body, i, fall * fall);
         sum += fall * fall;
     }
     if (nearest < 0) return false;
-    if (sum == 0) add_vertex(grab, body, nearest, 1);
+    if (sum == 0) take_vertex(grab, g, body, nearest, 1);
     return true;
 }
 
@@ -273,13 +258,14 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
 {
     double last[3], y[3], v[3], reach = reach_m(grab, tool);
     pal_sub3(last, tool->last.position_m, body->offset_m);
-    if (!close_on(grab, body, last, reach)) return;
+    if (!close_on(grab, g, body, last, reach)) return;
     take_gathered(grab, g, body);
-    if (grab->handed) grab->handed[g - grab->grip].due = false;
+    if (grab->handed) grab->handed[g - grab->grip] = (pal_handed){.due = false};
     patch_place(g, body, y, v);
     double back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
     pal_sub3(g->offset, y, last);
     pal_quat_rotate(g->offset, back, g->offset);
+    memcpy(g->quat, tool->last.quat, sizeof g->quat);
     g->held = true;
     if (g->live) {
         g->live->renewed = false;
@@ -296,50 +282,14 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     }
 }
 
-/* what a point weighs in gather, or would if it had been there before */
-static double weight_of(const tool_grab *grab, const pal_levels *levels, int32_t point)
-{
-    int32_t edge = pal_levels_vertex_parent(levels, point);
-    if (grab->use->known[point] || edge < 0) return fabs(grab->gather[point]);
-    const int32_t *end = levels->edge[edge].vertex;
-    return 0.5 * (weight_of(grab, levels, end[0]) + weight_of(grab, levels, end[1]));
-}
-
-/* a point that is gone: its weight to the ends of its edge, below 0 where they were not in the grip before, unless one
- * was; those that are gone themselves hand it on */
-static void hand_on(tool_grab *grab, const pal_shell *shell, int32_t point)
-{
-    double weight = fabs(grab->gather[point]);
-    const int32_t *end = shell->levels.edge[pal_levels_vertex_parent(&shell->levels, point)].vertex;
-    grab->gather[point] = 0;
-    if (weight == 0 || grab->gather[end[0]] > 0 || grab->gather[end[1]] > 0) return;
-    for (int k = 0; k < 2; k++) {
-        grab->gather[end[k]] -= 0.5 * weight;
-        if (!pal_shell_has(shell, end[k])) hand_on(grab, shell, end[k]);
-    }
-}
-
 /* the same grip on the points that are in use now */
 static void grip_again(tool_grab *grab, grip *g, const pal_body *body)
 {
-    const pal_shell *shell = body->shell;
     for (int i = 0; i < g->n_node; i++) {
         grab->sum_weight[g->node[i]] -= g->weight[i];
         grab->gather[g->node[i]] = g->live->even[i];
     }
-    /* finest first, so that the ends of an edge are asked while they still weigh */
-    for (int level = shell->levels.n_level - 1; level > 0; level--)
-        for (int i = 0; i < g->n_node; i++)
-            if (shell->levels.vertex_level[g->node[i]] == level && !pal_shell_has(shell, g->node[i]))
-                hand_on(grab, shell, g->node[i]);
-    for (int k = 0; k < body->n_active; k++) {
-        int32_t i = body->active[k];
-        if (!grab->use->known[i]) grab->gather[i] = weight_of(grab, &shell->levels, i);
-    }
-    for (int k = 0; k < body->n_active; k++) {
-        double *weight = &grab->gather[body->active[k]];
-        *weight = fabs(*weight);
-    }
+    pal_in_use_weigh(grab->use, body, g->node, g->n_node, grab->gather);
     take_gathered(grab, g, body);
     g->live->renewed = true;
 }
@@ -350,7 +300,7 @@ static void follow(tool_grab *grab, const pal_body *body)
     if (!grab->use || grab->use->revision == body->revision) return;
     for (int t = 0; t < grab->n_tool; t++)
         if (grab->grip[t].held) grip_again(grab, &grab->grip[t], body);
-    look(grab->use, body);
+    pal_in_use_look(grab->use, body);
 }
 
 /* once a step: the button's edges */
@@ -363,8 +313,48 @@ static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal
     if (pressed && !g->held) take_hold(grab, g, tool, body);
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_body *from,
-                 const pal_point_rows *place)
+/* what the grip b of another body holds, by this body's nodes */
+static void hand_nodes(tool_grab *grab, grip *g, const pal_body *body, const grip *b, const pal_hand *by)
+{
+    const pal_point_rows *place = by->place;
+    g->by_vertex = b->by_vertex && g->share && by->same_shown;
+    for (int i = 0; i < body->n_shown && g->by_vertex; i++) g->share[i] = b->share[i];
+    for (int i = 0; i < body->n_shown && g->by_vertex && place; i++)
+        if (g->share[i] > 0) add_vertex(grab, body, i, g->share[i] / WHOLE);
+    for (int i = 0; i < b->n_node && !(g->by_vertex && place); i++) {
+        const double weight = b->live ? b->live->even[i] : b->weight[i];
+        if (!place) grab->gather[b->node[i]] += weight;
+        for (int32_t k = place ? place->start[b->node[i]] : 0; place && k < place->start[b->node[i] + 1]; k++)
+            grab->gather[place->point[k]] += weight * fmax(0, place->weight[k]);
+    }
+    take_gathered(grab, g, body);
+}
+
+/* what the grip of before pulled on nodes less what this one does: to left_N */
+static void leave(const grip *g, const grip *b, const double force_N[3], const pal_hand *by)
+{
+    const pal_point_rows *place = by->place;
+    if (!by->left_N || !place || !pal_finite3(force_N)) return;
+    for (int i = 0; i < b->n_node; i++) {
+        if (!by->from->embed && by->from->held[b->node[i]]) continue;
+        for (int32_t k = place->start[b->node[i]]; k < place->start[b->node[i] + 1]; k++)
+            pal_axpy3(by->left_N + 3 * (size_t)place->point[k], b->weight[i] * place->weight[k], force_N);
+    }
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(by->left_N + 3 * (size_t)g->node[i], -g->weight[i], force_N);
+}
+
+/* o by what the patch's place at rest differs */
+static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_body *from)
+{
+    double moved[3] = {0}, back[4] = {b->quat[0], -b->quat[1], -b->quat[2], -b->quat[3]};
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(moved, g->weight[i], body->node_rest + 3 * (size_t)g->node[i]);
+    for (int i = 0; i < b->n_node; i++) pal_axpy3(moved, -b->weight[i], from->node_rest + 3 * (size_t)b->node[i]);
+    pal_quat_rotate(moved, back, moved);
+    pal_add3(g->offset, b->offset, moved);
+    memcpy(g->quat, b->quat, sizeof g->quat);
+}
+
+static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
 {
     tool_grab *grab = self;
     const tool_grab *old = before;
@@ -372,43 +362,50 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
     for (int t = 0; t < grab->n_tool && t < old->n_tool && grab->handed; t++) {
         const grip *b = &old->grip[t];
         grip *g = &grab->grip[t];
-        handed *h = &grab->handed[t];
+        pal_handed *h = &grab->handed[t];
+        let_go(grab, g);
         g->button = b->button;
-        for (int i = 0; i < b->n_node && b->held; i++) {
-            const double weight = b->live ? b->live->even[i] : b->weight[i];
-            if (!place) grab->gather[b->node[i]] += weight;
-            for (int32_t k = place ? place->start[b->node[i]] : 0; place && k < place->start[b->node[i] + 1]; k++)
-                grab->gather[place->point[k]] += weight * fmax(0, place->weight[k]);
-        }
         if (!b->held) continue;
-        take_gathered(grab, g, body);
-        pal_copy3(g->offset, b->offset), pal_copy3(g->last_m, b->last_m), pal_copy3(g->last_N, b->last_N);
+        hand_nodes(grab, g, body, b, by);
+        move_hold(g, body, b, by->from);
+        pal_copy3(g->last_m, b->last_m), pal_copy3(g->last_N, b->last_N);
         g->xx = b->xx, g->xf = b->xf, g->k_start_N_m = b->k_start_N_m, g->k_felt_N_m = b->k_felt_N_m;
-        patch_place(b, from, h->y, h->force_N);
-        pal_scale3(h->force_N, -1, b->force);
-        h->k_N_m = b->firm ? b->firm->k_N_m : 0;
+        *h = old->handed ? old->handed[t] : (pal_handed){.due = false};
+        if (!h->due) {
+            double v[3];
+            patch_place(b, by->from, h->y, v);
+            pal_scale3(h->force_N, -1, b->force);
+            pal_copy3(h->hold, b->offset);
+            h->k_N_m = b->firm ? b->firm->k_N_m : 0;
+        }
+        leave(g, b, h->force_N, by);
         g->held = h->due = g->n_node > 0;
     }
 }
 
-/* o of a grip that was handed over, for the same force; held back besides (caps, haste) only where that is no jump */
-static void hold_on(const tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body, double k_N_m)
+/* a grip that was handed over begins with the force that it had; drag_N: what of it the damper gives */
+static void hold_on(const tool_grab *grab, grip *g, const pal_tool *tool, const pal_body *body, double k_N_m,
+                    const double drag_N[3])
 {
-    handed *h = grab->handed ? &grab->handed[g - grab->grip] : NULL;
-    double goal[3], y[3], back[4] = {tool->last.quat[0], -tool->last.quat[1], -tool->last.quat[2], -tool->last.quat[3]};
+    pal_handed *h = grab->handed ? &grab->handed[g - grab->grip] : NULL;
+    pal_handed_spring s = {.k_N_m = k_N_m, .firm = g->firm != NULL};
+    double v[3];
     if (!h || !h->due || !(k_N_m > 0)) return;
-    h->due = false;
-    patch_place(g, body, y, goal);
-    pal_quat_rotate(goal, tool->last.quat, g->offset);
-    pal_sub3(goal, goal, h->y);
-    if (g->firm && h->k_N_m > 0)
-        pal_axpy3(goal, -1 / h->k_N_m, h->force_N);
-    else
-        pal_sub3(goal, body->offset_m, tool->last.position_m);
-    pal_add3(goal, goal, y);
-    pal_axpy3(goal, 1 / k_N_m, h->force_N);
-    pal_quat_rotate(g->offset, back, goal);
+    patch_place(g, body, s.y, v);
+    pal_copy3(s.drag_N, drag_N);
+    pal_sub3(s.at_m, tool->last.position_m, body->offset_m);
+    pal_quat_rotate(s.hold, tool->last.quat, g->offset);
+    pal_quat_rotate(s.was_hold, tool->last.quat, h->hold);
+    pal_handed_begin(h, &s);
     if (g->firm) g->firm->stretch_m = pal_norm3(h->force_N) / k_N_m;
+}
+
+/* where the spring would have the patch, body frame */
+static void find_goal(const tool_grab *grab, const grip *g, const pal_tool *tool, const pal_step *step, double goal[3])
+{
+    pal_quat_rotate(goal, tool->next.quat, g->offset);
+    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, step->body->offset_m);
+    if (grab->handed) pal_handed_add(&grab->handed[g - grab->grip], step->dt_s, goal);
 }
 
 /* what the patch weighs at least, where points carry its nodes: W' C W <= sum W_i C_ii; shared by tools that hold it */
@@ -466,12 +463,11 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     double y[3], v[3], goal[3], force[3];
     find_limits(grab, g, body, step->dt_s);
     patch_place(g, body, y, v);
-    double k = spring_N_m(grab, g, tool);
-    hold_on(grab, g, tool, body, tool->ramp * k);
-    pal_quat_rotate(goal, tool->next.quat, g->offset);
-    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, body->offset_m);
+    double k = spring_N_m(grab, g, tool), c = fmin(k * grab->damping_s, g->c_most_Ns_m), drag[3];
+    for (int d = 0; d < 3; d++) drag[d] = tool->ramp * (c * (tool->velocity_m_s[d] - v[d]));
+    hold_on(grab, g, tool, body, tool->ramp * k, drag);
+    find_goal(grab, g, tool, step, goal);
     if (g->live) keep_force(g, tool, y, v, k, step->dt_s, goal);
-    double c = fmin(k * grab->damping_s, g->c_most_Ns_m);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
     pal_set3(g->force, 0, 0, 0);
     if (!pal_finite3(force)) return;
@@ -500,9 +496,8 @@ static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *
     double y[3], v[3], goal[3], rise = RISE_S * body->size_m / step->n_sub;
     patch_place(g, body, y, v);
     g->firm->k_N_m = tool->ramp * stiffness_N_m(grab, reach_m(grab, tool));
-    hold_on(grab, g, tool, body, g->firm->k_N_m);
-    pal_quat_rotate(goal, tool->next.quat, g->offset);
-    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, body->offset_m);
+    hold_on(grab, g, tool, body, g->firm->k_N_m, (double[3]){0});
+    find_goal(grab, g, tool, step, goal);
     pal_sub3(goal, goal, y);
     double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), most = g->firm->stretch_m + rise, weight = 0;
     for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);

@@ -635,13 +635,12 @@ static bool settle(void *self, pal_step *step, const double *moved)
     return again;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_body *from,
-                 const pal_point_rows *place)
+static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
 {
     tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its touch gathers forces, which is work room */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
         double k_N_m = push->young_Pa * old->holder[t].limits.radius_m / (1 - push->poisson * push->poisson);
-        pal_holder_hand(&push->holder[t], body, &old->holder[t], from, &old->touch, place, k_N_m);
+        pal_holder_hand(&push->holder[t], body, &old->holder[t], by->from, &old->touch, by->place, k_N_m);
     }
 }
 
