@@ -174,27 +174,27 @@ static pal_err make_group(const pal_solid *solid, pal_cell_kind kind, pal_arena 
 
 /* ---- constants ---- */
 
-/* Lame constants of the lanes of half a block at a point */
-static void lame_lanes(const pal_solid_samples *s, const pal_cell_group *g, bool no_volume, int block, int lane,
-                       int point, pal_wide *mu, pal_wide *lambda)
+/* Lame constants of the lanes of half a block at a point; of what is not shared with the control cell (cell_volume.c)
+ */
+static void lame_lanes(const pal_solid_samples *s, const pal_cell_group *g, bool shared, int block, int lane, int point,
+                       pal_wide *mu, pal_wide *lambda)
 {
     for (int l = 0; l < PAL_WIDE; l++) {
         size_t at = (size_t)element_of(g, block, lane + l) * PAL_CELL_POINTS + (size_t)point;
         double m, la;
         pal_lame((double)s->young_Pa[at], fmin((double)s->poisson[at], 0.4999), &m, &la);
-        /* what the change of volume takes stands elsewhere (cell_volume.c) */
-        (*mu)[l] = m, (*lambda)[l] = no_volume ? -2.0 / 3 * m : la;
+        (*mu)[l] = m, (*lambda)[l] = shared ? pal_cell_lambda_kept(m, la) : la;
     }
 }
 
-static void fill_cubic(const pal_solid *solid, bool no_volume, pal_cell_group *g)
+static void fill_cubic(const pal_solid *solid, bool shared, pal_cell_group *g)
 {
     for (int b = 0; b < g->n_block; b++)
         for (int p = 0; p < PAL_CELL_POINTS; p++)
             for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
                 float *to = g->stiff + ((size_t)b * PAL_CELL_POINTS + (size_t)p) * 2 * PAL_LANES + l;
                 pal_wide mu, lambda;
-                lame_lanes(&solid->samples[PAL_CELL_CUBIC], g, no_volume, b, l, p, &mu, &lambda);
+                lame_lanes(&solid->samples[PAL_CELL_CUBIC], g, shared, b, l, p, &mu, &lambda);
                 cell_store_float(to, mu), cell_store_float(to + PAL_LANES, lambda);
             }
 }
@@ -226,7 +226,7 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
  * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
  * `mean`: K of A 3.2, int B' C B dV */
 static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn, bool mean,
-                      bool no_volume, int block, int lane)
+                      bool shared, int block, int lane)
 {
     const int n_node = group->n_node, n_pair = pal_cell_pairs(n_node);
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
@@ -237,7 +237,7 @@ static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
     for (int p = 0; p < PAL_CELL_POINTS; p++) {
         double at[3], weight = pal_cell_point(p, at);
         pal_wide volume = rest_gradients(rest, n_node, dn[p], weight, g);
-        lame_lanes(&solid->samples[kind], group, no_volume, block, lane, p, &mu, &lambda);
+        lame_lanes(&solid->samples[kind], group, shared, block, lane, p, &mu, &lambda);
         mu *= volume;
         pal_wide kappa = lambda * volume + mu * (2.0 / 3), outer = mean ? mu * (-2.0 / 3) : lambda * volume;
         all += kappa;
@@ -261,12 +261,12 @@ static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
     for (int i = 0; i < 9 * n_pair; i++) cell_store_float(to + (size_t)i * PAL_LANES, k[i / 9][i % 9]);
 }
 
-static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean, bool no_volume)
+static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean, bool shared)
 {
     point_gradients dn;
     trilinear_gradients(group->n_node, dn);
     for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, mean, no_volume, b, l);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, mean, shared, b, l);
 }
 
 void pal_cells_elastic_refresh(pal_cells_elastic *c)
@@ -274,10 +274,10 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
     if (c->sampled == c->solid->sampled) return;
     c->sampled = c->solid->sampled;
     pal_kept_forget(&c->kept);
-    const bool no_volume = c->volume.n > 0, mean = c->op == PAL_CELL_POLAR && !no_volume;
-    fill_cubic(c->solid, no_volume, &c->group[PAL_CELL_CUBIC]);
-    fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, no_volume);
-    fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean, no_volume);
+    const bool shared = c->volume.n > 0, mean = c->op == PAL_CELL_POLAR;
+    fill_cubic(c->solid, shared, &c->group[PAL_CELL_CUBIC]);
+    fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, shared);
+    fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean, shared);
     pal_cell_volume_refresh(c);
     pal_cell_tangle_refresh(&c->tangle, c);
 }

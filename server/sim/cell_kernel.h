@@ -49,11 +49,11 @@ typedef struct pal_cell_group {
     double *here;        /* 1: an element, 0: part of a patch (cell_tangle.h)      [n_block][8] */
     double *energy_J;    /* of each element when energy was asked for last         [n_block][8] */
     int32_t *home;       /* control cell of each element, where changes of volume have theirs [n_block][8] */
-    double *swell;       /* int kappa grad N dV, J/m, the same           [n_block][n_node][3][8] */
+    double *swell;       /* int kappa grad N dV, J/m, kappa of what they share          [n_block][n_node][3][8] */
     int n_slow;          /* rotations of the last call that vectors did not settle */
 } pal_cell_group;
 
-/* changes of volume of whole control cells (cell_volume.c); n 0: each element has its own */
+/* changes of volume that control cells share (cell_volume.c); n 0: each element has its own */
 typedef struct pal_cell_volume {
     int n;         /* control cells */
     double *sum;   /* int kappa tr(strain) dV, J            [n] */
@@ -73,6 +73,11 @@ typedef struct pal_cells_elastic {
     pal_cell_group group[PAL_CELL_KINDS];
 } pal_cells_elastic;
 
+/* lambda of an element's own where its control cell has the rest */
+static inline double pal_cell_lambda_kept(double mu, double lambda)
+{
+    return lambda < mu ? lambda : mu;
+}
 static inline int pal_cell_pairs(int n_node)
 {
     return (n_node - 1) * n_node / 2;

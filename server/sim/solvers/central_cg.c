@@ -21,8 +21,9 @@
  * largest eigenvalues at the begin of every step. Held points' rows are dropped, led ones (held 2) keep their velocity
  * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3); where
  * one would have moved farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three
- * times and grow again by 2 % of what was halved a sub-step. Where the
- * world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met. */
+ * times and grow again by 2 % of what was halved a sub-step. While elements are turned over sub-steps are 0.6 times as
+ * long. Where the world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met.
+ */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
@@ -54,6 +55,7 @@ typedef struct central {
     double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
     double cell_m;                /* edge of a control cell, about */
     double way_m;                 /* no point has moved farther against the others since it was taken */
+    bool tangled;                 /* elements run on something else since they are turned over      */
     int n_unseen;                 /* sub-steps since turned over elements were looked for */
     int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
@@ -69,6 +71,9 @@ typedef struct central {
 static const double most_way = 0.2, most_move_S = 0.2;
 /* of wild, and what is left of it after a sub-step without clamps */
 static const double most_wild = 8, calm = 0.98;
+/* of omega^2 while elements are turned over: what throws a corner about is the fastest motion, which near its limit is
+ * seen with up to twice its energy, velocities being those of half a sub-step before */
+static const double tangled2 = 3;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
 enum { PAUSE = 12, MOST_PAUSE = 96 };
@@ -359,6 +364,7 @@ static bool untangle(central *row, pal_step *step)
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
     if (seen & PAL_TANGLE_CHANGED) row->dt_s = 0;
+    row->tangled = seen & PAL_TANGLED;
     return seen & PAL_TANGLE_CHANGED;
 }
 
@@ -371,7 +377,8 @@ static double limit(void *self, pal_step *step)
     if (renew(row, body) || untangle(row, step)) row->known = false;
     if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
     if (step->sub == 0) find_contact(row, step);
-    const double lambda = row->rows2 + row->contact2, c = row->contact_1_s;
+    const double rows2 = row->tangled ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
+                 c = row->contact_1_s;
     row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->wild;
     return row->limit_s;
 }
@@ -494,6 +501,7 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     row->dt_s = 0;
     row->wild = 1;
+    row->tangled = false;
     row->known = false;
     row->n_unseen = UNSEEN;
 }
