@@ -155,7 +155,7 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     wait_steps(&c, 60, pressed);
     send(&c, "estimate", "\"on\":1");
     const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
-    for (int i = 0; i < 400 && !(e->tick > 0 && next_size(e)); i++) wait_steps(&c, 2, pressed);
+    for (int i = 0; i < 4000 && !(e->tick > 0 && next_size(e)); i++) wait_steps(&c, 2, pressed);
     const pal_wire_neighbour *next = next_size(e);
     REQUIRE(next);
     double now_m = e->error_m, then_m = next->error_m;
