@@ -260,7 +260,7 @@ static void what_makes_no_sense_is_refused_in_a_sentence(void)
 int main(void)
 {
     RUN(the_step_of_the_scene_is_the_one_that_is_swept);
-    RUN(a_full_organ_is_pressed);
+    RUN_LONG(a_full_organ_is_pressed);
     RUN(a_hollow_organ_is_pressed_and_pulled);
     RUN(cells_are_pressed);
     RUN(what_makes_no_sense_is_refused_in_a_sentence);

@@ -182,7 +182,7 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
  * pal_setting_nodes promises them */
 static void neighbours_are_what_a_switch_makes(void)
 {
-    for (int k = 0; k < 2; k++) {
+    for (int k = CHECK_REPEATS(0, 1); k < 2; k++) {
         pal_scene *from = fem_scene();
         pal_set_scene *set = NULL;
         pal_setting own;
