@@ -7,9 +7,9 @@
  * the least squares (numerics.md part 1 A), by conjugate gradients with a small pull to rest. Two solids of the same
  * control cells share their points to the bit; of two adaptive surfaces of one organ the new one refines where the old
  * one has, as far as it can.
- * Forces go the other way: those on old nodes are shared out to the new ones around them, so that no net force is lost;
- * where the new mesh is the finer one by the masses of all new nodes that look to the old one, so that they do not
- * gather in few nodes and unlike masses (springs of whole voxels, elements of cut ones) make them no larger.
+ * Forces go the other way: those on old nodes are shared out to the new ones around them by their masses as well, so
+ * that no net force is lost and nodes that are light (at the rim of cut elements) are not thrown; where the new mesh is
+ * the finer one to all new nodes that look to the old one, so that they do not gather in few.
  *
  * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
  * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),

@@ -289,18 +289,38 @@ static void add_spread(const pal_transfer *t, const pal_body *from, const pal_bo
     pal_row_end(rows);
 }
 
-/* t->spread: forces at old nodes -> at new ones, no net force is lost. To the new nodes around; where points carry the
- * nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that look to
- * the old one by their masses, so that they do not gather in few: of equal meshes' masses that is as accelerations */
+/* old node i's force to the new nodes around it, by their masses as well: light ones, at the rim of cut elements, would
+ * be thrown by what their heavy neighbours bear with ease */
+static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_row_build *rows)
+{
+    const pal_point_rows *back = &t->back;
+    double sum = 0;
+    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++)
+        sum += fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
+    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++) {
+        double share = fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
+        pal_row_add(rows, back->point[k], sum > 0 ? share / sum : back->weight[k]);
+    }
+    pal_row_end(rows);
+}
+
+/* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
+ * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
+ * look to the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
 static void find_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    bool lumped = t->shell || (!from->embed && from->n_node >= to->n_node);
+    bool lumped = !from->embed && from->n_node >= to->n_node;
     lookers l = {0};
     pal_row_build rows;
-    if (lumped || t->spread.n_row > 0) return;
-    if (find_lookers(&t->in, from->n_node, &l)) {
+    if (t->shell || t->spread.n_row > 0) return;
+    if (lumped || find_lookers(&t->in, from->n_node, &l)) {
         pal_row_build_begin(&rows, from->n_node, to->n_node, INT32_MAX);
-        for (int i = 0; i < from->n_node && !rows.err; i++) add_spread(t, from, to, &l, i, &rows);
+        for (int i = 0; i < from->n_node && !rows.err; i++) {
+            if (lumped)
+                add_by_mass(t, to, i, &rows);
+            else
+                add_spread(t, from, to, &l, i, &rows);
+        }
         (void)pal_row_build_finish(&rows, &t->spread);
     }
     free(l.first), free(l.who), free(l.weight);

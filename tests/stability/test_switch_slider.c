@@ -170,6 +170,9 @@ static void slide(pulled *p, uint64_t seed)
                   "slider under a pull: farthest move of the surface in a frame, over the "
                   "errors of both",
                   s.frame, 1, "");
+        /* light nodes at the rim of cut elements are not thrown */
+        HARD_CASE("switch", list[to].model, "slider under a pull: farthest move in a frame, of the way pulled",
+                  100 * s.frame * bound_m / pal_norm3(p->by_m), 10, "%");
         HARD_CASE("switch", list[to].model, "slider under a pull: longest edge over the longest without a switch",
                   s.edge / longest, 1.25, "");
         /* what was not let go yet is not lost at the next switch: nothing springs back */
