@@ -83,6 +83,7 @@ typedef struct pal_body {
     double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
     double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
     double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
+    double given_Pa;         /* E that springs stand for whose edges have constants of their own; 0: the material's */
     pal_rescues rescue;      /* since reset: what kept it within its bounds, and what that took         */
     char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
     /* extra drag, and for how long yet, after a change that puts work in (brake.h); 0: none */
@@ -133,6 +134,11 @@ static inline int pal_body_point(const pal_body *body, int k)
 static inline int pal_body_nodes(const pal_body *body)
 {
     return body->embed ? body->n_node : body->n_active;
+}
+/* load_cap_N of a body of this material: by what its edges are, where their constants are given */
+static inline double pal_body_cap_N(const pal_body *body, double young_Pa)
+{
+    return 10 * (body->given_Pa > 0 ? body->given_Pa : young_Pa) * body->h_m * body->h_m;
 }
 /* most of a lasting load that a node bears: load_cap_N, and of that the part that the node is of the corner of a full
  * voxel, or of a solid's mean cell, as a sliver is as much softer */

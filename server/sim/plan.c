@@ -136,7 +136,7 @@ static pal_err build_body(pal_wishes *s, const pal_scene *scene)
     PAL_TRY(hold(body, def, scene->up, s->build.note));
     if (body->solid) pal_solid_weigh(body);
     body->size_m = box_diagonal(body);
-    body->load_cap_N = 10 * def->material.young_Pa * body->h_m * body->h_m;
+    body->load_cap_N = pal_body_cap_N(body, def->material.young_Pa);
     if (body->tets || body->solid) body->corner_kg = def->material.density_kg_m3 * pow(body->h_m, 3) / 8;
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
     for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
@@ -302,6 +302,8 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_note *not
         for (int i = before; i < out->n_row; i++) row_byte += made[i].arena ? made[i].n_byte : 0;
         PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte + row_byte));
         for (int i = before; i < out->n_row; i++) made_body[i] = b;
+        /* rows of springs have said by now what they stand for */
+        out->body[b].load_cap_N = pal_body_cap_N(&out->body[b], scene->body[b].material.young_Pa);
         if (s->build.scratch_byte > out->scratch_byte) out->scratch_byte = s->build.scratch_byte;
     }
     out->row = PAL_NEW(arena, pal_row, out->n_row);

@@ -62,6 +62,18 @@ static double tet_volume(const pal_tets *tets, int t)
     return fabs(pal_dot3(e[0], n)) / 6;
 }
 
+static double inside_m3(const pal_body *body, int t)
+{
+    return tet_volume(body->tets, t) * (body->fill ? (double)body->fill[t] : 1);
+}
+
+double pal_spring_volume_m3(const pal_body *body)
+{
+    double sum = 0;
+    for (int t = 0; t < body->tets->n_tet; t++) sum += inside_m3(body, t);
+    return sum;
+}
+
 /* a spring by its nodes in ascending order, to find it from the tetrahedra around it */
 typedef struct known {
     int32_t node[4], item;
@@ -89,7 +101,7 @@ static void add_volumes(const pal_body *body, const double *share, const known *
 {
     const pal_tets *tets = body->tets;
     for (int t = 0; t < tets->n_tet; t++) {
-        double volume = tet_volume(tets, t) * (body->fill ? (double)body->fill[t] : 1) * (share ? share[t] : 1);
+        double volume = inside_m3(body, t) * (share ? share[t] : 1);
         for (unsigned set = 1; set < 16; set++) {
             if (__builtin_popcount(set) != n_corner) continue;
             int32_t node[4];

@@ -50,5 +50,7 @@ void pal_spring_on_grid(pal_spring *spring, const pal_spring_grid *grid, const p
                         int n_item, int n_corner, double *weight);
 /* constants at the body's nodes, J [n_node], before weights: a row's grid */
 void pal_spring_nodes(const pal_spring_grid *grid, pal_spring_kind kind, const pal_body *body, double *out_J);
+/* of all tetrahedra, of cut voxels what is inside */
+double pal_spring_volume_m3(const pal_body *body);
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material);
 #endif

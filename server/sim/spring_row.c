@@ -152,11 +152,13 @@ pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_mate
     return PAL_ERR_OK;
 }
 
-bool pal_springs_given(const pal_row *row, int n_row)
+double pal_spring_young_Pa(const pal_spring_row *row, const pal_body *body, double poisson)
 {
-    for (int i = 0; i < n_row; i++) {
-        const pal_spring_row *springs = row[i].effect->springs ? row[i].effect->springs(row[i].self) : NULL;
-        if (springs && springs->spring.given) return true;
+    double factor[3], sum_N_m = 0;
+    pal_spring_factors(poisson, row->spring.without_area, factor);
+    for (int i = 0; i < row->n_item; i++) {
+        const int lane = row->strips.place[i];
+        sum_N_m += row->spring.k_J * row->q[lane] * row->w[lane] * row->w[lane];
     }
-    return false;
+    return sum_N_m * body->h_m * body->h_m / (6 * factor[PAL_SPRING_DISTANCE] * pal_spring_volume_m3(body));
 }

@@ -40,8 +40,9 @@ pal_err pal_spring_row_make(pal_spring_kind kind, pal_item *entry, pal_build *bu
                             double least, pal_spring_row *out);
 /* least and most of the volumes of a row of these over those at rest, and 1, whatever springs are off; d [n_node][3] */
 void pal_spring_extremes(const pal_spring_row *row, pal_slots *slots, const double *d, double out[2]);
-/* do these FORCE rows have springs whose constants the scene gives, which no edit of the material changes? */
-bool pal_springs_given(const pal_row *row, int n_row);
+/* Young's modulus that a row of edges stands for, Pa: of a material whose derived constants (spring_law.h) have the
+ * same sum of stiffness over all edges, sum k q/l0^2 = 6 f_d E V/h^2; of derived ones without regions the material's */
+double pal_spring_young_Pa(const pal_spring_row *row, const pal_body *body, double poisson);
 /* a live edit: k_J, and with regions q too */
 pal_err pal_spring_row_material(void *self, const pal_body *body, const pal_material *material, pal_note *note);
 

@@ -8,7 +8,6 @@
 #include "server/sim/plan.h"
 #include "server/sim/shell.h"
 #include "server/sim/solid_body.h"
-#include "server/sim/spring_row.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -316,9 +315,7 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_n
         body->shell->options.mass_kg *= ratio;
         for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
     }
-    /* springs whose constants are given stay as they are, and so does what their nodes bear */
-    if (!pal_springs_given(w->plan.row + w->plan.first[PAL_STAGE_FORCE][b], w->plan.n_of[PAL_STAGE_FORCE][b]))
-        body->load_cap_N = 10 * to->young_Pa * body->h_m * body->h_m;
+    body->load_cap_N = pal_body_cap_N(body, to->young_Pa);
     body->corner_kg *= ratio;
     w->material[b] = *to;
     return PAL_ERR_OK;

@@ -1,6 +1,7 @@
 /* The world: what a scene becomes, how a step runs, what is refused, and that a step neither depends on its
  * surroundings nor touches the heap. */
 #include "server/sim/plan.h"
+#include "server/sim/spring_law.h"
 #include "server/sim/world.h"
 #include "tests/check.h"
 #include "tests/heap_calls.h"
@@ -448,24 +449,39 @@ static void a_sliver_bears_less_of_a_lasting_load(void)
     box_free(&box);
 }
 
-/* springs whose constants are given: an edit of E changes neither them nor what nodes bear */
-static void given_springs_bear_what_they_bore_after_an_edit_of_E(void)
+/* what nodes bear goes by the E that edges stand for: the material's where they are derived, whatever volumes are, and
+ * what was given where they are given, which no edit of E changes */
+static void nodes_of_springs_bear_what_their_edges_stand_for(void)
 {
-    for (int given = 0; given < 2; given++) {
-        pal_prepared box;
-        REQUIRE(!box_make(3, 3, 3, 0.01, &box));
-        pal_scene *scene = box_scene(&box, true, false);
-        if (given) pal_item_put_number(&scene->body[0].model, "k_distance_J", 1e-3, NULL);
-        pal_world *world;
-        REQUIRE(!pal_world_create(scene, &note, &world));
-        const double cap_N = pal_world_body(world, 0)->load_cap_N;
-        pal_material to = scene->body[0].material;
+    static const char *const key[] = {"k_distance_J", "k_area_J", "k_volume_J"};
+    static const struct {
+        int kind;      /* -1: none is given */
+        double times;  /* of the derived constant */
+        double cap[2]; /* over 10 E h^2, before and after E is four times as high */
+    } cases[] = {{-1, 0, {1, 4}},
+                 {PAL_SPRING_DISTANCE, 1, {1, 1}},
+                 {PAL_SPRING_DISTANCE, 3, {3, 3}},
+                 {PAL_SPRING_AREA, 3, {1, 4}},
+                 {PAL_SPRING_VOLUME, 3, {1, 4}}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        box_bench b;
+        double factor[3];
+        REQUIRE(box_bench_make(&b, (const int[3]){3, 4, 3}, 0.01, true, false));
+        pal_material to = b.scene->body[0].material;
+        pal_item *model = &b.scene->body[0].model;
+        const double unit_N = 10 * to.young_Pa * 1e-4;
+        pal_spring_factors(to.poisson, false, factor);
+        if (cases[k].kind >= 0) {
+            const double k_J = cases[k].times * factor[cases[k].kind] * to.young_Pa * 1e-6;
+            REQUIRE(!pal_item_put_number(model, key[cases[k].kind], k_J, NULL));
+            REQUIRE(!pal_item_put_text(model, "weights", "volume", NULL));
+        }
+        REQUIRE(box_bench_start(&b));
+        CHECK_NEAR(b.body->load_cap_N / unit_N, cases[k].cap[0], 1e-12 * cases[k].cap[0]);
         to.young_Pa *= 4;
-        REQUIRE(!pal_world_material(world, 0, &to, &note));
-        CHECK_NEAR(pal_world_body(world, 0)->load_cap_N / cap_N, given ? 1 : 4, 1e-12);
-        pal_world_destroy(world);
-        free(scene);
-        box_free(&box);
+        REQUIRE(!pal_world_material(b.world, 0, &to, &note));
+        CHECK_NEAR(b.body->load_cap_N / unit_N, cases[k].cap[1], 1e-12 * cases[k].cap[1]);
+        box_bench_close(&b);
     }
 }
 
@@ -485,6 +501,6 @@ int main(void)
     RUN(has_rows_only_for_what_the_scene_calls_for);
     RUN(spring_scenes_pay_nothing_for_finite_elements);
     RUN(a_sliver_bears_less_of_a_lasting_load);
-    RUN(given_springs_bear_what_they_bore_after_an_edit_of_E);
+    RUN(nodes_of_springs_bear_what_their_edges_stand_for);
     return check_report();
 }

@@ -50,6 +50,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         if (!e->node_J) return PAL_ERR_MEMORY;
         pal_spring_nodes(&build->def->spring_grid, PAL_SPRING_DISTANCE, build->body, e->node_J);
     }
+    if (e->row.spring.given)
+        build->body->given_Pa = pal_spring_young_Pa(&e->row, build->body, build->def->material.poisson);
     *self = e;
     return PAL_ERR_OK;
 }
