@@ -74,7 +74,8 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
     return sqrt(2) * fabs(pal_dot3(g, c)) / (mean2 * sqrt(mean2));
 }
 
-static void look_at_elements(const pal_body *body, pal_preflight_body *out)
+/* volumes: springs keep the volumes of tetrahedra */
+static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
     const pal_tets *tets = body->embed ? NULL : body->tets;
     const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->shell ? body->shell->levels.first_face[1] : 0;
@@ -86,7 +87,7 @@ static void look_at_elements(const pal_body *body, pal_preflight_body *out)
         double shape = shape_of(body->x_rest, corner, n, mean2);
         middle(body->x_rest, corner, n, at);
         if (shape < least_shape) weak(&out->flat, e, shape, at, body);
-        if (tets && !body->element) out->n_sliver += shape < PAL_SPRING_SLIVER;
+        if (tets && volumes) out->n_sliver += shape < PAL_SPRING_SLIVER;
     }
     int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
     const int32_t *element = body->element ? body->element : simplex;
@@ -310,12 +311,14 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
 {
     pal_body *body = pal_world_body(world, b);
     probe p = {.world = world, .body = body, .most_cg = most_cg};
+    bool volumes = false;
     for (int i = 0; i < pal_world_rows(world); i++) {
         const pal_row *row = pal_world_effect(world, i);
         pal_row_info info;
         pal_world_row(world, i, &info);
-        if (info.body == body->name && row->effect->stage == PAL_STAGE_FORCE && p.n_force < 32)
-            p.force[p.n_force++] = *row;
+        if (info.body != body->name || row->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
+        p.force[p.n_force++] = *row;
+        volumes = volumes || !strcmp(info.name, "tet_volume");
     }
     *out = (pal_preflight_body){.name = scene->body[b].name,
                                 .n_point = body->n_dof,
@@ -325,7 +328,7 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
                                 .limit_edge_m = INFINITY};
     out->n_sub = isfinite(out->limit_s) ? (int)ceil(scene->step_s / out->limit_s * (1 - 1e-12)) : 1;
     if (!find_limit_node(&p, out)) return PAL_ERR_MEMORY;
-    look_at_elements(body, out);
+    look_at_elements(body, volumes, out);
     look_at_masses(body, out);
     if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
     out->foreseen_ms = foresee_ms(&p, body, out->n_sub, b);

@@ -23,7 +23,7 @@ typedef struct pal_preflight_body {
     int limit_node;
     double limit_at_m[3], limit_edge_m, limit_mass_kg; /* its place, shortest edge and mass */
     pal_weak flat;  /* tetrahedra or triangles of shape below 0.1 (1: regular), value: shape; 0: no volume or area */
-    int n_sliver;   /* of these the tetrahedra whose volume springs leave out (effects/tet_volume.c)              */
+    int n_sliver;   /* of these the tetrahedra whose volume a row tet_volume leaves out; 0 without such a row     */
     pal_weak edge;  /* edges shorter than 1e-6 S, value: m                                                       */
     pal_weak thin;  /* elements filled by less than 5 %, value: share                                            */
     pal_weak light; /* points lighter than 1/1000 of the mean, value: kg                                         */

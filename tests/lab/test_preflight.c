@@ -45,6 +45,10 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     bool told = false;
     for (int i = 0; i < n_line; i++) told |= strstr(line[i], "springs leave the volume out") != NULL;
     CHECK(told);
+    /* without a row of volumes they are no slivers to anybody */
+    pal_item_put_number(&scene->body[0].model, "k_volume_J", 0, NULL);
+    REQUIRE(!pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &p, &note));
+    CHECK(p.body[0].n_sliver == 0 && p.body[0].flat.n > 0);
     free(scene);
     box_free(&box);
 }
