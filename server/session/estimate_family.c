@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,6 +16,8 @@ enum { MOST_NODES = 16000, PROBES = 600, LEAST_SIZE = 4, MOST_SIZE = 400, MOST_F
 /* MOST_FINER: finest mesh over this one; a mesh so much coarser than the finest can be told from it; order of those
  * that cannot, and the mean of that and of what half and this size show */
 static const double told_apart = 1.35, order = 2, far_order = 1.75, least_ratio = 0.02, most_times = 20;
+/* the factors that were observed, with finest meshes of so many times the voxels and without any */
+static const double observed = 2, observed_finer = 2, without = 3;
 /* cosine of two loads from which on what was measured under one is taken for the other; times that measuring took, to
  * wait before the next */
 static const double same_loads = 0.8, waits = 20;
@@ -35,6 +38,7 @@ typedef struct family {
     const pal_surface *surface;
     bool fits;
     int stride, n_probe; /* every so many vertices of the surface */
+    int n_mesh;          /* solved so far */
 } family;
 
 /* ---- sizes ---- */
@@ -84,9 +88,10 @@ static bool stopped(const family *f)
 }
 
 /* size 0: merged voxels; that of the setting: the body's own mesh */
-static bool solve(const family *f, int size, sized *m)
+static bool solve(family *f, int size, sized *m)
 {
     if (stopped(f)) return false;
+    f->n_mesh++;
     pal_err err = size == 0                  ? pal_rest_coarser(f->scene, f->body, NULL, "linear", NULL, &m->rest)
                   : size == f->setting->size ? pal_rest_make(f->scene, f->body, NULL, "linear", NULL, &m->rest)
                                              : pal_rest_sized(f->scene, f->body, f->setting, size, "linear", &m->rest);
@@ -108,53 +113,77 @@ static double between(const family *f, const sized *a, const sized *b)
     return most;
 }
 
+/* of the finest mesh, that of a mesh of `size` being 1 */
+static double share_of(int size, int finest)
+{
+    return pow((double)size / finest, order);
+}
+
 /* The distance of two meshes is the difference of errors of the same sign, and what is random of them (which voxels are
- * cut, and how) adds up in squares: the geometric mean of what either says. NaN: no such mesh, or too near to the
- * finest
- */
-static double left(const family *f, int size, const sized *finest)
+ * cut, and how) adds up in squares: the geometric mean of what either says */
+static double left(const family *f, const sized *m, const sized *finest)
+{
+    const double share = share_of(m->size, finest->size);
+    return between(f, m, finest) / sqrt((1 - share) * sqrt(1 + share * share));
+}
+
+/* NaN: no such mesh, or too near to the finest */
+static double left_in(family *f, int size, const sized *finest)
 {
     sized m = {.u = NULL};
-    double error = NAN, share = pow((double)size / finest->size, order);
-    if (size >= LEAST_SIZE && finest->size >= told_apart * size && solve(f, size, &m))
-        error = between(f, &m, finest) / sqrt((1 - share) * sqrt(1 + share * share));
+    double error = NAN;
+    if (size >= LEAST_SIZE && finest->size >= told_apart * size && solve(f, size, &m)) error = left(f, &m, finest);
     sized_free(&m);
     return error;
 }
 
-/* from merged voxels to this mesh */
-static double change(const family *f, bool shown)
+/* either way over their geometric mean */
+static double ambiguity(double finer)
 {
-    sized own = {.u = NULL}, merged = {.u = NULL};
+    const double share = pow(finer, -order);
+    return sqrt(sqrt(1 + share * share) / (1 - share));
+}
+
+/* from merged voxels to this mesh */
+static double change(family *f, const sized *own, bool shown)
+{
+    sized merged = {.u = NULL};
     double most = 0;
-    bool good = solve(f, f->setting->size, &own) && solve(f, 0, &merged);
-    if (good && shown) most = between(f, &own, &merged);
+    const bool good = solve(f, 0, &merged);
+    if (good && shown) most = between(f, own, &merged);
     if (good && !shown)
         for (int k = 0; k < merged.rest.n_common; k++) {
             size_t i = 3 * (size_t)merged.rest.common[k];
-            most = fmax(most, pal_dist3(own.rest.x + i, merged.rest.x + i));
+            most = fmax(most, pal_dist3(own->rest.x + i, merged.rest.x + i));
         }
-    sized_free(&own), sized_free(&merged);
+    sized_free(&merged);
     return most;
 }
 
-static void measure(family *f, bool shown, pal_family *out)
+static void measure(family *f, bool shown, pal_estimate_family *out)
 {
-    sized finest = {.u = NULL};
-    int size = f->setting->size, r = finest_size(f);
+    sized finest = {.u = NULL}, own = {.u = NULL};
+    const int size = f->setting->size, r = finest_size(f);
+    double error = 0, last = 0;
     out->known = false;
     if (r > 0 && solve(f, r, &finest)) {
-        pal_rest_free(&finest.rest); /* its places are kept, its factor is the largest thing here */
-        double own = left(f, size, &finest), last = change(f, shown);
-        if (own > 0 && last > 0) {
-            out->times = fmin(fmax(own / last, 1 / most_times), most_times);
-            out->half = left(f, size / 2, &finest) / own;
-            out->twice = left(f, 2 * size, &finest) / own;
-            double seen = out->half > 0 ? 0.5 * (far_order + log2(out->half)) : far_order;
-            out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, least_ratio);
-            out->finest = r, out->known = !stopped(f);
-        }
+        pal_rest_free(&finest.rest); /* its places are kept, it is the largest thing here */
+        if (solve(f, size, &own)) error = left(f, &own, &finest), last = change(f, &own, shown);
     }
+    sized_free(&own);
+    if (error > 0 && last > 0) {
+        const double finer = (double)r / size;
+        out->times = fmin(fmax(error / last, 1 / most_times), most_times);
+        out->good_to = observed * fmax(1, ambiguity(finer) / ambiguity(observed_finer));
+        if (out->times != error / last) out->good_to = INFINITY;
+        out->half = left_in(f, size / 2, &finest) / error;
+        out->twice = left_in(f, 2 * size, &finest) / error;
+        double seen = out->half > 0 ? 0.5 * (far_order + log2(out->half)) : far_order;
+        out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, least_ratio);
+        out->finest = r, out->known = !stopped(f);
+    }
+    out->n_measured++;
+    out->n_mesh += f->n_mesh;
     sized_free(&finest);
 }
 
@@ -177,36 +206,56 @@ static double cosine(const double *a, const double *b, int n)
     return sum;
 }
 
-void pal_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
-                        const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
-                        pal_family *out)
+/* is what was measured under `loads` of one material good for the other? Moduli that are the same everywhere cancel */
+static bool is_same(const family *f, const pal_estimate_family *of, const double *loads)
+{
+    const pal_material *now = &f->state->material;
+    const bool regions = f->scene->body[0].n_region > 0;
+    return of->loads && cosine(loads, of->loads, 3 * f->state->n_node) > same_loads &&
+           now->poisson == of->material.poisson && (!regions || now->young_Pa == of->material.young_Pa);
+}
+
+bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
+                                 const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
+                                 pal_estimate_family *out)
 {
     const pal_surface *surface = &scene->body[0].mesh->surface;
-    family f = {scene, body, setting, state, stop, surface, fits, 1 + surface->n_vertex / PROBES, 0};
+    family f = {scene, body, setting, state, stop, surface, fits, 1 + surface->n_vertex / PROBES, 0, 0};
     double began = pal_clock_s();
     f.n_probe = surface->n_vertex / f.stride;
-    if (setting->size < LEAST_SIZE || f.n_probe < 1 || scene->body[0].cells || began < out->next_s) return;
+    if (setting->size < LEAST_SIZE || f.n_probe < 1 || scene->body[0].cells) return false;
     double *now = malloc(3 * sizeof *now * (size_t)state->n_node);
-    if (!now || !take_loads(body, state, now) ||
-        (out->loads && cosine(now, out->loads, 3 * state->n_node) > same_loads)) {
+    const bool loaded = now && take_loads(body, state, now), same = loaded && is_same(&f, out, now);
+    if (!loaded || same || began < out->next_s) {
         free(now);
-        return;
+        return out->known && same;
     }
-    /* hundreds of megabytes: bodies that are watched at the same time wait for one another */
+    /* bodies that are watched at the same time wait for one another */
     if (atomic_flag_test_and_set_explicit(&busy, memory_order_acquire)) {
         out->next_s = began + 1;
         free(now);
-        return;
+        return false;
     }
     free(out->loads);
     out->loads = now;
+    out->material = state->material;
     measure(&f, shown, out);
     atomic_flag_clear_explicit(&busy, memory_order_release);
     double end = pal_clock_s();
     out->next_s = end + waits * (end - began);
+    return out->known;
 }
 
-void pal_family_free(pal_family *of)
+void pal_estimate_family_say(const pal_estimate_family *f, bool fresh, char *text, size_t n_byte)
+{
+    const double good_to = !f->known ? without : fresh ? f->good_to : fmax(f->good_to, without);
+    if (isfinite(good_to))
+        snprintf(text, n_byte, "many voxels are cut: good to a factor of %.2g", good_to);
+    else
+        snprintf(text, n_byte, "many voxels are cut: no factor is known that it is good to");
+}
+
+void pal_estimate_family_free(pal_estimate_family *of)
 {
     free(of->loads);
     of->loads = NULL;

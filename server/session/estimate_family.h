@@ -23,22 +23,33 @@
 #define PAL_SESSION_ESTIMATE_FAMILY_H
 #include "server/session/estimate_rest.h"
 
-typedef struct pal_family {
+typedef struct pal_estimate_family {
     bool known;
     double times;       /* error left over the change from merged voxels to this mesh                                 */
     double half, twice; /* error of half and of twice as many voxels over this mesh's; NaN: none so coarse */
     int finest;         /* voxels of the finest mesh */
-    /* what it was measured under, [n_node][3] of length 1, and the clock from which on it may be measured again */
+    /* `times` is good to this factor: 2 as it was observed with twice as many voxels in the finest mesh, more where
+     * that has fewer, by what the two ways in which errors may add up differ by then; INFINITY: it is beyond what is
+     * told */
+    double good_to;
+    /* what it was measured under: loads [n_node][3] of length 1, and the material; the clock from which on it may be
+     * measured again; how often it was, and how many meshes were solved for that */
     double *loads, next_s;
-} pal_family;
+    pal_material material;
+    int n_measured, n_mesh;
+} pal_estimate_family;
 
-/* Measures it, the first time; again where loads are others, as soon as it has waited 20 times as long as that took.
- * scene: of one body of model fem, without tools; body: the running one, as made from it; setting: as it is; state:
- * what it bears; shown: `times` is of changes at vertices of the shown surface, else at nodes; fits:
- * voxels fit the body, so that only whole multiples of their number do; out: begins zeroed.
- * Stays unknown where this body has no such meshes (no surface, finer ones too large, no rest) or it was stopped */
-void pal_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
-                        const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
-                        pal_family *out);
-void pal_family_free(pal_family *family); /* a zeroed one is fine */
+/* Measures it, the first time; again where loads or Poisson's ratio are others (of bodies with regions: E, too), as
+ * soon as it has waited 20 times as long as that took. True: it is of what the state says; false: of what was before,
+ * or not known. scene: of one body of model fem, without tools; body: the running one, as made from it; setting: as it
+ * is; state: what it bears; shown: `times` is of changes at vertices of the shown surface, else at nodes; fits: voxels
+ * fit the body, so that only whole multiples of their number do; out: begins zeroed. Stays unknown where this body has
+ * no such meshes (no surface, finer ones too large, no rest) or it was stopped */
+bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
+                                 const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
+                                 pal_estimate_family *out);
+/* one clause on what the error of many cut voxels is good to: 3 was observed without a family. fresh: as refresh said
+ */
+void pal_estimate_family_say(const pal_estimate_family *family, bool fresh, char *text, size_t n_byte);
+void pal_estimate_family_free(pal_estimate_family *family); /* a zeroed one is fine */
 #endif

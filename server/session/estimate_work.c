@@ -44,9 +44,9 @@ struct pal_estimate_work {
     pal_rest fine, coarse, coarsest, model; /* world NULL: there is none */
     pal_estimate_shown shown;               /* n 0: nothing is, or nodes are */
     pal_foresight foresight;
-    pal_family family; /* of cut voxels */
-    bool priced;       /* what more nodes cost has been measured, or cannot be */
-    double awake_ms;   /* of a step of a body that was never seen awake; 0: not measured yet */
+    pal_estimate_family family; /* of cut voxels */
+    bool priced;                /* what more nodes cost has been measured, or cannot be */
+    double awake_ms;            /* of a step of a body that was never seen awake; 0: not measured yet */
     char note[160];
 };
 
@@ -313,7 +313,7 @@ void pal_estimate_work_close(pal_estimate_work *w)
     free(w->scene), free(w->exact_scene);
     free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.outer), free(w->state.borne);
     free(w->first), free(w->second);
-    pal_family_free(&w->family);
+    pal_estimate_family_free(&w->family);
     free(w);
 }
 
@@ -554,6 +554,7 @@ static double skin_off(pal_estimate_work *w)
 static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
     pal_zz zz;
+    bool fresh = false;
     if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->zz_percent = zz.percent;
     if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) {
         if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
@@ -562,13 +563,15 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
     double last = w->shown.n > 0 ? pal_estimate_shown_change(&w->shown, PAL_SHOWN_FINE, PAL_SHOWN_COARSE)
                                  : change(&w->fine, &w->coarse);
     if ((w->cut || w->thin) && !w->springs)
-        pal_family_refresh(w->scene, body, &w->foresight.setting, &w->state, w->shown.n > 0, !w->cut, w->stop,
-                           &w->family);
-    const pal_family *f = &w->family;
+        fresh = pal_estimate_family_refresh(w->scene, body, &w->foresight.setting, &w->state, w->shown.n > 0, !w->cut,
+                                            w->stop, &w->family);
+    const pal_estimate_family *f = &w->family;
     w->foresight.left[0] = f->known ? known(f->half) : 0, w->foresight.left[1] = f->known ? known(f->twice) : 0;
-    if (w->cut)
-        tell(out,
-             f->known ? "many voxels are cut: good to a factor of 2" : "many voxels are cut: good to a factor of 3");
+    if (w->cut) {
+        char text[80];
+        pal_estimate_family_say(f, fresh, text, sizeof text);
+        tell(out, text);
+    }
     if (f->known) {
         w->foresight.order = usual_order;
         out->discretisation_m = last * f->times + skin_off(w);

@@ -1,5 +1,6 @@
 /* What estimates say, on the thread that asks: the parts of the error, neighbours on the knobs, what is not known. The
  * thread that makes them beside a session: test_estimate. */
+#include "server/session/estimate_family.h"
 #include "server/session/estimate_foresee.h"
 #include "server/session/estimate_work.h"
 #include "server/session/switching.h"
@@ -445,6 +446,56 @@ static void a_body_at_rest_has_no_error(void)
     free(fem);
 }
 
+/* meshes of other sizes are made once for a load and Poisson's ratio: E and what is borne cancel, the ratio does not.
+ * Five at most are solved: the finest, this one, merged voxels, half and twice */
+static void other_sizes_are_measured_anew_where_the_answer_is_another(void)
+{
+    pal_scene *fem = fem_scene();
+    fem->body[0].output.name[0] = 0;
+    pal_world *w = swinging(fem, 0);
+    const pal_body *body = pal_world_look(w, 0);
+    pal_estimate_work *work = NULL;
+    pal_estimate_family f = {.known = false};
+    pal_setting setting;
+    pal_setting_of(fem, 0, &setting);
+    REQUIRE(!pal_estimate_work_open(fem, 0, NULL, NULL, &work));
+    pal_estimate_state *s = pal_estimate_work_state(work);
+    REQUIRE(pal_estimate_copy(s, w, 0));
+    for (int i = 0; i < 3 * s->n_node; i++) s->borne[i] = i % 3 == 0 ? 1e-5 * body->node_mass_kg[i / 3] : 0;
+    const pal_material is = s->material;
+    static const struct {
+        double young, poisson, load; /* times what it is */
+        int n;                       /* measured until then */
+    } edits[] = {{1, 1, 1, 1}, {1, 1, 3, 1}, {10, 1, 1, 1}, {1, 0.8, 1, 2}, {1, 0.8, 1, 2}, {1, 1, 1, 3}};
+    double times[3] = {0};
+    for (size_t k = 0; k < sizeof edits / sizeof *edits; k++) {
+        s->material = is, f.next_s = 0;
+        s->material.young_Pa *= edits[k].young, s->material.poisson *= edits[k].poisson;
+        for (int i = 0; i < 3 * s->n_node; i++) s->borne[i] *= edits[k].load;
+        CHECK(pal_estimate_family_refresh(fem, body, &setting, s, false, false, NULL, &f));
+        CHECK_INT(f.n_measured, edits[k].n);
+        times[f.n_measured - 1] = f.times;
+    }
+    printf("  %d voxels against %d: error %.3g, then %.3g of the change; %d meshes in %d times, good to %.2g\n",
+           setting.size, f.finest, times[0], times[1], f.n_mesh, f.n_measured, f.good_to);
+    CHECK_LE(f.n_mesh, 5 * f.n_measured);
+    CHECK(times[1] != times[0]);
+    CHECK_NEAR(times[2] / times[0], 1, 1e-4);
+    /* before it may be measured again, what is there is of something else, and said to be worse */
+    char text[2][80];
+    s->material.poisson *= 0.9, f.next_s = INFINITY;
+    CHECK(!pal_estimate_family_refresh(fem, body, &setting, s, false, false, NULL, &f));
+    CHECK_INT(f.n_measured, 3);
+    f.good_to = 2.4;
+    pal_estimate_family_say(&f, true, text[0], sizeof text[0]),
+        pal_estimate_family_say(&f, false, text[1], sizeof text[1]);
+    CHECK(strstr(text[0], "a factor of 2.4") && strstr(text[1], "a factor of 3"));
+    pal_estimate_family_free(&f);
+    pal_estimate_work_close(work);
+    pal_world_destroy(w);
+    free(fem);
+}
+
 int main(void)
 {
     if (!estimate_scene(8)) return 1;
@@ -462,6 +513,9 @@ int main(void)
     RUN(a_body_let_go_errs_as_it_did_under_load);
     RUN(what_rounding_moved_has_no_error);
     RUN(a_sleeping_body_is_priced_awake);
+    pal_prepared_free(&mesh);
+    if (!estimate_scene(4)) return 1;
+    RUN(other_sizes_are_measured_anew_where_the_answer_is_another);
     pal_prepared_free(&mesh);
     return check_report();
 }
