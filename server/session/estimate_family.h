@@ -17,8 +17,9 @@
  * Of two voxels across, merged ones are one, which B-bar leaves next to nothing to bend with: a beam's error was told 8
  * times too large.
  *
- * Private to estimate_*.c. Heap memory, slow: most of it is the factor of the finest mesh, up to two seconds and, while
- * it lasts, 800 MB. Thread: one at a time. */
+ * Private to estimate_*.c. Heap memory, up to 80 MB while it lasts, as meshes of many nodes are solved without a factor
+ * (estimate_rest.h); slow: half a second of an organ of 20 voxels, three of a nearly incompressible one. Thread: one at
+ * a time. */
 #ifndef PAL_SESSION_ESTIMATE_FAMILY_H
 #define PAL_SESSION_ESTIMATE_FAMILY_H
 #include "server/session/estimate_rest.h"

@@ -15,7 +15,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEWTON_A_STEP = 3, MOST_STEPS = 30, LEAST_HEXES = 4, MORE_PRESSES = 2 };
+enum {
+    NEWTON_A_STEP = 3,
+    MOST_STEPS = 30,
+    LEAST_HEXES = 4,
+    MORE_PRESSES = 2,
+    MANY_NODES = 4000,
+    MOST_GRADIENTS = 3000
+};
 /* near enough in the work of contact; times that its loads are taken more or less at most, in one go */
 #define SAME_PRESS 0.05
 #define MOST_PART  5.0
@@ -48,6 +55,14 @@ static pal_err make_scene(const pal_scene *scene, const char *element, const cha
     pal_item_init(&def->solver, "solver", "static_newton");
     PAL_TRY(pal_item_put_number(&def->solver, "tolerance", rest_tolerance, note));
     return pal_item_put_number(&def->solver, "newton", NEWTON_A_STEP, note);
+}
+
+/* a factor of many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
+static pal_err spare_memory(pal_scene *scene)
+{
+    pal_item *solver = &scene->body[0].solver;
+    PAL_TRY(pal_item_put_text(solver, "linear", "incomplete", NULL));
+    return pal_item_put_number(solver, "iterations", MOST_GRADIENTS, NULL);
 }
 
 /* the lowest part as a box where `up` is an axis, so that it is the same part of every mesh */
@@ -283,6 +298,7 @@ pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_s
     PAL_TRY(pal_setting_make(scene, 0, &to, NULL, &set));
     pal_err err = make_scene(&set->scene, NULL, law, NULL, out);
     if (!err && set->mesh.tets.n_node == 0) err = PAL_ERR_REFUSED;
+    if (!err && set->mesh.tets.n_node > MANY_NODES) err = spare_memory(out->scene);
     if (!err) {
         out->mesh = set->mesh;
         memset(&set->mesh, 0, sizeof set->mesh);

@@ -1,5 +1,7 @@
 /* Sparse Cholesky factors: against a dense solve, with held points, of every scale, refused, refreshed beside. */
 #include "server/num/cholesky.h"
+#include "server/num/conjugate.h"
+#include "server/num/incomplete.h"
 #include "server/num/shape.h"
 #include "tests/check.h"
 
@@ -554,6 +556,110 @@ static void survives_every_request_for_memory_that_fails(void)
     pal_arena_destroy(g.arena);
 }
 
+/* without its matrix' blocks left and right of the diagonal's neighbours there is no fill: the incomplete factor is one
+ */
+static void an_incomplete_factor_without_fill_is_whole(void)
+{
+    grid g = make_grid(40, 1, 1);
+    fill_grid(&g, 1e9, 0.1, 5, NULL);
+    /* lines of nodes along x alone */
+    for (int j = 0; j < g.n; j++)
+        for (int k = g.a.start[j]; k < g.a.start[j + 1]; k++)
+            for (int c = 0; c < 9 && g.a.row[k] > j + 1; c++) g.a.value[9 * (size_t)k + (size_t)c] = 0;
+    double *b = calloc(3 * (size_t)g.n, sizeof *b), *x = calloc(3 * (size_t)g.n, sizeof *x);
+    for (int i = 0; i < 3 * g.n; i++) b[i] = draw();
+    pal_incomplete f;
+    REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+    CHECK_NEAR(f.shift, 0, 0);
+    pal_incomplete_solve(&f, b, x);
+    CHECK_LE(residual(&g, g.held, x, b), 1e-6);
+    free(b), free(x);
+    pal_arena_destroy(g.arena);
+}
+
+typedef struct gradients {
+    const grid *g;
+    const pal_incomplete *f; /* NULL: the diagonal alone */
+} gradients;
+
+static void multiply(void *user, const double *p, double *out)
+{
+    const gradients *of = user;
+    memset(out, 0, 3 * sizeof *out * (size_t)of->g->n);
+    pal_blocks_multiply(&of->g->a, 1, p, out);
+    for (int i = 0; i < 3 * of->g->n; i++) out[i] = of->g->held[i / 3] ? 0 : out[i];
+}
+
+static void precondition(void *user, const double *r, double *out)
+{
+    const gradients *of = user;
+    if (of->f) {
+        pal_incomplete_solve(of->f, r, out);
+        return;
+    }
+    for (int i = 0; i < 3 * of->g->n; i++)
+        out[i] =
+            of->g->held[i / 3] ? 0 : r[i] / of->g->a.value[9 * (size_t)of->g->a.start[i / 3] + 4 * (size_t)(i % 3)];
+}
+
+static int iterations(const grid *g, const pal_incomplete *f, const double *b, double *x)
+{
+    double *room = calloc(12 * (size_t)g->n, sizeof *room), *r = room, size = 0;
+    const size_t n = 3 * (size_t)g->n;
+    for (size_t i = 0; i < n; i++) r[i] = g->held[i / 3] ? 0 : b[i], size += r[i] * r[i], x[i] = 0;
+    gradients of = {g, f};
+    pal_conjugate cg = {(int)n, multiply, precondition, &of, r, room + n, room + 2 * n, room + 3 * n, -1};
+    const int turns = pal_conjugate_run(&cg, x, 1e-8 * sqrt(size), 1, 5000);
+    free(room);
+    return turns;
+}
+
+static double every_third_is_soft(int hex)
+{
+    return hex % 3 ? 1 : 0.02;
+}
+
+/* bars, nearly incompressible too, and with soft voxels in them as cut ones are */
+static void conjugate_gradients_gain_from_an_incomplete_factor(void)
+{
+    static const struct {
+        double kappa;
+        double (*factor)(int hex);
+    } body[] = {{2, NULL}, {50, NULL}, {5, every_third_is_soft}};
+    grid g = make_grid(24, 6, 6);
+    double *b = calloc(3 * (size_t)g.n, sizeof *b), *x = calloc(3 * (size_t)g.n, sizeof *x);
+    for (int i = 0; i < 3 * g.n; i++) b[i] = 1e-5 * draw();
+    for (size_t k = 0; k < sizeof body / sizeof *body; k++) {
+        pal_incomplete f;
+        fill_grid(&g, 3e4, 0, body[k].kappa, body[k].factor);
+        REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+        const int diagonal = iterations(&g, NULL, b, x), incomplete = iterations(&g, &f, b, x);
+        printf("  kappa %g%s: %d iterations, %d by the diagonal; shift %.2g\n", body[k].kappa,
+               body[k].factor ? ", soft voxels" : "", incomplete, diagonal, f.shift);
+        CHECK_LE(residual(&g, g.held, x, b), 1e-8);
+        CHECK_LE(2 * incomplete, diagonal);
+    }
+    free(b), free(x);
+    pal_arena_destroy(g.arena);
+}
+
+static void an_incomplete_factor_refuses_what_has_none(void)
+{
+    grid g = make_grid(3, 2, 2);
+    pal_incomplete f;
+    fill_grid(&g, 1, 0, 5, NULL);
+    REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+    const int last = g.n - 1; /* not held */
+    double *v = g.a.value + 9 * (size_t)g.a.start[last], was = v[4];
+    v[4] = -1;
+    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_NUMERIC);
+    v[4] = NAN;
+    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_NUMERIC);
+    v[4] = was;
+    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_OK);
+    pal_arena_destroy(g.arena);
+}
+
 int main(void)
 {
     RUN(agrees_with_a_dense_solve_of_random_matrices);
@@ -569,5 +675,8 @@ int main(void)
     RUN(keeps_the_old_factor_when_a_refresh_fails);
     RUN(factors_on_the_threads_it_was_called_on);
     RUN(survives_every_request_for_memory_that_fails);
+    RUN(an_incomplete_factor_without_fill_is_whole);
+    RUN(conjugate_gradients_gain_from_an_incomplete_factor);
+    RUN(an_incomplete_factor_refuses_what_has_none);
     return check_report();
 }

@@ -496,6 +496,32 @@ static void other_sizes_are_measured_anew_where_the_answer_is_another(void)
     free(fem);
 }
 
+/* of many nodes there is no factor, which would take a hundred megabytes and more */
+static void meshes_of_many_nodes_have_no_factor(void)
+{
+    pal_scene *fem = fem_scene();
+    pal_world *w = swinging(fem, 0);
+    pal_setting setting;
+    pal_setting_of(fem, 0, &setting);
+    static const int size[] = {8, 20};
+    for (int k = 0; k < 2; k++) {
+        pal_rest rest;
+        pal_solve_report report;
+        REQUIRE(!pal_rest_sized(fem, pal_world_look(w, 0), &setting, size[k], "linear", &rest));
+        pal_world_solve_report(rest.world, 0, &report);
+        const int n_node = pal_world_look(rest.world, 0)->n_node;
+        printf("  %d nodes: %lld numbers in a factor, %.1f MB\n", n_node, (long long)report.factor_nonzeros,
+               1e-6 * (double)pal_world_bytes(rest.world));
+        CHECK(k ? n_node > 4000 : n_node < 4000);
+        CHECK(k ? report.factor_nonzeros == 0 : report.factor_nonzeros > 0);
+        /* 14 blocks of 3x3 a node in double and in single precision are 1.5 KB */
+        CHECK_LE((double)pal_world_bytes(rest.world), 4e3 * n_node + 2e6);
+        pal_rest_free(&rest);
+    }
+    pal_world_destroy(w);
+    free(fem);
+}
+
 int main(void)
 {
     if (!estimate_scene(8)) return 1;
@@ -515,6 +541,7 @@ int main(void)
     RUN(a_sleeping_body_is_priced_awake);
     pal_prepared_free(&mesh);
     if (!estimate_scene(4)) return 1;
+    RUN(meshes_of_many_nodes_have_no_factor);
     RUN(other_sizes_are_measured_anew_where_the_answer_is_another);
     pal_prepared_free(&mesh);
     return check_report();

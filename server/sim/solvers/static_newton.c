@@ -7,7 +7,10 @@
  *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
  *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
  *           made of the present K before the next; where that happens again at once, before every one until an
- *           iteration leaves a tenth of the residual or less.
+ *           iteration leaves a tenth of the residual or less,
+ *   incomplete: by conjugate gradients with an incomplete factor of K (num/incomplete.h), of K as it is in every
+ *           iteration: a tenth of the memory or less, for bodies of many nodes; many more iterations the more nearly
+ *           incompressible and the thinner the body is.
  * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
  * of forces along each direction, system.h) by conjugate gradients with the same factor (truncated Newton; Nash 2000):
  * half the iterations or fewer on a bent beam. Where that meets a direction of no positive curvature before it has
@@ -26,7 +29,7 @@
  * motion is taken out of every d.
  *
  * A body whose nodes are carried by control points (body.h, embed) is solved for the points by pcg, its factor being of
- * the matrix at rest as embedded.h finds it; `direct` and inertia relief are refused.
+ * the matrix at rest as embedded.h finds it; `direct`, `incomplete` and inertia relief are refused.
  *
  * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3: residual
  * of conjugate gradients over that of the iteration, for laws that are not linear), iterations (500, of one solve).
@@ -34,6 +37,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
+#include "server/num/incomplete.h"
 #include "server/sim/compliance.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/relief.h"
@@ -42,7 +46,7 @@
 #include <limits.h>
 #include <string.h>
 
-typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG } linear_kind;
+typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG, LINEAR_INCOMPLETE } linear_kind;
 
 typedef struct static_newton {
     double tolerance, cg_tolerance;
@@ -53,6 +57,7 @@ typedef struct static_newton {
     pal_blocks blocks;
     pal_turns turns;
     pal_warp warp;
+    pal_incomplete incomplete; /* in place of the warp's factor */
     pal_answer answer;
     pal_conjugate cg;
     pal_relief relief;
@@ -101,13 +106,15 @@ static pal_err read_choice(pal_item *item, const pal_build *build, const char *k
             *out = i;
             return PAL_ERR_OK;
         }
-    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s", item->path, key, text,
-                        names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "");
+    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s%s%s", item->path, key, text,
+                        names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "", n > 3 ? ", " : "",
+                        n > 3 ? names[3] : "");
 }
 
 static pal_err read_keys(pal_item *item, const pal_build *build, static_newton *row)
 {
-    static const char *const linear[] = {"auto", "direct", "pcg"}, *const rigid[] = {"refuse", "inertia_relief"};
+    static const char *const linear[] = {"auto", "direct", "pcg", "incomplete"}, *const rigid[] = {"refuse",
+                                                                                                   "inertia_relief"};
     int kind = 0, relieved = 0;
     row->tolerance = 1e-8, row->cg_tolerance = 1e-3;
     row->newton = 50, row->load_steps = 1, row->iterations = 500;
@@ -116,7 +123,7 @@ static pal_err read_keys(pal_item *item, const pal_build *build, static_newton *
     PAL_TRY(pal_item_count(item, "newton", 1, 100000, &row->newton, build->note));
     PAL_TRY(pal_item_count(item, "load_steps", 1, 10000, &row->load_steps, build->note));
     PAL_TRY(pal_item_count(item, "iterations", 1, 100000, &row->iterations, build->note));
-    PAL_TRY(read_choice(item, build, "linear", linear, 3, &kind));
+    PAL_TRY(read_choice(item, build, "linear", linear, 4, &kind));
     PAL_TRY(read_choice(item, build, "free", rigid, 2, &relieved));
     PAL_TRY(pal_item_done(item, build->note));
     row->linear = (linear_kind)kind;
@@ -146,7 +153,11 @@ static void multiply_true(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_warp_solve(&((static_newton *)user)->warp, r, z);
+    static_newton *row = user;
+    if (row->linear == LINEAR_INCOMPLETE)
+        pal_incomplete_solve(&row->incomplete, r, z);
+    else
+        pal_warp_solve(&row->warp, r, z);
 }
 
 static pal_err make_arrays(static_newton *row, pal_arena *arena)
@@ -192,7 +203,8 @@ static pal_err factor(static_newton *row)
 {
     if (row->system.embedded) probe(row);
     assemble(row);
-    PAL_TRY(pal_warp_factor(&row->warp, &row->blocks));
+    PAL_TRY(row->linear == LINEAR_INCOMPLETE ? pal_incomplete_factor(&row->incomplete, &row->blocks)
+                                             : pal_warp_factor(&row->warp, &row->blocks));
     if (row->system.embedded) pal_warp_rest(&row->warp);
     row->has_factor = true;
     row->stale = false;
@@ -248,15 +260,18 @@ static pal_err check_supports(static_newton *row, const pal_build *build)
 static pal_err make_factors(static_newton *row, pal_build *build)
 {
     pal_body *body = build->body;
-    if (body->embed && row->linear == LINEAR_DIRECT)
+    if (body->embed && (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE))
         return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "body \"%s\": static_newton with linear \"direct\" is for bodies of nodes, this one has "
+                            "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
                             "control points; take \"pcg\"",
-                            body->name);
+                            body->name, row->linear == LINEAR_DIRECT ? "direct" : "incomplete");
     if (body->embed) row->linear = LINEAR_PCG;
     PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
     PAL_TRY(pal_turns_make(&row->system, build->arena, &row->turns));
-    PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
+    if (row->linear == LINEAR_INCOMPLETE)
+        PAL_TRY(pal_incomplete_make(&row->blocks, body->held, build->arena, &row->incomplete));
+    else
+        PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
     pal_system_linearise(&row->system);
     if (row->relieved) choose_shift(row);
     pal_err err = row->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(row);
@@ -419,6 +434,7 @@ static void run_gradients(static_newton *row, double size)
         n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
         row->report.n_cg += n;
     }
+    if (row->linear == LINEAR_INCOMPLETE) return;
     double worth = pal_cholesky_flops(row->warp.factor) /
                    (flops_per_nonzero * (double)(pal_cholesky_nonzeros(row->warp.factor) + 1));
     row->stale = n > fmin(fmax(worth, 10), 100);
@@ -428,11 +444,11 @@ static void run_gradients(static_newton *row, double size)
 /* move = K^-1 r */
 static pal_err solve_linear(static_newton *row, double size)
 {
-    bool fresh = row->linear == LINEAR_DIRECT && !row->constant;
+    bool fresh = (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE) && !row->constant;
     bool direct = row->linear == LINEAR_DIRECT && !row->system.has_contact && !row->exact;
     memset(row->move, 0, bytes3(row));
     if (!row->has_factor || fresh || (row->linear == LINEAR_AUTO && (row->stale || row->eager))) PAL_TRY(factor(row));
-    pal_warp_turn(&row->warp, &row->turns);
+    if (row->warp.factor) pal_warp_turn(&row->warp, &row->turns);
     double before = pal_clock_s();
     if (direct)
         pal_warp_solve(&row->warp, row->cg.r, row->move);
