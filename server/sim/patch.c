@@ -168,3 +168,11 @@ bool pal_patch_series(double give[3][3], int n_give, double k_N_m, double K[6])
     for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
     return isfinite(det);
 }
+
+double pal_patch_along(double give[3][3], int n_give, double k_N_m, double k_guess_N_m, const double way[3])
+{
+    double give_m_N = 0;
+    if (n_give < 3) return k_guess_N_m;
+    for (int c = 0; c < 3; c++) give_m_N += way[c] * pal_dot3(give[c], way) / pal_dot3(way, way);
+    return k_N_m / (1 + k_N_m * fmax(0, give_m_N));
+}

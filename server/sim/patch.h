@@ -64,4 +64,7 @@ void pal_patches_update(pal_patches *patches, const pal_patch_rules *rules, cons
 /* K = (C + 1/k)^-1 as xx xy xz yy yz zz: tissue of compliance C, m/N, behind a spring k. give: columns of C, those from
  * n_give on are not known and taken isotropic. False: none is known, or C is no compliance */
 bool pal_patch_series(double give[3][3], int n_give, double k_N_m, double K[6]);
+/* what the force rises by for each metre that the spring's end leads the tissue along way; unless all of C is known
+ * k_guess_N_m */
+double pal_patch_along(double give[3][3], int n_give, double k_N_m, double k_guess_N_m, const double way[3]);
 #endif

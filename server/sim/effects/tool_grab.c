@@ -12,9 +12,10 @@
  *
  * With an implicit solver (pal_body.implicit) nothing limits k, c is 0 (the step itself damps), the solver takes the
  * spring implicitly and the forces are those of the end of the sub-step. The spring stretches by at most 0.02 S more
- * than at the end of the last sub-step (numerics.md part 3: a tool that jumps) and never by more than 98 % of the caps,
- * so tissue follows a faster tool late. Where caps leave less than the spring's force, it becomes a constant force and
- * the solver goes round once more (pal_tangent.settle).
+ * than at the end of the last sub-step (numerics.md part 3: a tool that jumps) and by no more than brings the force to
+ * 98 % of the caps once the tissue has followed, as far as its compliance is known, so tissue follows a faster tool
+ * late. Where caps leave less than the spring's force, it becomes a constant force and the solver goes round once more
+ * (pal_tangent.settle).
  *
  * Another body in this one's place (hand): where it shows the same surface the grip holds the very vertices that it
  * took, by its own skin, else the nodes around those that it held. o changes by what the patch's place at rest does,
@@ -499,10 +500,12 @@ static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *
     hold_on(grab, g, tool, body, g->firm->k_N_m, (double[3]){0});
     find_goal(grab, g, tool, step, goal);
     pal_sub3(goal, goal, y);
-    double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), most = g->firm->stretch_m + rise, weight = 0;
+    double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal), k = g->firm->k_N_m, weight = 0;
     for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / weight);
-    if (g->firm->k_N_m * most > BELOW_CAP * cap) most = BELOW_CAP * cap / g->firm->k_N_m;
+    double kept = fmin(g->firm->stretch_m, BELOW_CAP * cap / k);
+    double lead = pal_patch_along(g->firm->give, g->firm->n_give, k, fmin(k, g->k_felt_N_m), goal);
+    double most = kept + fmin(rise, (BELOW_CAP * cap - k * kept) / lead);
     if (way > most) pal_scale3(goal, most / way, goal);
     g->pulls = pal_finite3(goal);
     g->firm->constant = g->firm->settled = false;
