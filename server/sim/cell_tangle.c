@@ -254,16 +254,24 @@ static bool let_go(pal_cell_tangle *t, double spare_J, double calm, bool still)
 
 enum { NOT = -1, NEW = -2 };
 
-/* what is turned over joins, with its neighbours; so do those of patches that do not come loose. True: some do */
-static bool take_in(pal_cell_tangle *t, const pal_solid *solid)
+static bool is_loaded(const pal_body *body)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * body->n_node && body->outer; i++) sum += fabs(body->outer[i]);
+    return sum > 0;
+}
+
+/* what is turned over joins, with its neighbours; so do those of patches that do not come loose, but not while a
+ * lasting load pulls at the body: it is that which turns them over, and larger patches are softer. True: some do */
+static bool take_in(pal_cell_tangle *t, const pal_solid *solid, bool loaded)
 {
     bool any = false;
     memset(t->root, 0, sizeof *t->root * (size_t)t->n_node);
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t node[8];
         const pal_cell_patch *patch = t->patch[cell] >= 0 ? &t->of[t->patch[cell]] : NULL;
-        const bool grows = patch && patch->bad && patch->age >= GROW_LOOKS && patch->age % GROW_LOOKS == 0;
-        if (!grows && !is_bad(t, cell)) continue;
+        const bool grows = patch && patch->bad && !loaded && patch->age >= GROW_LOOKS && patch->age % GROW_LOOKS == 0;
+        if (patch ? !grows : !is_bad(t, cell)) continue;
         for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) t->root[node[k]] = 1;
     }
     for (int cell = 0; cell < t->n_cell; cell++) {
@@ -364,7 +372,7 @@ bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const
     bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op],
                           kinetic_J < still_share * patches(t));
     memcpy(t->before, t->patch, sizeof *t->patch * (size_t)t->n_cell);
-    changed |= take_in(t, c->solid);
+    changed |= take_in(t, c->solid, is_loaded(body));
     if (changed && c->volume.n > 0) take_whole_cells(t, c);
     if (!changed) return false;
     number(t, c->solid);

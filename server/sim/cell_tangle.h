@@ -14,8 +14,8 @@
  * s <= 1 is such that a patch begins with no more energy than its elements had. It becomes elements again when none of
  * them is below 0.3 (above 20) any more, they store at most 0.1 mu V, and the body's motion and this row then have no
  * more energy than when patches first were, or after 120 looks in a row at a body that stands still (loads hold it). A
- * patch that does not come loose takes in its neighbours every 30 looks. Memory: the world's arena. Thread: make
- * [load], else [sim]. */
+ * patch that does not come loose takes in its neighbours every 30 looks, unless a lasting load pulls at the body.
+ * Memory: the world's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_CELL_TANGLE_H
 #define PAL_SIM_CELL_TANGLE_H
 #include "server/sim/body.h"

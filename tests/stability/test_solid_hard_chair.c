@@ -83,9 +83,37 @@ static void a_chair_that_is_bent_has_no_patches(void)
     solid_scene_close(&s);
 }
 
+/* a lasting load on the tip of a thin limb, beyond any cap: patches that grow under it are ever softer, and let it out
+ * by 1.9 S */
+static void a_pulled_tail_is_not_let_out_by_what_untangles_it(void)
+{
+    pal_cells cells = {0};
+    solid_scene s;
+    double far = 0;
+    REQUIRE(!pal_cell_model_make(pal_cell_model_find("monster"), &cells, &(pal_note){""}));
+    solid_scene_take(&s, cells, 1, "central_cg", "polar");
+    s.def->material = (pal_material){.young_Pa = 8000, .poisson = 0.4, .density_kg_m3 = 1000, .damping_1_s = 6};
+    s.def->support[s.def->n_support++] = (pal_support){.lowest = true, .fraction = 0.15};
+    REQUIRE(solid_scene_open(&s));
+    const double at[3] = {-0.14, -0.03, -0.002};
+    int tip = 0;
+    for (int i = 0; i < s.body->n_node; i++)
+        if (pal_dist3(s.body->node_rest + 3 * i, at) < pal_dist3(s.body->node_rest + 3 * tip, at)) tip = i;
+    REQUIRE(!pal_world_load(s.world, 0, tip, (double[3]){0, 0, 1e9}));
+    for (int i = 0; i < 60; i++) {
+        REQUIRE(solid_scene_step(&s, 1, solid_step_s));
+        for (int k = 0; k < s.body->n_dof; k++) far = fmax(far, pal_dist3(s.body->x + 3 * k, s.body->x_rest + 3 * k));
+    }
+    printf("  %.2f S out, %d looks found patches\n", far / s.body->size_m, (int)s.body->rescue.n_tangled);
+    CHECK(!s.body->frozen && s.body->rescue.n_tangled > 0);
+    CHECK_LE(far, 1.6 * s.body->size_m);
+    solid_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(a_chair_comes_back_from_any_shape);
+    RUN_LONG(a_pulled_tail_is_not_let_out_by_what_untangles_it);
     RUN(a_chair_that_is_bent_has_no_patches);
     return check_report();
 }
