@@ -112,7 +112,8 @@ enum {
 typedef struct pal_hand {
     const pal_body *from;
     const pal_point_rows *place; /* its nodes as weighted sums of the new ones; NULL: they are the same nodes */
-    bool same_shown;             /* shown vertices of the same number mean the same place on both             */
+    const float *rest_m;         /* shown vertices of the new body at rest, scene frame [n_shown][3]          */
+    bool same_shown;             /* those of the same number mean the same place on both                      */
     /* += forces that the row had on nodes, by place, less those it begins with on new ones, N [n_node][3]: what is to
      * be let go (ease.h); NULL: nobody asks */
     double *left_N;

@@ -1,6 +1,7 @@
 /* Weights of a grip on a body that adapts (shell_grip.h). */
 #include "server/sim/shell_grip.h"
 
+#include "server/base/vec3.h"
 #include "server/sim/shell.h"
 
 #include <math.h>
@@ -62,4 +63,27 @@ void pal_in_use_weigh(const pal_in_use *use, const pal_body *body, const int32_t
         if (!use->known[i]) weight[i] = weight_of(use, &shell->levels, i, weight);
     }
     for (int k = 0; k < body->n_active; k++) weight[body->active[k]] = fabs(weight[body->active[k]]);
+}
+
+void pal_live_grip_keep(pal_live_grip *l, const double quat[4], const double y[3], const double v[3], double k_N_m,
+                        double dt_s, double offset[3], double goal[3])
+{
+    double fade = fmax(0, 1 - dt_s / PAL_LIVE_SHIFT_S);
+    pal_scale3(l->shift, fade, l->shift);
+    if (l->renewed && k_N_m > 0) {
+        double moved[3], back[4] = {quat[0], -quat[1], -quat[2], -quat[3]};
+        pal_sub3(moved, y, l->y);
+        pal_axpy3(moved, -l->dt_s, v);
+        pal_add3(goal, goal, moved);
+        pal_quat_rotate(moved, back, moved);
+        pal_add3(offset, offset, moved);
+        pal_scale3(l->shift, l->k_N_m / k_N_m, l->shift);
+        for (int c = 0; c < 3; c++) l->shift[c] += (l->k_N_m / k_N_m - 1) * (goal[c] - y[c]);
+    }
+    if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
+    pal_add3(goal, goal, l->shift);
+    pal_copy3(l->y, y);
+    l->k_N_m = k_N_m;
+    l->dt_s = dt_s;
+    l->renewed = false;
 }

@@ -550,6 +550,7 @@ static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
             row->effect->hand(row->self, &next->plan.body[b], from->self,
                               &(pal_hand){.from = &before->plan.body[b],
                                           .place = b == t->body ? force_rows(t) : NULL,
+                                          .rest_m = next->part[b].rest_m,
                                           .same_shown = pal_transfer_same_shown(next, before, b),
                                           .left_N = b == t->body ? t->pull : NULL});
     }

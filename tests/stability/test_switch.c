@@ -221,6 +221,43 @@ static void tools_hold_on(void)
     }
 }
 
+/* and of another surface it holds the same tissue: what solids show are no voxels. After six switches it pulls as if
+ * it had always held that body */
+static void grips_go_between_surfaces(void)
+{
+    const pal_setting list[2] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"}, full[0]};
+    pal_world *w[2];
+    beam b;
+    begin(&b, true, false, 20);
+    b.scene->body[0].n_support = 1;
+    for (int k = 0; k < 2; k++) add_setting(&b, &list[k]);
+    pal_transfer *x[2] = {make_transfer(&b, 0, 1), make_transfer(&b, 1, 0)};
+    pal_transfer_report r;
+    for (int k = 0; k < 2; k++) {
+        w[k] = open_world(&b.set[k]->scene);
+        for (int i = 0; i < 60; i++) {
+            pal_pose p = at(0.19, 0.025, WIDTH + 0.0002 * fmin(i, 40), 1);
+            pal_world_pose(w[k], 0, &p);
+            step(w[k], 1.0 / 60, 1);
+        }
+    }
+    const double right_N = pal_norm3(pal_world_tools(w[0])->tool[0].mean_force_N);
+    for (int k = 0; k < 6; k++) {
+        pal_world *next = open_world(&b.set[(k + 1) % 2]->scene);
+        pal_transfer_carry(x[k % 2], next, w[0], &r);
+        pal_world_destroy(w[0]);
+        w[0] = next;
+        step(w[0], 1.0 / 60, k < 5 ? 3 : 60);
+        CHECK(pal_world_tools(w[0])->tool[0].holding);
+    }
+    const double now_N = pal_norm3(pal_world_tools(w[0])->tool[0].mean_force_N);
+    if (table) printf("  between surfaces: %.3f N, %.3f N without a switch\n", now_N, right_N);
+    CHECK(right_N > 0.3);
+    CHECK_NEAR(now_N / right_N, 1, 0.1);
+    for (int k = 0; k < 2; k++) pal_transfer_free(x[k]), pal_world_destroy(w[k]);
+    end(&b);
+}
+
 /* a tool that drags the tip of finite elements sideways by friction goes on dragging: friction begins anew, and tissue
  * that is still sheared pulls at once on the tool that holds it */
 static void friction_holds_on(void)
@@ -451,6 +488,7 @@ int main(int argc, char **argv)
     RUN(the_same_switch_gives_the_same_hash);
     RUN(there_and_back_fifty_times);
     RUN(tools_hold_on);
+    RUN(grips_go_between_surfaces);
     RUN(friction_holds_on);
     RUN(lasting_loads_stay);
     RUN(handles_hold_on);

@@ -18,13 +18,12 @@
  * (pal_tangent.settle).
  *
  * Another body in this one's place (hand): where it shows the same surface the grip holds the very vertices that it
- * took, by its own skin, else the nodes around those that it held. o changes by what the patch's place at rest does,
- * so that it stays the hold of that tissue, however often; the force goes over without a jump (handed.h).
+ * took, by its own skin; of another surface those about the place at rest that it closed on. o changes by what the
+ * patch's place at rest does, so that it stays the hold of that tissue, however often; the force goes over without a
+ * jump (handed.h).
  *
  * On a body that adapts (sim/shell.h) weights go with the masses of the nodes as well, so that fine and coarse parts of
- * the patch come along alike, and a grip goes on when nodes come and go (shell_grip.h). The force is the same on both
- * sides of the change: o goes with y, and F = k (tool + o + shift - y), where shift makes up for another k and fades in
- * SHIFT_S.
+ * the patch come along alike, and a grip goes on when nodes come and go (shell_grip.h).
  *
  * For a haptic bridge the tool's bilateral part is published as f0 - K (x - x0) - b v, K = k_s 1: k_s starts as this
  * spring in series with the tissue under the patch, 2 E R / (1 - nu^2), and follows least squares on the tool's moves
@@ -51,7 +50,6 @@
 #define LEAST_K_N_M  10.0
 #define RISE_S       0.02
 #define BELOW_CAP    0.98
-#define SHIFT_S      0.15
 #define WHOLE        65535.0
 
 /* what a grip needs beside with an implicit solver */
@@ -64,13 +62,6 @@ typedef struct firm_grip {
     int n_give, next_give;        /* columns known                                                                */
 } firm_grip;
 
-/* what a grip needs beside on a body that adapts */
-typedef struct live_grip {
-    double *even;                       /* weights but for the masses of nodes [n_node]   */
-    double y[3], shift[3], k_N_m, dt_s; /* patch and spring in the sub-step before        */
-    bool renewed;                       /* other nodes since then                         */
-} live_grip;
-
 typedef struct grip {
     bool held, button; /* has tissue; button in the last step                              */
     bool by_vertex;    /* share is that of the patch                                       */
@@ -78,11 +69,12 @@ typedef struct grip {
     int32_t *node;                  /* [n_node]                                                         */
     double *weight;                 /* sum 1 [n_node]                                                   */
     uint16_t *share;                /* of each shown vertex, WHOLE: 1; NULL on bodies that adapt [n_shown] */
-    double quat[4];                 /* of the tool when it closed                                       */
+    double quat[4], at_m[3];        /* of the tool when it closed, and where of the tissue at rest      */
+    double reach_m;                 /* then                                                             */
     double offset[3];               /* patch minus tool in the tool's axes at quaternion 1              */
     double k_most_N_m, c_most_Ns_m; /* explicit limits in this sub-step                    */
     double force[3];                /* on the tool, this sub-step                                       */
-    struct live_grip *live;         /* bodies that adapt only, else NULL */
+    pal_live_grip *live;            /* bodies that adapt only, else NULL */
     /* felt stiffness */
     double last_m[3], last_N[3], xx, xf, k_start_N_m, k_felt_N_m;
     bool pulls;      /* implicit solvers only: in this sub-step */
@@ -143,7 +135,7 @@ static void reset(void *self, const pal_body *body)
 
 static pal_err make_live(grip *g, size_t n_node, pal_arena *arena)
 {
-    g->live = PAL_NEW(arena, live_grip, 1);
+    g->live = PAL_NEW(arena, pal_live_grip, 1);
     if (g->live) g->live->even = PAL_NEW(arena, double, n_node);
     return g->live && g->live->even ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -203,8 +195,9 @@ static void take_vertex(tool_grab *grab, grip *g, const pal_body *body, int vert
     if (g->share) g->share[vertex] = (uint16_t)(WHOLE * share + 0.5);
 }
 
-/* node weights of what lies within reach of p (body frame), left in gather; false: nothing there */
-static bool close_on(tool_grab *grab, grip *g, const pal_body *body, const double p[3], double reach)
+/* node weights of shown vertices (at shown, m) that lie within reach of p, left in gather; false: nothing there */
+static bool close_on(tool_grab *grab, grip *g, const pal_body *body, const float *shown, const double p[3],
+                     double reach)
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
     int nearest = -1;
@@ -213,7 +206,7 @@ static bool close_on(tool_grab *grab, grip *g, const pal_body *body, const doubl
     if (g->share) memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
     for (int k = 0; k < n_shown; k++) {
         int i = body->shell ? body->active[k] : k;
-        const float *s = body->shown + 3 * (size_t)i;
+        const float *s = shown + 3 * (size_t)i;
         double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
         double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
         if (d2 <= nearest2) nearest2 = d2, nearest = i;
@@ -234,6 +227,12 @@ static void patch_place(const grip *g, const pal_body *body, double y[3], double
         pal_axpy3(y, g->weight[i], body->d + 3 * (size_t)g->node[i]);
         pal_axpy3(v, g->weight[i], body->dv + 3 * (size_t)g->node[i]);
     }
+}
+
+static void rest_place(const grip *g, const pal_body *body, double y[3])
+{
+    pal_set3(y, 0, 0, 0);
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(y, g->weight[i], body->node_rest + 3 * (size_t)g->node[i]);
 }
 
 /* the grip's nodes and weights from those in gather, which is then 0 again */
@@ -259,7 +258,7 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
 {
     double last[3], y[3], v[3], reach = reach_m(grab, tool);
     pal_sub3(last, tool->last.position_m, body->offset_m);
-    if (!close_on(grab, g, body, last, reach)) return;
+    if (!close_on(grab, g, body, body->shown, last, reach)) return;
     take_gathered(grab, g, body);
     if (grab->handed) grab->handed[g - grab->grip] = (pal_handed){.due = false};
     patch_place(g, body, y, v);
@@ -267,6 +266,9 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     pal_sub3(g->offset, y, last);
     pal_quat_rotate(g->offset, back, g->offset);
     memcpy(g->quat, tool->last.quat, sizeof g->quat);
+    rest_place(g, body, g->at_m);
+    pal_sub3(g->at_m, g->at_m, y), pal_add3(g->at_m, g->at_m, tool->last.position_m);
+    g->reach_m = reach;
     g->held = true;
     if (g->live) {
         g->live->renewed = false;
@@ -318,11 +320,13 @@ static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal
 static void hand_nodes(tool_grab *grab, grip *g, const pal_body *body, const grip *b, const pal_hand *by)
 {
     const pal_point_rows *place = by->place;
-    g->by_vertex = b->by_vertex && g->share && by->same_shown;
-    for (int i = 0; i < body->n_shown && g->by_vertex; i++) g->share[i] = b->share[i];
-    for (int i = 0; i < body->n_shown && g->by_vertex && place; i++)
+    bool same = b->by_vertex && g->share && by->same_shown, found = same && place;
+    for (int i = 0; i < body->n_shown && same; i++) g->share[i] = b->share[i];
+    for (int i = 0; i < body->n_shown && found; i++)
         if (g->share[i] > 0) add_vertex(grab, body, i, g->share[i] / WHOLE);
-    for (int i = 0; i < b->n_node && !(g->by_vertex && place); i++) {
+    if (!same && place && g->share) found = close_on(grab, g, body, by->rest_m, b->at_m, b->reach_m);
+    g->by_vertex = same || found;
+    for (int i = 0; i < b->n_node && !found; i++) {
         const double weight = b->live ? b->live->even[i] : b->weight[i];
         if (!place) grab->gather[b->node[i]] += weight;
         for (int32_t k = place ? place->start[b->node[i]] : 0; place && k < place->start[b->node[i] + 1]; k++)
@@ -347,12 +351,14 @@ static void leave(const grip *g, const grip *b, const double force_N[3], const p
 /* o by what the patch's place at rest differs */
 static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_body *from)
 {
-    double moved[3] = {0}, back[4] = {b->quat[0], -b->quat[1], -b->quat[2], -b->quat[3]};
-    for (int i = 0; i < g->n_node; i++) pal_axpy3(moved, g->weight[i], body->node_rest + 3 * (size_t)g->node[i]);
-    for (int i = 0; i < b->n_node; i++) pal_axpy3(moved, -b->weight[i], from->node_rest + 3 * (size_t)b->node[i]);
+    double was[3], moved[3], back[4] = {b->quat[0], -b->quat[1], -b->quat[2], -b->quat[3]};
+    rest_place(g, body, moved), rest_place(b, from, was);
+    pal_sub3(moved, moved, was);
     pal_quat_rotate(moved, back, moved);
     pal_add3(g->offset, b->offset, moved);
     memcpy(g->quat, b->quat, sizeof g->quat);
+    pal_copy3(g->at_m, b->at_m);
+    g->reach_m = b->reach_m;
 }
 
 static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
@@ -432,32 +438,6 @@ static double spring_N_m(const tool_grab *grab, const grip *g, const pal_tool *t
     return fmin(stiffness_N_m(grab, reach_m(grab, tool)), g->k_most_N_m);
 }
 
-/* Bodies that adapt: goal, with the force as it was before the nodes changed. The patch y of the new nodes is the same
- * tissue, so the hold o goes with it for good; that the spring's k may be another is made up for by shift. */
-static void keep_force(grip *g, const pal_tool *tool, const double y[3], const double v[3], double k_N_m, double dt_s,
-                       double goal[3])
-{
-    live_grip *l = g->live;
-    double fade = fmax(0, 1 - dt_s / SHIFT_S);
-    pal_scale3(l->shift, fade, l->shift);
-    if (l->renewed && k_N_m > 0) {
-        double moved[3], back[4] = {tool->next.quat[0], -tool->next.quat[1], -tool->next.quat[2], -tool->next.quat[3]};
-        pal_sub3(moved, y, l->y);
-        pal_axpy3(moved, -l->dt_s, v);
-        pal_add3(goal, goal, moved);
-        pal_quat_rotate(moved, back, moved);
-        pal_add3(g->offset, g->offset, moved);
-        pal_scale3(l->shift, l->k_N_m / k_N_m, l->shift);
-        for (int c = 0; c < 3; c++) l->shift[c] += (l->k_N_m / k_N_m - 1) * (goal[c] - y[c]);
-    }
-    if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
-    pal_add3(goal, goal, l->shift);
-    pal_copy3(l->y, y);
-    l->k_N_m = k_N_m;
-    l->dt_s = dt_s;
-    l->renewed = false;
-}
-
 static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
@@ -468,7 +448,7 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     for (int d = 0; d < 3; d++) drag[d] = tool->ramp * (c * (tool->velocity_m_s[d] - v[d]));
     hold_on(grab, g, tool, body, tool->ramp * k, drag);
     find_goal(grab, g, tool, step, goal);
-    if (g->live) keep_force(g, tool, y, v, k, step->dt_s, goal);
+    if (g->live) pal_live_grip_keep(g->live, tool->next.quat, y, v, k, step->dt_s, g->offset, goal);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
     pal_set3(g->force, 0, 0, 0);
     if (!pal_finite3(force)) return;
