@@ -253,7 +253,7 @@ static void grips_go_between_surfaces(void)
     const double now_N = pal_norm3(pal_world_tools(w[0])->tool[0].mean_force_N);
     if (table) printf("  between surfaces: %.3f N, %.3f N without a switch\n", now_N, right_N);
     CHECK(right_N > 0.3);
-    CHECK_NEAR(now_N / right_N, 1, 0.1);
+    CHECK_NEAR(now_N / right_N, 1, 0.03);
     for (int k = 0; k < 2; k++) pal_transfer_free(x[k]), pal_world_destroy(w[k]);
     end(&b);
 }
