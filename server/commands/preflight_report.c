@@ -59,6 +59,8 @@ cJSON *pal_preflight_json(const pal_preflight *preflight)
         if (b->n_sliver > 0) cJSON_AddNumberToObject(body, "slivers", b->n_sliver);
         add_weak(body, "thin_elements", &b->thin);
         add_weak(body, "light_nodes", &b->light);
+        if (b->locks) cJSON_AddStringToObject(body, "locks", b->locks);
+        if (b->locks) cJSON_AddStringToObject(body, "instead", b->instead);
         add_number(body, "condition", b->condition);
         add_number(body, "slowest_s", b->slow_s);
         add_number(body, "foreseen_ms", b->foreseen_ms);
@@ -75,6 +77,9 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
         n_weak += body->edge.n + body->flat.n + body->thin.n + body->light.n;
         if (body->n_sub > n_sub) n_sub = body->n_sub;
         if (body->condition > condition) condition = body->condition;
+        if (body->locks)
+            pal_log(PAL_LOG_WARN, "preflight", "%s: body %s: element %s locks at Poisson's ratio %.4g, %s does not",
+                    scene, body->name, body->locks, body->poisson, body->instead);
     }
     pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
             "%s: %d sub-step%s a step, condition at least %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,

@@ -9,6 +9,6 @@
 void pal_preflight_print(const pal_preflight *preflight, double measured_ms);
 /* an object: bodies with limits, weak places, condition, foreseen milliseconds; MB */
 cJSON *pal_preflight_json(const pal_preflight *preflight);
-/* one line in the log, a warning when something is weak */
+/* one line in the log, a warning when something is weak, and one for each body whose element locks */
 void pal_preflight_log(const pal_preflight *preflight, const char *scene);
 #endif

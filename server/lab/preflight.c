@@ -305,6 +305,32 @@ static double foresee_ms(const probe *p, const pal_body *body, int n_sub, int b)
     return 1e-6 * (n_sub * (evaluations * (forces + solve) + least) + shown + 2 * least);
 }
 
+/* ---- elements that lock ---- */
+
+/* tests/stability, case poisson_static; below it full integration is within some percent */
+static const double locks_above = 0.47;
+
+static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
+{
+    if (strcmp(def->model.name, "fem")) return;
+    const char *element = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4";
+    for (int i = 0; i < def->model.n_value; i++)
+        if (!strcmp(def->model.value[i].key, "element")) element = def->model.value[i].text;
+    out->poisson = def->material.poisson;
+    for (int r = 0; r < def->n_region; r++) {
+        const pal_region *region = &def->region[r];
+        const int n =
+            region->kind == PAL_REGION_GRID && region->grid_poisson ? region->n[0] * region->n[1] * region->n[2] : 0;
+        if (region->poisson > out->poisson) out->poisson = region->poisson;
+        for (int i = 0; i < n; i++)
+            if (region->grid_poisson[i] > out->poisson) out->poisson = region->grid_poisson[i];
+    }
+    const bool hex = !strcmp(element, "hex8"), tet = !strcmp(element, "tet4");
+    if ((!hex && !tet) || !(out->poisson > locks_above)) return;
+    out->locks = hex ? "hex8" : "tet4";
+    out->instead = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet10";
+}
+
 /* ---- all ---- */
 
 static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int most_cg, pal_preflight_body *out)
@@ -330,6 +356,7 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
     if (!find_limit_node(&p, out)) return PAL_ERR_MEMORY;
     look_at_elements(body, volumes, out);
     look_at_masses(body, out);
+    look_for_locking(&scene->body[b], out);
     if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
     out->foreseen_ms = foresee_ms(&p, body, out->n_sub, b);
     return PAL_ERR_OK;
@@ -363,6 +390,10 @@ static void say_weak(const pal_weak *w, const char *what, double scale, const ch
 int pal_preflight_say(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
 {
     int n = 0;
+    if (b->locks)
+        snprintf(line[n++], PAL_PREFLIGHT_LINE,
+                 "element %s locks at Poisson's ratio %.4g: it rests stiffer than the material is; element %s does not",
+                 b->locks, b->poisson, b->instead);
     if (isfinite(b->limit_s) && b->limit_node >= 0) {
         int used = snprintf(line[n], PAL_PREFLIGHT_LINE, "node %d at (%.4g, %.4g, %.4g) mm sets the limit of %.3g ms",
                             b->limit_node, 1e3 * b->limit_at_m[0], 1e3 * b->limit_at_m[1], 1e3 * b->limit_at_m[2],

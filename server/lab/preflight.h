@@ -31,6 +31,10 @@ typedef struct pal_preflight_body {
      * body under its own weight; condition is their ratio, slow_s the period of the latter. NaN: nothing holds it, or
      * everything does */
     double fast_1_s, slow_1_s, condition, slow_s;
+    /* element that locks at the body's largest Poisson's ratio, and one that does not (both literals); NULL: none does
+     */
+    const char *locks, *instead;
+    double poisson;
     double foreseen_ms; /* of a step under load, on the machine of README's tables; NaN: not known for its rows */
 } pal_preflight_body;
 

@@ -88,6 +88,40 @@ static void the_slowest_motion_of_a_bar_is_that_of_beams(void)
     beam_free(&b);
 }
 
+/* the textbook's element at the ratio of soft tissue is told at load, with the way out */
+static void elements_that_lock_are_named_with_one_that_does_not(void)
+{
+    static const struct {
+        const char *element;
+        double poisson;
+        const char *instead; /* NULL: nothing is said */
+    } of[] = {{"hex8", 0.499, "hex8_bbar"},
+              {"tet4", 0.49, "hex8_bbar"},
+              {"hex8", 0.3, NULL},
+              {"hex8_bbar", 0.499, NULL},
+              {"tet10", 0.499, NULL}};
+    for (int i = 0; i < 5; i++)
+        for (int in_region = 0; in_region < (of[i].instead ? 2 : 1); in_region++) {
+            fem_beam b;
+            pal_preflight p;
+            char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE];
+            bool told = false;
+            beam_make(&b, 4, 2, 2, 0.01, true);
+            beam_element(&b, of[i].element, "corotational");
+            b.def->material.poisson = in_region ? 0.3 : of[i].poisson;
+            pal_region region = {.kind = PAL_REGION_BOX, .high_m = {0.02, 1, 1}};
+            region.young_Pa = 1e5, region.poisson = of[i].poisson, region.density_kg_m3 = 1000;
+            if (in_region) b.def->region[b.def->n_region++] = region;
+            REQUIRE(!pal_preflight_look(b.scene, PAL_PREFLIGHT_QUICK, &p, &note));
+            for (int k = pal_preflight_say(&p.body[0], line) - 1; k >= 0; k--)
+                told |= strstr(line[k], "locks at Poisson's ratio") && of[i].instead &&
+                        strstr(line[k], of[i].element) && strstr(line[k], of[i].instead);
+            CHECK_INT(told, of[i].instead != NULL);
+            CHECK((p.body[0].locks != NULL) == (of[i].instead != NULL));
+            beam_free(&b);
+        }
+}
+
 /* a row whose cost nobody measured: no figure instead of one that leaves it out */
 static void what_costs_of_unknown_rows_is_not_foreseen(void)
 {
@@ -138,6 +172,7 @@ int main(void)
 {
     RUN(the_limit_is_the_bodys_and_its_node_is_found);
     RUN(the_slowest_motion_of_a_bar_is_that_of_beams);
+    RUN(elements_that_lock_are_named_with_one_that_does_not);
     RUN(what_costs_of_unknown_rows_is_not_foreseen);
     RUN(what_nothing_holds_has_no_slowest_motion);
     RUN(what_cannot_run_is_refused_with_the_node_that_is_to_blame);
