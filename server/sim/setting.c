@@ -417,8 +417,9 @@ static bool keeps_mesh(const pal_body_def *body, const pal_setting *now, const p
     if (!is_voxels(to->model)) return true;
     if (body->cells || body->mesh->tets.n_node < 1) return false;
     if (to->size == 0 || pal_setting_same(now, to)) return true;
-    bool by_fill = is(to->model, "fem") || to->k_distance_J > 0;
-    return to->size == voxels_of(body->mesh) && (!by_fill || body->mesh->hexes.measured);
+    bool by_fill = is(to->model, "fem") || to->k_distance_J > 0,
+         goes_on = is(now->model, "fem") && is(to->model, "fem");
+    return to->size == voxels_of(body->mesh) && (!by_fill || goes_on || body->mesh->hexes.measured);
 }
 
 static pal_err change(const pal_scene *from, const pal_setting *now, const pal_setting *to, pal_set_scene *set,

@@ -56,12 +56,12 @@ bool pal_setting_box(const pal_scene *scene, int body, int support, pal_support 
  * number out of range. [any] */
 pal_err pal_setting_check(const pal_scene *from, int body, const pal_setting *to, pal_note *note);
 /* Makes it: keeps material, supports, regions, effects, tools and the keys of model and solver that a setting does not
- * speak of; prepares voxels anew from the body's shown surface when the size differs, or when finite elements find no
- * measured fill. Cut voxels count by their filled share, those less than a quarter full are dropped unless more than
- * 2.5 % of the volume would go, and the voxels' planes go through the border of the first support or region that cuts
- * the body, as lab/load_case.h has it; a support of the lowest part becomes a box there. *out heap, pal_set_scene_free;
- * borrows from `from`, which outlives it. REFUSED: a model that does not fit the body (one sentence why), an unknown
- * word, a size or number out of range; BUDGET, MEMORY
+ * speak of; prepares voxels anew from the body's shown surface when the size differs, or when finite elements take
+ * over from another model and find no measured fill. Cut voxels count by their filled share, those less than a quarter
+ * full are dropped unless more than 2.5 % of the volume would go, and the voxels' planes go through the border of the
+ * first support or region that cuts the body, as lab/load_case.h has it; a support of the lowest part becomes a box
+ * there. *out heap, pal_set_scene_free; borrows from `from`, which outlives it. REFUSED: a model that does not fit the
+ * body (one sentence why), an unknown word, a size or number out of range; BUDGET, MEMORY
  */
 pal_err pal_setting_make(const pal_scene *from, int body, const pal_setting *to, pal_note *note, pal_set_scene **out);
 void pal_set_scene_free(pal_set_scene *scene); /* NULL is fine */

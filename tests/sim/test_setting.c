@@ -162,6 +162,15 @@ static void keys_that_a_setting_does_not_speak_of_stay(void)
     CHECK(!pal_item_count(solver, "iterations", 0, 99, &iterations, &note) && iterations == 33);
     CHECK(set->mesh.tets.n_node == 0);
     pal_set_scene_free(set);
+    /* elements that run on voxels as they are go on on them, in place of springs they have them measured */
+    o.mesh.hexes.measured = false;
+    CHECK(!pal_setting_make(o.scene, 0, &to, &note, &set));
+    CHECK(set->mesh.tets.n_node == 0);
+    pal_set_scene_free(set);
+    pal_item_init(&def->model, "model", "tet_springs");
+    CHECK(!pal_setting_make(o.scene, 0, &to, &note, &set));
+    CHECK(set->mesh.tets.n_node > 0 && set->mesh.hexes.measured);
+    pal_set_scene_free(set);
     organ_free(&o);
 }
 
