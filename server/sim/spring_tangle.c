@@ -13,7 +13,7 @@
 static const double least_in = 0.01, least_out = 0.2, most_in = 30, most_out = 20;
 /* of s, so that a patch never is too soft to move */
 static const double least_scale = 0.02;
-/* kinetic energy of a body that stands still, of what its patches store */
+/* kinetic energy of a patch that stands still, of what all of them store */
 static const double still_share = 1e-3;
 /* of the sum of constants: springs that store more would fly apart when they take over */
 static const double calm_share = 0.02;
@@ -55,7 +55,7 @@ void pal_spring_tangle_follow(pal_spring_tangle *t, const pal_spring_tangle *fro
 {
     memcpy(t->patch, from->patch, sizeof *t->patch * (size_t)t->n_node);
     memcpy(t->of, from->of, sizeof t->of);
-    t->n_patch = from->n_patch, t->scale = from->scale, t->damp_s = from->damp_s, t->first_J = from->first_J;
+    t->n_patch = from->n_patch, t->damp_s = from->damp_s, t->first_J = from->first_J;
     t->k_J = from->k_J, t->seen_s = from->seen_s;
     t->stale = true;
 }
@@ -160,18 +160,19 @@ static void find_spins(pal_spring_tangle *t, const pal_spring_row *row, const pa
 static double edge_energy(const pal_spring_tangle *t, const pal_spring_row *row, int i, const pal_body *body, double *f)
 {
     const int32_t *node = corners(row, i);
+    const pal_spring_patch *patch = &t->of[patch_of(t, row, i)];
     const double k = edge_N_m(row, i);
     double x[3], y[3], u[3];
     edge_vectors(node, body, x, y);
-    pal_mul33(u, t->of[patch_of(t, row, i)].turn, y);
+    pal_mul33(u, patch->turn, y);
     pal_sub3(u, x, u);
     const double energy = 0.5 * k * pal_dot3(u, u);
     if (f) {
         double rate[3];
-        edge_rate(&t->of[patch_of(t, row, i)], node, body, x, rate);
+        edge_rate(patch, node, body, x, rate);
         pal_axpy3(u, t->damp_s, rate);
-        pal_axpy3(f + 3 * (size_t)node[0], t->scale * k, u);
-        pal_axpy3(f + 3 * (size_t)node[1], -t->scale * k, u);
+        pal_axpy3(f + 3 * (size_t)node[0], patch->scale * k, u);
+        pal_axpy3(f + 3 * (size_t)node[1], -patch->scale * k, u);
     }
     return energy;
 }
@@ -189,8 +190,9 @@ double pal_spring_tangle_energy(pal_spring_tangle *t, const pal_spring_row *row,
 {
     double sum = 0;
     find_turns(t, row, body);
-    for (int k = 0; k < row->n_off; k++) sum += edge_energy(t, row, row->off[k], body, NULL);
-    return t->scale * sum;
+    for (int k = 0; k < row->n_off; k++)
+        sum += t->of[patch_of(t, row, row->off[k])].scale * edge_energy(t, row, row->off[k], body, NULL);
+    return sum;
 }
 
 /* ---- looking ---- */
@@ -224,13 +226,14 @@ static void weigh(pal_spring_tangle *t, const rows *r, const pal_body *body)
     const pal_spring_row *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
     for (int p = 0; p < t->n_patch; p++) {
         pal_spring_patch *patch = &t->of[p];
-        patch->patch_J = patch->spring_J = patch->size_J = 0, patch->bad = patch->pressed = false, patch->n = 0;
+        patch->patch_J = patch->spring_J = patch->size_J = patch->kinetic_J = 0;
+        patch->bad = patch->pressed = false, patch->n = 0;
     }
     find_turns(t, edges, body);
     for (int k = 0; k < edges->n_off; k++) {
         const int i = edges->off[k];
         pal_spring_patch *patch = &t->of[patch_of(t, edges, i)];
-        patch->patch_J += t->scale * edge_energy(t, edges, i, body, NULL);
+        patch->patch_J += patch->scale * edge_energy(t, edges, i, body, NULL);
         patch->size_J += edges->spring.k_J * edges->all[edges->strips.place[i]];
     }
     for (int kind = 0; kind < 3; kind++)
@@ -244,8 +247,11 @@ static void weigh(pal_spring_tangle *t, const rows *r, const pal_body *body)
     }
     for (int i = 0; i < t->n_node; i++) {
         if (t->patch[i] < 0) continue;
-        t->of[t->patch[i]].n++;
-        t->of[t->patch[i]].pressed |= loaded(body, i);
+        pal_spring_patch *patch = &t->of[t->patch[i]];
+        const double *v = body->dv + 3 * (size_t)i;
+        patch->n++;
+        patch->pressed |= loaded(body, i);
+        patch->kinetic_J += 0.5 * body->mass_kg[i] * pal_dot3(v, v);
     }
 }
 
@@ -265,14 +271,14 @@ static double springs(const rows *r, const pal_body *body)
 }
 
 /* which patches become springs again; true: some do */
-static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, bool still, double passed_s)
+static bool let_go(pal_spring_tangle *t, double spare_J, double little_J, double still_J, double passed_s)
 {
     bool any = false;
     for (int p = 0; p < t->n_patch; p++) {
         pal_spring_patch *patch = &t->of[p];
         const double rise = patch->spring_J - patch->patch_J;
         patch->grow_s += passed_s;
-        patch->loose_s = patch->bad || !still ? 0 : patch->loose_s + passed_s;
+        patch->loose_s = patch->bad || !(patch->kinetic_J < still_J) ? 0 : patch->loose_s + passed_s;
         const bool fits = rise <= spare_J && patch->spring_J <= calm_share * patch->size_J;
         if (patch->bad || (!fits && (patch->loose_s < nearly * loose_after_s || rise > little_J))) continue;
         spare_J -= rise;
@@ -338,12 +344,13 @@ static bool take_in(pal_spring_tangle *t, const rows *r, const pal_body *body)
     return any && leave_pressed(t, body);
 }
 
-/* patches anew of all nodes that are in one, connected by edges. What has changed elsewhere does not set back the times
- * of those that stay as they are */
+/* patches anew of all nodes that are in one, connected by edges. What has changed elsewhere sets back neither the
+ * times nor s of those that stay as they are */
 static void number(pal_spring_tangle *t, const pal_spring_row *edges)
 {
-    double grow_s[PAL_SPRING_PATCHES], loose_s[PAL_SPRING_PATCHES];
-    for (int p = 0; p < t->n_patch; p++) grow_s[p] = t->of[p].grow_s, loose_s[p] = t->of[p].loose_s;
+    pal_spring_patch old[PAL_SPRING_PATCHES];
+    int home[PAL_SPRING_PATCHES]; /* the old patch of all of its nodes; NOT: they are of several, or new */
+    memcpy(old, t->of, sizeof *old * (size_t)t->n_patch);
     join(t, edges);
     t->n_patch = 0;
     for (int i = 0; i < t->n_node; i++) {
@@ -354,13 +361,20 @@ static void number(pal_spring_tangle *t, const pal_spring_row *edges)
             t->patch[i] = t->patch[root];
         else {
             if (t->n_patch < PAL_SPRING_PATCHES)
-                t->of[t->n_patch++] = (pal_spring_patch){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .loose_s = INFINITY};
+                home[t->n_patch] = was,
+                t->of[t->n_patch++] =
+                    (pal_spring_patch){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
             t->patch[i] = t->n_patch - 1;
         }
         pal_spring_patch *patch = &t->of[t->patch[i]];
         patch->n++;
-        patch->grow_s = fmax(patch->grow_s, was >= 0 ? grow_s[was] : 0);
-        patch->loose_s = fmin(patch->loose_s, was >= 0 ? loose_s[was] : 0);
+        if (home[t->patch[i]] != was) home[t->patch[i]] = NOT;
+        patch->grow_s = fmax(patch->grow_s, was >= 0 ? old[was].grow_s : 0);
+        patch->loose_s = fmin(patch->loose_s, was >= 0 ? old[was].loose_s : 0);
+    }
+    for (int p = 0; p < t->n_patch; p++) {
+        t->of[p].stays = home[p] >= 0 && old[home[p]].n == t->of[p].n;
+        if (t->of[p].stays) t->of[p].scale = old[home[p]].scale;
     }
 }
 
@@ -392,7 +406,7 @@ static void switch_rows(const pal_spring_tangle *t, rows *r)
     }
 }
 
-/* G held or not, and s such that there is no more energy than before_J */
+/* G held or not, and s of patches that are others than before such that there is no more energy than before_J */
 static void begin(pal_spring_tangle *t, const rows *r, const pal_body *body, double before_J)
 {
     double held[9];
@@ -403,13 +417,18 @@ static void begin(pal_spring_tangle *t, const rows *r, const pal_body *body, dou
         t->of[p].held = led && 2 * t->of[p].n > n_free;
         if (t->of[p].held) memcpy(t->of[p].turn, held, sizeof held);
     }
-    t->scale = 1;
     t->k_J = r->of[PAL_SPRING_DISTANCE]->spring.k_J;
     t->damp_s = damp_share * edge_time_s(t, r->of[PAL_SPRING_DISTANCE], body);
     weigh(t, r, body);
-    const double all_J = patches(t), left_J = before_J - springs(r, body);
-    if (all_J > left_J) t->scale = left_J > least_scale * all_J ? left_J / all_J : least_scale;
-    for (int p = 0; p < t->n_patch; p++) t->of[p].patch_J *= t->scale;
+    double new_J = 0, left_J = before_J - springs(r, body), scale = 1;
+    for (int p = 0; p < t->n_patch; p++)
+        *(t->of[p].stays ? &left_J : &new_J) += (t->of[p].stays ? -1 : 1) * t->of[p].patch_J;
+    if (new_J > left_J) scale = left_J > least_scale * new_J ? left_J / new_J : least_scale;
+    for (int p = 0; p < t->n_patch; p++) {
+        if (t->of[p].stays) continue;
+        t->of[p].scale = scale;
+        t->of[p].patch_J *= scale;
+    }
 }
 
 /* supports may turn or be taken off, and constants may be others than when patches began */
@@ -464,8 +483,8 @@ unsigned pal_spring_tangle_look(pal_spring_tangle *t, pal_step *step)
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
         before_J = springs(&r, body) + patches(t);
-        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J,
-                         kinetic_J < still_share * patches(t), fmax(0, step->time_s - t->seen_s));
+        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J, still_share * patches(t),
+                         fmax(0, step->time_s - t->seen_s));
     }
     t->seen_s = step->time_s;
     changed |= take_in(t, &r, body);

@@ -16,13 +16,13 @@
  * x_j)): by the normal equations of w this takes no momentum and no angular momentum, and lattice waves are gone where
  * drag alone would take seconds; tau is a quarter of the time that edges give the explicit step.
  *
- * s <= 1 is such that patches begin with no more energy than the springs had. A patch becomes springs again when all
- * its tetrahedra are between 0.2 and 20 of their volume, the springs would store little (a strain of 0.2 or so in
- * mean), and the body's motion and springs then have no more energy than when patches first were; or after 2 s of a
- * body that stands still, where that adds next to nothing. A patch that nothing presses and that does not come loose
- * takes in the nodes beside it every half second. What another patch does leaves its times as they are. While anything
- * presses or pulls the body nothing is taken out, since patches are softer than springs: a tool goes on to feel
- * springs. A body with a row gravity or with another solver than verlet and rk4 has no patches at all.
+ * s <= 1 of a patch is such that patches begin with no more energy than the springs had. A patch becomes springs again
+ * when all its tetrahedra are between 0.2 and 20 of their volume, the springs would store little (a strain of 0.2 or so
+ * in mean), and the body's motion and springs then have no more energy than when patches first were; or after 2 s in
+ * which the patch stood still, where that adds next to nothing. A patch that nothing presses and that does not come
+ * loose takes in the nodes beside it every half second. What another patch does leaves its times and its s as they are.
+ * While anything presses or pulls the body nothing is taken out, since patches are softer than springs: a tool goes on
+ * to feel springs. A body with a row gravity or with another solver than verlet and rk4 has no patches at all.
  *
  * These look where they take the bounds of stiffness anew, which is where a node may have moved a fifth of an element,
  * and in every step while there are patches (effect.h, untangle): one pass over volumes, 8 lanes at a time. Rows and
@@ -41,10 +41,13 @@ typedef struct pal_spring_patch {
     double turn[9]; /* G of the last look, force or energy                                               */
     double spin_1_s[3];
     double sum[9]; /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best                               */
+    double scale;  /* s                                                               */
     double patch_J, spring_J, size_J; /* at the last look: its energy, that of its springs, sum of k q   */
+    double kinetic_J;                 /* then, of its nodes                                              */
     int n;                            /* nodes                                                           */
-    double grow_s, loose_s; /* since it could grow; for which nothing in it was bad and the body stood still */
-    bool bad, pressed;      /* a tetrahedron is too much turned over to leave; a load acts on a node          */
+    double grow_s, loose_s;           /* since it could grow; for which nothing in it was bad and it stood still */
+    bool stays;                       /* its nodes are those that it had before the last change */
+    bool bad, pressed; /* a tetrahedron is too much turned over to leave; a load acts on a node          */
 } pal_spring_patch;
 
 typedef struct pal_spring_tangle {
@@ -53,11 +56,11 @@ typedef struct pal_spring_tangle {
     double *room;          /* for sums at nodes                                             [n_node] */
     pal_spring_patch of[PAL_SPRING_PATCHES];
     int n_patch;
-    double scale, damp_s; /* s, tau                                                                        */
-    double first_J;       /* of motion and springs when there first were patches: what may be again   */
-    double k_J;           /* of the edges then                                                        */
-    double seen_s;        /* world time of the last look                                              */
-    bool stale;           /* rows may have others switched off than nodes say                         */
+    double damp_s;  /* tau                                                                           */
+    double first_J; /* of motion and springs when there first were patches: what may be again   */
+    double k_J;     /* of the edges then                                                        */
+    double seen_s;  /* world time of the last look                                              */
+    bool stale;     /* rows may have others switched off than nodes say                         */
 } pal_spring_tangle;
 
 /* MEMORY */
