@@ -6,8 +6,9 @@ function rate(bytes) {
   return bytes >= 1e6 ? (bytes / 1e6).toFixed(2) + " MB/s" : (bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0) + " kB/s";
 }
 
-/** grouped from five digits on */
-const COUNT = new Intl.NumberFormat("en", { useGrouping: /** @type {any} */ ("min2") });
+/** with commas from five figures on; engines before 2022 do not know that grouping by its name
+ * @param {number} n */
+const count = (n) => (n < 10000 ? String(n) : n.toLocaleString("en"));
 
 /**
  * What is active of each body that adapts: a sentence each, with the body's name when there are several.
@@ -15,10 +16,9 @@ const COUNT = new Intl.NumberFormat("en", { useGrouping: /** @type {any} */ ("mi
  * @param {{name: string}[]} parts of `hello`
  */
 export function activeLines(active, parts) {
-  const n = (/** @type {number} */ value) => COUNT.format(value);
   return active.map((a) => {
     const name = parts.length > 1 ? `${parts[a.part]?.name ?? a.part}: ` : "";
-    return `${name}${n(a.nodes)} of ${n(a.of_nodes)} nodes, ${n(a.springs)} of ${n(a.of_springs)} springs`;
+    return `${name}${count(a.nodes)} of ${count(a.of_nodes)} nodes, ${count(a.springs)} of ${count(a.of_springs)} springs`;
   });
 }
 
@@ -49,7 +49,7 @@ export function rowsOf(plan, status) {
 export function bodyLines(states, parts) {
   return states.map((s) => {
     const said = s.frozen ? [s.why || "It left its bounds."] : [];
-    if (s.rescues) said.push(`${COUNT.format(s.rescues)} ${s.rescues === 1 ? "rescue" : "rescues"}, ${(s.rescue_ms ?? 0).toFixed(s.rescue_ms && s.rescue_ms < 1 ? 3 : 1)} ms in all.`);
+    if (s.rescues) said.push(`${count(s.rescues)} ${s.rescues === 1 ? "rescue" : "rescues"}, ${(s.rescue_ms ?? 0).toFixed(s.rescue_ms && s.rescue_ms < 1 ? 3 : 1)} ms in all.`);
     const name = parts[s.part]?.name ?? String(s.part);
     return { name, frozen: s.frozen === true, mark: s.frozen ? "stopped" : s.asleep ? "asleep" : "", said };
   });
@@ -62,7 +62,7 @@ export function bodyLines(states, parts) {
 export function unwatchedLine({ field, estimate, estimates, unwatched }) {
   const idle = [...(field ? [] : ["colours"]), ...(estimate || !estimates ? [] : ["errors"])];
   const said = idle.length ? `Not computed, nobody looks here: ${idle.join(", ")}.` : "";
-  const skins = unwatched > 0 ? `${COUNT.format(unwatched)} steps were not skinned while nobody watched.` : "";
+  const skins = unwatched > 0 ? `${count(unwatched)} steps were not skinned while nobody watched.` : "";
   return [said, skins].filter(Boolean).join(" ");
 }
 
