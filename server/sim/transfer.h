@@ -36,7 +36,7 @@
 #include "server/sim/world.h"
 
 /* most that a displacement, and a velocity, is lengthened or shortened for the sake of the energy */
-#define PAL_TRANSFER_SCALE 1.6
+#define PAL_TRANSFER_SCALE 1.8
 #define PAL_TRANSFER_RATE  4.0
 
 typedef struct pal_transfer pal_transfer;

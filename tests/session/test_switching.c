@@ -108,10 +108,15 @@ static void step_by_step_the_energy_is_kept(void)
     a_session_changes_its_method_and_comes_back(true);
 }
 
-/* One step after the tool has come, where the springs of whole voxels give most: elements of cut ones would have to lie
- * more than six tenths as far again from rest. They go to the bound, and the velocity makes up for the remainder */
+/* One step after the tool has come, by springs whose constants make them several times as stiff as the tissue: elements
+ * would have to lie more than eight tenths as far again from rest. They go to the bound, and the velocity makes up for
+ * the remainder */
 static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
 {
+    pal_item *model = &scene.body[0].model, was = *model;
+    CHECK(!pal_item_put_text(model, "weights", "volume", NULL));
+    CHECK(!pal_item_put_number(model, "k_distance_J", 0.25, NULL) &&
+          !pal_item_put_number(model, "k_volume_J", 1, NULL));
     pal_session *s = begin(true);
     pal_switch *change = NULL;
     pal_switch_report r;
@@ -127,6 +132,7 @@ static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
     pal_session_close(s);
     pal_session_close(next);
     pal_switch_free(change);
+    *model = was;
 }
 
 static void carry_slowly(void *change, pal_world *next, const pal_world *before)
