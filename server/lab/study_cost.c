@@ -14,8 +14,9 @@
 #include <string.h>
 
 enum { LEAST = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
-/* weight of "no effect" for each knob; of "off by nothing" beside settings that are near */
-static const double ridge = 3e-2, trust = 0.1;
+/* weight of "no effect" for each knob of as many settings as are enough; of "off by nothing" beside settings that are
+ * near */
+static const double ridge = 3e-2, enough = 30, trust = 0.1;
 /* so many knobs that stand otherwise are as far as e times the nodes */
 static const double knobs_per_e = 4, whole_nodes = 1000;
 
@@ -47,10 +48,16 @@ static void features(const pal_setting *s, double n_node, double f[FEATURES])
     f[17] = 0.5 * f[12] * n;
 }
 
-/* (F'F + ridge) w = F'y by elimination; the constant is not held back */
-static void solve(double A[FEATURES][FEATURES + 1], double w[FEATURES])
+/* few settings tell little of each knob: elements times sub-steps alone tell most */
+static double hold_of(int n)
 {
-    for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : ridge;
+    return ridge * fmax(1, pow(enough / n, 2));
+}
+
+/* (F'F + hold) w = F'y by elimination; the constant is not held back */
+static void solve(double A[FEATURES][FEATURES + 1], double hold, double w[FEATURES])
+{
+    for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : hold;
     for (int i = 0; i < FEATURES; i++)
         for (int r = i + 1; r < FEATURES; r++) {
             double share = A[r][i] / A[i][i];
@@ -99,13 +106,13 @@ static cost_law fit(const seen *p, int n, double a, double c)
                 A[r][FEATURES] += slope[r] * y;
             }
         }
-        solve(A, law.w);
+        solve(A, hold_of(n), law.w);
     }
     for (int i = 0; i < n; i++) {
         double off = log((a + work_ms(&law, &p[i], NULL)) / p[i].ms);
         law.misfit += off * off;
     }
-    for (int r = 1; r < FEATURES; r++) law.misfit += ridge * law.w[r] * law.w[r];
+    for (int r = 1; r < FEATURES; r++) law.misfit += hold_of(n) * law.w[r] * law.w[r];
     return law;
 }
 
