@@ -140,9 +140,10 @@ if [ -z "$fast" ]; then
     wait
     say "tests with sanitizers"
     {
-        # ranks of MPI are the release build's, and so are headers alone and tables, of which a sanitizer sees nothing
+        # ranks of MPI and the whole of torture are the release build's (lab has its code), and so are headers alone and
+        # tables, of which a sanitizer sees nothing
         [ ! -e "$build/built_asan" ] ||
-            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|headers|hard_cases|test_hard_table)$'
+            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_torture|test_study_records|headers|hard_cases|test_hard_table)$'
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
     } &
     built asan && waits asan
@@ -153,11 +154,11 @@ if [ -z "$fast" ]; then
     if built fuzz; then
         # two at a time
         ls "$build"/fuzz/tests/fuzz | sed -n 's/^fuzz_\([a-z0-9_]*\)$/\1/p' | xargs -P 2 -I % sh -c 'cd "$0" && mkdir -p corpus/% &&
-            fuzz/tests/fuzz/fuzz_% -max_total_time=3 -timeout=20 -rss_limit_mb=2048 -artifact_prefix="$0/crash_" corpus/% "$1/%" \
+            fuzz/tests/fuzz/fuzz_% -max_total_time=2 -timeout=20 -rss_limit_mb=2048 -artifact_prefix="$0/crash_" corpus/% "$1/%" \
                 >fuzz_%.log 2>&1; echo $? >fuzz_%.code' "$build" "$tree/tests/data/fuzz"
         for code in "$build"/fuzz_*.code; do
             thing=$(basename "$code" .code)
-            step "$(echo "$thing" | tr _ ' ') for 3 s" sh -c 'cat "$0/$1.log"; exit $(cat "$0/$1.code")' "$build" "$thing"
+            step "$(echo "$thing" | tr _ ' ') for 2 s" sh -c 'cat "$0/$1.log"; exit $(cat "$0/$1.code")' "$build" "$thing"
         done
     fi
 fi

@@ -1,6 +1,8 @@
 /* `palpate bench guards`: what it costs to be on guard while nothing goes wrong, as a share of a step, for every model:
  * two worlds of one scene step in turn under the same load; one has the row finite_guard and an implicit solver that
- * watches its energy, the other neither. Medians of the processor time of each, and of their difference pair by pair.
+ * watches its energy, the other neither. Medians of the processor time of each, and of their difference pair by pair,
+ * over worlds that are made anew several times, now the one first and now the other: where two worlds of one scene lie
+ * in memory alone makes them differ by several percent.
  * What every solver looks at besides (is all finite?) cannot be taken out and is timed alone, as is the row. Asked: 3 %
  * of a step for difference and looks together; what is watched while a step computes has no price of its own and is
  * named. */
@@ -17,11 +19,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_CASE = 4, N_STEP = 320, N_WARM = 8 };
+enum { N_CASE = 4, N_ROUND = 10, N_STEP = 40, N_ALL = N_ROUND * N_STEP, N_WARM = 8 };
 
 typedef struct guards {
     const char *model;
     int n_point, n_sub;
+    bool watches;      /* an implicit solver's energy */
     uint64_t n_rescue; /* 0, else something did go wrong */
     double with_ms, without_ms, row_ms, looks_ms, watch_ms;
 } guards;
@@ -125,39 +128,56 @@ static pal_err step_ms(pal_world *world, double step_s, double *ms)
     return err;
 }
 
-static pal_err measure(const bodies *b, int which, guards *out, pal_note *note)
+/* of all steps [N_ALL] */
+typedef struct times {
+    double ms[2][N_ALL], row[N_ALL], more[N_ALL];
+} times;
+
+/* both worlds made, stepped in turn and gone; what is no sum of times goes to out from the guarded one */
+static pal_err one_round(const bodies *b, int which, int round, times *t, guards *out, pal_note *note)
 {
     static pal_scene scene[2];
     pal_world *world[2] = {NULL, NULL};
-    double ms[2][N_STEP], row[N_STEP], more[N_STEP];
     pal_err err = PAL_ERR_OK;
-    for (int g = 0; g < 2 && !err; g++) {
+    for (int turn = 0; turn < 2 && !err; turn++) {
+        int g = (round + turn) & 1;
         err = dress(&scene[g], b, which, g == 1, note);
         if (!err) err = pal_world_create(&scene[g], note, &world[g]);
     }
-    for (int k = -N_WARM; k < N_STEP && !err; k++)
+    for (int k = -N_WARM; k < N_STEP && !err; k++) {
+        const int at = round * N_STEP + k;
         for (int turn = 0; turn < 2 && !err; turn++) {
             /* who is first changes from step to step */
             int g = (k + turn) & 1;
             double took = 0;
             err = lean(world[g], k + N_WARM);
             if (!err) err = step_ms(world[g], scene[g].step_s, &took);
-            if (k >= 0) ms[g][k] = took;
-            if (k >= 0 && g == 1) row[k] = row_ms(world[1], "finite_guard");
+            if (k >= 0) t->ms[g][at] = took;
+            if (k >= 0 && g == 1) t->row[at] = row_ms(world[1], "finite_guard");
         }
+        if (k >= 0) t->more[at] = t->ms[1][at] - t->ms[0][at] - t->row[at];
+    }
     if (!err) {
-        for (int k = 0; k < N_STEP; k++) more[k] = ms[1][k] - ms[0][k] - row[k];
-        *out = (guards){.model = model_name[which],
-                        .n_point = pal_world_body(world[1], 0)->n_active,
-                        .n_sub = pal_world_substeps(world[1]),
-                        .n_rescue = pal_rescues_sum(&pal_world_body(world[1], 0)->rescue),
-                        .with_ms = pal_median(ms[1], N_STEP),
-                        .without_ms = pal_median(ms[0], N_STEP),
-                        .row_ms = pal_median(row, N_STEP),
-                        .looks_ms = looks_ms(world[1])};
-        if (pal_world_body(world[1], 0)->implicit) out->watch_ms = pal_median(more, N_STEP);
+        out->n_point = pal_world_body(world[1], 0)->n_active;
+        out->n_sub = pal_world_substeps(world[1]);
+        out->n_rescue += pal_rescues_sum(&pal_world_body(world[1], 0)->rescue);
+        out->looks_ms = looks_ms(world[1]);
+        out->watches = pal_world_body(world[1], 0)->implicit;
     }
     for (int g = 0; g < 2; g++) pal_world_destroy(world[g]);
+    return err;
+}
+
+static pal_err measure(const bodies *b, int which, guards *out, pal_note *note)
+{
+    static times t;
+    pal_err err = PAL_ERR_OK;
+    *out = (guards){.model = model_name[which]};
+    for (int round = 0; round < N_ROUND && !err; round++) err = one_round(b, which, round, &t, out, note);
+    out->with_ms = pal_median(t.ms[1], N_ALL);
+    out->without_ms = pal_median(t.ms[0], N_ALL);
+    out->row_ms = pal_median(t.row, N_ALL);
+    if (out->watches) out->watch_ms = pal_median(t.more, N_ALL);
     return err;
 }
 
