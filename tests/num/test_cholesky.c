@@ -676,7 +676,7 @@ int main(void)
     RUN(factors_on_the_threads_it_was_called_on);
     RUN(survives_every_request_for_memory_that_fails);
     RUN(an_incomplete_factor_without_fill_is_whole);
-    RUN(conjugate_gradients_gain_from_an_incomplete_factor);
+    RUN_SERIAL(conjugate_gradients_gain_from_an_incomplete_factor); /* no thread of its own */
     RUN(an_incomplete_factor_refuses_what_has_none);
     return check_report();
 }
