@@ -35,6 +35,8 @@ typedef struct pal_step {
     int n_force;
     pal_row *contact; /* this body's CONTACT rows       [n_contact]; for their stiffness only */
     int n_contact;
+    pal_row *adapt; /* this body's ADAPT rows         [n_adapt] */
+    int n_adapt;
     bool drag_apart; /* set by a solver that applies the rows' drag itself: pal_gather leaves those rows out */
     double dt_s;     /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT */
     double time_s;   /* at its end                                                         */
@@ -158,7 +160,8 @@ typedef struct pal_effect {
     const pal_tangent *tangent;
     bool implicit;   /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other rows are made */
     bool keeps_rows; /* SOLVE: holds pointers or patterns of the body's rows, so it is made anew when they change */
-    /* time from which the row's force no longer changes with time by itself, s; INFINITY: never. NULL: it never does */
+    /* time from which the row's force, ADAPT: the body's nodes, no longer change with time by themselves, s; INFINITY:
+     * never. NULL: they never do */
     double (*settled_s)(const void *self);
     /* CONTACT: how far from the tool's centre the row acts or looks, INFINITY while some tool holds or presses the body
      * by it; NULL: it knows no tools */

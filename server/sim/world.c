@@ -25,6 +25,8 @@ static pal_step step_of(pal_world *w, int b)
                       .n_force = p->n_of[PAL_STAGE_FORCE][b],
                       .contact = p->row + p->first[PAL_STAGE_CONTACT][b],
                       .n_contact = p->n_of[PAL_STAGE_CONTACT][b],
+                      .adapt = p->row + p->first[PAL_STAGE_ADAPT][b],
+                      .n_adapt = p->n_of[PAL_STAGE_ADAPT][b],
                       .time_s = w->time_s};
 }
 

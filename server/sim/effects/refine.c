@@ -22,7 +22,8 @@
  *
  * Keys: force_N (absent: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s (absent:
  * 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (absent: 0.3/h_0); 0 switches a criterion off, and with all three off nothing
- * ever changes. What stands as it was looked at last is looked at again after dwell_s only. dwell_s (0.2), every_s
+ * ever changes. What stands as it was looked at last is looked at again after dwell_s only; until that has found
+ * nothing to do, now or later, the body does not sleep (row sleep). dwell_s (0.2), every_s
  * (1/120), most_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
@@ -48,6 +49,8 @@ typedef struct refine {
 
     double clock_s, wait_s;           /* simulated since reset; until the next evaluation              */
     double seen_s, seen_load2, way_m; /* clock and sum of squared loads at the last one; no node went farther since */
+    bool put_off;                     /* it had wishes that have to wait for dwell_s                         */
+    bool seen_twice;                  /* nothing had moved since the one before, and it changed nothing      */
     uint64_t seen_revision;           /* 0: there was none                                             */
     uint8_t *patience;                /* twos by which a face waits longer to be joined                  [n faces]  */
     double *switched_s;               /* clock of a face's last switch                       [n faces]  */
@@ -76,6 +79,7 @@ static void clear(refine *row)
     }
     row->clock_s = row->wait_s = row->spring_slope = row->shape_slope = row->way_m = 0;
     row->seen_revision = 0;
+    row->put_off = row->seen_twice = false;
     for (int32_t i = 0; i < levels->n_vertex[levels->n_level - 1]; i++) row->seen[i] = 0;
     row->report = (pal_switch_report){0};
     pal_set3(row->measure.frame.quat + 1, 0, 0, 0);
@@ -247,14 +251,17 @@ static bool take_wishes(refine *row, const pal_body *body)
 {
     const pal_shell *shell = row->shell;
     bool any = false;
+    row->put_off = false;
     for (int k = 0; k < shell->n_leaf; k++) {
         int32_t leaf = shell->leaf[k], parent = parent_of_first(&shell->levels, leaf);
-        row->wish[k] = NOTHING;
+        int wish = NOTHING;
         if (wants_split(row, leaf))
-            row->wish[k] = may_split(row, leaf) ? SPLIT : NOTHING;
-        else if (parent >= 0 && settled(row, parent) && pal_shell_can_join(shell, parent) &&
-                 wants_join(row, body, parent))
-            row->wish[k] = JOIN;
+            wish = SPLIT;
+        else if (parent >= 0 && pal_shell_can_join(shell, parent) && wants_join(row, body, parent))
+            wish = JOIN;
+        const bool now = wish == SPLIT ? may_split(row, leaf) : wish == NOTHING || settled(row, parent);
+        row->put_off |= !now;
+        row->wish[k] = (uint8_t)(now ? wish : NOTHING);
         any |= row->wish[k] != NOTHING;
     }
     return any;
@@ -496,7 +503,7 @@ static void change(refine *row, pal_step *step)
     pal_switch_take(&report->after, step);
 }
 
-/* would an evaluation look at what the last one saw? then it can wait, for dwell_s at most */
+/* would an evaluation look at what the last one saw? */
 static bool is_still(refine *row, const pal_body *body, double dt_s, double *load2)
 {
     double most2 = 0;
@@ -509,7 +516,12 @@ static bool is_still(refine *row, const pal_body *body, double dt_s, double *loa
     }
     row->way_m += dt_s * sqrt(most2);
     return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->h_m &&
-           fabs(*load2 - row->seen_load2) <= 1e-6 * *load2 && row->clock_s - row->seen_s < row->dwell_s;
+           fabs(*load2 - row->seen_load2) <= 1e-6 * *load2;
+}
+
+static bool evaluates(const refine *row)
+{
+    return row->limits.force_N > 0 || row->limits.speed_m_s > 0 || row->limits.curvature_1_m > 0;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -524,13 +536,23 @@ static pal_err run(void *self, pal_step *step)
     const bool still = is_still(row, step->body, step->dt_s, &load2);
     if (row->wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
     row->wait_s = fmax(row->wait_s + row->every_s, 0);
-    if (!(row->limits.force_N > 0 || row->limits.speed_m_s > 0 || row->limits.curvature_1_m > 0)) return PAL_ERR_OK;
-    if (still) return PAL_ERR_OK;
+    if (!evaluates(row)) return PAL_ERR_OK;
+    if (still && row->clock_s - row->seen_s < row->dwell_s) return PAL_ERR_OK;
     row->seen_revision = step->body->revision + 1, row->seen_s = row->clock_s;
     row->seen_load2 = load2, row->way_m = 0;
     pal_refine_mark_nodes(&row->measure, shell, step->body, &row->limits);
+    const uint64_t n_switch = row->report.n_switch;
     if (take_wishes(row, step->body)) change(row, step);
+    row->seen_twice = still && row->report.n_switch == n_switch;
     return PAL_ERR_OK;
+}
+
+/* a body that slept before its faces may be joined would stay fine for ever */
+static double settled_s(const void *self)
+{
+    const refine *row = self;
+    const bool eased = row->spring_slope == 0 && row->shape_slope == 0;
+    return !evaluates(row) || (row->seen_twice && !row->put_off && eased) ? 0 : INFINITY;
 }
 
 /* the body is at rest, but may have another level than at load */
@@ -571,4 +593,5 @@ const pal_effect pal_effect_refine = {.name = "refine",
                                       .run = run,
                                       .material = material,
                                       .reset = reset,
-                                      .hand = hand};
+                                      .hand = hand,
+                                      .settled_s = settled_s};

@@ -2,10 +2,10 @@
  * threshold").
  *
  * It falls asleep when for `still_s` of simulated time no point was faster than speed_1_s S, the triangles were the
- * same, no tool was near and no row's force changed by itself with time, and when after that the forces left over would
- * move it by less than rest_1_s2 S in s^2, on average over its mass (S: the body's box diagonal). Velocities are then
- * 0, positions stay as they are to the bit, and none of the body's rows is run. What CONTACT rows knew of tools is
- * forgotten, as after a reset.
+ * same, no tool was near, no row's force changed by itself with time and refinement had nothing left to do, and when
+ * after that the forces left over would move it by less than rest_1_s2 S in s^2, on average over its mass (S: the
+ * body's box diagonal). Velocities are then 0, positions stay as they are to the bit, and none of the body's rows is
+ * run. What CONTACT rows knew of tools is forgotten, as after a reset.
  *
  * It wakes in the step in which a tool comes as near as the CONTACT rows reach (their hook reach_m), swept along the
  * tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
@@ -57,7 +57,7 @@ static bool slow(const sleeper *row, const pal_body *body)
     return all;
 }
 
-/* does some row's force still change by itself? */
+/* does some row still change something by itself? */
 static bool changes(const pal_row *row, int n, double time_s)
 {
     for (int i = 0; i < n; i++)
@@ -176,7 +176,8 @@ static pal_err run(void *self, pal_step *step)
     row->revision = body->revision;
     row->boxed = false;
     bool calm = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
-                !changes(step->contact, step->n_contact, step->time_s) && !tool_near(row, step);
+                !changes(step->contact, step->n_contact, step->time_s) &&
+                !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
     row->calm_s = calm ? row->calm_s + step->dt_s : 0;
     /* a hair less, so that a sum of steps is what it is meant to be */
     if (row->calm_s < row->still_s * (1 - 1e-9)) return PAL_ERR_OK;
