@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/solid_mass.h"
+#include "server/sim/sums.h"
 
 #include <limits.h>
 #include <string.h>
@@ -373,23 +374,28 @@ static double still_N(const pal_body *body)
     return isfinite(body->load_cap_N) ? still_share * body->load_cap_N : 0;
 }
 
-/* energy at velocities v, the body being at its x: kinetic, of the rows, less the work of loads and contact since the
- * sub-step's begin, when it has moved; *slack: what of it is not worth an iteration */
-static double total_energy(pal_implicit *core, const double *velocity, bool moved, double *slack)
+/* what loads on nodes and contact have put in since the sub-step's begin, J */
+static double work_done(pal_implicit *core)
 {
     const pal_body *body = core->system.body;
-    double kinetic = 0, rows = pal_system_energy(&core->system), work = 0, *p = core->cg.z, *q = core->cg.q;
-    if (body->solid_mass) kinetic = 0.5 * pal_system_square(&core->system, 1, 0, velocity);
-    for (int i = 0; i < body->n_dof && !body->solid_mass; i++)
-        pal_scale3(q + 3 * i, body->mass_kg[i], velocity + 3 * i);
-    if (!body->solid_mass) kinetic = 0.5 * pal_sum_products(core->cg.n, velocity, q);
-    for (int i = 0; i < core->cg.n && moved; i++) p[i] = body->x[i] - core->x0[i];
-    if (moved) work = pal_system_work(&core->system, p);
-    if (moved && core->system.has_contact) {
-        memset(q, 0, bytes3(core));
-        pal_system_contact(&core->system, 1, 0, p, q);
-        work -= 0.5 * pal_sum_products(core->cg.n, p, q);
-    }
+    double *p = core->cg.z, *q = core->cg.q;
+    if (!body->embed && !core->system.has_contact) return pal_sum_way(core->cg.n, body->load, body->x, core->x0);
+    for (int i = 0; i < core->cg.n; i++) p[i] = body->x[i] - core->x0[i];
+    double work = pal_system_work(&core->system, p);
+    if (!core->system.has_contact) return work;
+    memset(q, 0, bytes3(core));
+    pal_system_contact(&core->system, 1, 0, p, q);
+    return work - 0.5 * pal_sum_products(core->cg.n, p, q);
+}
+
+/* energy of the body as it is: kinetic, of the rows, less the work of loads and contact since the sub-step's begin, when
+ * it has moved; *slack: what of it is not worth an iteration */
+static double total_energy(pal_implicit *core, bool moved, double *slack)
+{
+    const pal_body *body = core->system.body;
+    double rows = pal_system_energy(&core->system), work = moved ? work_done(core) : 0;
+    double kinetic = 0.5 * (body->solid_mass ? pal_system_square(&core->system, 1, 0, body->v)
+                                             : pal_sum_motion(body->n_dof, body->mass_kg, body->v));
     *slack = 1e-7 * (kinetic + fabs(work)) + 1e-14 * fabs(rows) + still_share * still_N(body) * body->h_m;
     return kinetic + rows - work;
 }
@@ -397,8 +403,15 @@ static double total_energy(pal_implicit *core, const double *velocity, bool move
 /* led nodes put in work that nobody counts */
 static bool is_led(const pal_body *body)
 {
-    for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0) return true;
+    for (int i = 0; i < body->n_dof; i++) {
+        uint64_t next = 0;
+        /* most nodes are free: eight at a glance */
+        if (i + 8 <= body->n_dof) memcpy(&next, body->held + i, 8);
+        if (i + 8 <= body->n_dof && next == 0)
+            i += 7;
+        else if (body->held[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0)
+            return true;
+    }
     return false;
 }
 
@@ -406,8 +419,11 @@ static bool is_led(const pal_body *body)
 static bool rises(pal_implicit *core, double share)
 {
     double slack;
-    return core->guarded && total_energy(core, core->system.body->v, true, &slack) >
-                                core->energy0_J + share * fabs(core->energy0_J) + slack;
+    if (!core->guarded) return false;
+    double now = total_energy(core, true, &slack);
+    /* its sums take in every number of x and v, but for points that carry no node */
+    core->sound = isfinite(now) && !core->system.body->embed;
+    return now > core->energy0_J + share * fabs(core->energy0_J) + slack;
 }
 
 /* of all loads on points, Euclidean, N */
@@ -426,6 +442,7 @@ static void open_stage(pal_implicit *core, double tau)
     core->system.mass = 1 + tau * pal_system_drag(&core->system);
     core->system.stiff = tau * tau;
     core->system.damp = tau;
+    core->sound = false;
     const double *x = core->system.body->x;
     for (int i = 0; i < core->cg.n; i++) core->start[i] = (x[i] - core->xs[i]) / tau;
 }
@@ -475,11 +492,6 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 
 /* ---- a sub-step ---- */
 
-static bool sound(const pal_body *body)
-{
-    return pal_body_finite(body);
-}
-
 /* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across.
  * Where something holds the body it does not matter: what they do not add costs nothing to leave in */
 static bool contact_acts(pal_implicit *core)
@@ -497,7 +509,8 @@ static bool contact_acts(pal_implicit *core)
 bool pal_implicit_begin(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
-    if (!sound(body)) {
+    const bool finite = pal_copy_finite(core->cg.n, body->x, core->x0);
+    if (!pal_copy_finite(core->cg.n, body->v, core->v0) || !finite) {
         pal_body_stop_bad(body, "");
         return false;
     }
@@ -509,8 +522,6 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     pal_system_place(&core->system);
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->untangle) (void)step->force[i].effect->untangle(step->force[i].self, step);
-    memcpy(core->x0, body->x, bytes3(core));
-    memcpy(core->v0, body->v, bytes3(core));
     core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
     core->risen = false;
     pal_system_touch(&core->system, step);
@@ -518,7 +529,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     step->drag_apart = true;
     double slack;
     core->guarded = core->wish.watch && core->wish.newton == 1 && core->system.has_energy && !is_led(body);
-    if (core->guarded) core->energy0_J = total_energy(core, body->v, false, &slack);
+    if (core->guarded) core->energy0_J = total_energy(core, false, &slack);
     return true;
 }
 
@@ -593,7 +604,7 @@ static void stand_still(pal_implicit *core, double dt_s)
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
-    if (!sound(body)) {
+    if (!core->sound && !pal_body_finite(body)) {
         pal_body_stop_bad(body, "");
         memcpy(body->x, core->x0, bytes3(core));
         memset(body->v, 0, bytes3(core));
@@ -620,7 +631,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
 double pal_implicit_limit(void *self, pal_step *step)
 {
     const pal_implicit *core = self;
-    return sound(step->body) ? core->wish.substep_s : (double)NAN;
+    return pal_body_finite(step->body) ? core->wish.substep_s : (double)NAN;
 }
 
 pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_note *note)

@@ -56,6 +56,7 @@ typedef struct pal_implicit {
     double reference;    /* of the tolerance, N s               */
     double energy0_J;    /* at the sub-step's begin             */
     bool guarded;        /* energy is watched: see above        */
+    bool sound;          /* its last look found that x and v are finite */
     bool risen;          /* ... and was not kept in this sub-step ... */
     int n_risen, n_calm; /* ... nor in so many (0 after half a second of peace); sub-steps since then */
     int most_cg, round;  /* in one solve of this sub-step; rounds of settle */

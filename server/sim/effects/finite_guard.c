@@ -11,6 +11,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/effect.h"
 #include "server/sim/shell.h"
+#include "server/sim/sums.h"
 
 #include <math.h>
 #include <string.h>
@@ -104,21 +105,6 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* twice the kinetic energy, NaN where a velocity is none; in lanes, as no addition then waits for the one before */
-static double motion(int n, const double *mass_kg, const double *v)
-{
-    double lane[8] = {0}, sum = 0;
-    int i = 0;
-    for (; i + 8 <= n; i += 8)
-        for (int l = 0; l < 8; l++) {
-            const double *u = v + 3 * (size_t)(i + l);
-            lane[l] += mass_kg[i + l] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-        }
-    for (; i < n; i++) sum += mass_kg[i] * pal_dot3(v + 3 * (size_t)i, v + 3 * (size_t)i);
-    for (int l = 0; l < 8; l++) sum += lane[l];
-    return sum;
-}
-
 /* true when every number is finite and within bounds; comparisons are written so that NaN fails them */
 static bool sound(const finite_guard *guard, const pal_body *body)
 {
@@ -134,9 +120,9 @@ static bool sound(const finite_guard *guard, const pal_body *body)
     for (int i = 0; i < n; i++) far += fabs(body->x[i] - body->x_rest[i]) <= limit ? 0 : 1;
     if (body->embed) {
         for (int i = 0; i < n; i++) energy += 0 * body->v[i];
-        energy += motion(body->n_node, body->node_mass_kg, body->dv);
+        energy += pal_sum_motion(body->n_node, body->node_mass_kg, body->dv);
     } else if (!body->active)
-        energy += motion(body->n_dof, body->mass_kg, body->v);
+        energy += pal_sum_motion(body->n_dof, body->mass_kg, body->v);
     return far == 0 && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
@@ -145,7 +131,7 @@ static bool sound(const finite_guard *guard, const pal_body *body)
 static void tell(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->size_m;
-    double twice_J = body->embed ? motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
+    double twice_J = body->embed ? pal_sum_motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
     int far = -1, fast = -1;
     bool number = pal_body_finite(body);
     for (int k = 0; k < body->n_active && number; k++) {
