@@ -388,8 +388,8 @@ static double work_done(pal_implicit *core)
     return work - 0.5 * pal_sum_products(core->cg.n, p, q);
 }
 
-/* energy of the body as it is: kinetic, of the rows, less the work of loads and contact since the sub-step's begin, when
- * it has moved; *slack: what of it is not worth an iteration */
+/* energy of the body as it is: kinetic, of the rows, less the work of loads and contact since the sub-step's begin,
+ * when it has moved; *slack: what of it is not worth an iteration */
 static double total_energy(pal_implicit *core, bool moved, double *slack)
 {
     const pal_body *body = core->system.body;

@@ -1,5 +1,6 @@
 /* finite_guard: a body that diverges is frozen in its last good state, and reset brings it back. */
 #include "server/sim/effect.h"
+#include "server/sim/sums.h"
 #include "tests/sim/tool_scene.h"
 
 static bool open_two(tool_scene *s)
@@ -199,8 +200,37 @@ static void rescues_are_counted_with_their_price_and_only_then(void)
     tool_scene_close(&s);
 }
 
+/* sums of 8 at a time are what they say for any number of points, and no number that is none is lost in them */
+static void sums_miss_no_number(void)
+{
+    enum { MOST = 35 };
+    double mass[MOST], v[3 * MOST], x[3 * MOST], x0[3 * MOST], copy[3 * MOST + 1];
+    for (int n = 0; n <= MOST; n++) {
+        double motion = 0, way = 0;
+        for (int i = 0; i < 3 * n; i++) {
+            mass[i / 3] = 0.5 + i / 3, v[i] = sin(i), x[i] = cos(i), x0[i] = 0.1 * i;
+            motion += mass[i / 3] * v[i] * v[i], way += v[i] * (x[i] - x0[i]);
+        }
+        copy[3 * n] = -7;
+        CHECK_NEAR(pal_sum_motion(n, mass, v), motion, 1e-12 * motion);
+        CHECK_NEAR(pal_sum_way(3 * n, v, x, x0), way, 1e-12 * fabs(way));
+        CHECK(pal_copy_finite(3 * n, x, copy) && !memcmp(copy, x, 3 * sizeof(double) * (size_t)n) && copy[3 * n] == -7);
+        for (int i = 0; i < 3 * n; i++) {
+            const double bad = i % 2 ? NAN : -INFINITY, v_i = v[i], x_i = x[i];
+            x[i] = bad;
+            CHECK(!pal_copy_finite(3 * n, x, copy));
+            v[i] = 0; /* where nothing pulls, too */
+            CHECK(!isfinite(pal_sum_way(3 * n, v, x, x0)));
+            v[i] = bad, x[i] = x_i;
+            CHECK(!isfinite(pal_sum_motion(n, mass, v)));
+            v[i] = v_i;
+        }
+    }
+}
+
 int main(void)
 {
+    RUN(sums_miss_no_number);
     RUN(freezes_what_is_no_number_too_far_or_too_fast);
     RUN(leaves_a_body_alone_that_is_only_pressed_hard);
     RUN(one_of_two_bodies_stops_alone_and_is_reset_alone);

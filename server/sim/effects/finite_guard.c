@@ -131,7 +131,8 @@ static bool sound(const finite_guard *guard, const pal_body *body)
 static void tell(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->size_m;
-    double twice_J = body->embed ? pal_sum_motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
+    double twice_J =
+        body->embed ? pal_sum_motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
     int far = -1, fast = -1;
     bool number = pal_body_finite(body);
     for (int k = 0; k < body->n_active && number; k++) {
