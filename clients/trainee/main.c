@@ -1,6 +1,7 @@
 /* palpate-trainee: scripted headless trainees against a server; load, latency, frame checks (trainee.h). */
 #include "clients/link/client_flags.h"
 #include "clients/trainee/trainee.h"
+#include "clients/trainee/until.h"
 #include "protocol/field_codec.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
@@ -20,6 +21,7 @@ typedef struct crowd {
     pal_trainee **trainee;
     int n;
     char (*name)[PAL_WIRE_MEMBER_NAME];
+    pal_until until;
 } crowd;
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
@@ -36,13 +38,16 @@ static void main_asset(void *user, const pal_stored_asset *asset)
     for (int i = 0; i < c->n; i++) pal_trainee_asset(c->trainee[i], asset);
 }
 
-/* ends early when asked to or when nobody is left */
+/* ends early when asked to, when nobody is left, or when all have seen what they are there for */
 static void main_watch(void *user)
 {
     crowd *c = user;
-    bool all = true;
-    for (int i = 0; i < c->n; i++) all = all && pal_trainee_ended(c->trainee[i]);
-    if (main_signal || all) pal_link_stop(c->loop);
+    bool all = true, reached = true;
+    for (int i = 0; i < c->n; i++) {
+        all = all && pal_trainee_ended(c->trainee[i]);
+        reached = reached && pal_until_reached(&c->until, pal_trainee_look(c->trainee[i]));
+    }
+    if (main_signal || all || reached) pal_link_stop(c->loop);
 }
 
 typedef struct totals {
@@ -244,6 +249,7 @@ static const char *main_verdict(const totals *sum, int n_client, const char *fie
 static int main_run(crowd *c, const pal_trainee_options *base, double seconds, bool json, bool quiet)
 {
     pal_note note = {""};
+    pal_log_set_level(PAL_LOG_WARN);
     pal_err err = pal_link_loop_create(&c->loop);
     const int wanted = base->n_client;
     if (!err) c->store = pal_asset_store_create(c->loop, base->url, main_asset, c);
@@ -275,10 +281,19 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
     return reason ? 1 : 0;
 }
 
+/* orders and what to wait for, where they are given; an exit code */
+static int main_read(const char *sculpt, pal_orders *orders, const char *until, pal_until *seen)
+{
+    pal_note note = {""};
+    const int code = until && pal_until_read(seen, until, &note) ? 2 : sculpt && pal_orders_load(orders, sculpt, &note);
+    if (code) fprintf(stderr, "palpate-trainee: %s\n", note.text);
+    return code;
+}
+
 int main(int argc, char **argv)
 {
     const char *url = NULL, *name = "trainee", *script = "press", *tool = "any", *up = "0,0,1", *stall = NULL,
-               *field = NULL, *sculpt = NULL;
+               *field = NULL, *sculpt = NULL, *until = NULL;
     double seconds = 5, rate = 120, clients = 1, slow = 0, depth = 0;
     bool json = false, quiet = false;
     int n_operand;
@@ -287,6 +302,10 @@ int main(int argc, char **argv)
         {"--name", "NAME", PAL_CLIENT_TEXT, &name, 0, 0, NULL, "name among the members"},
         {"--tool", "N", PAL_CLIENT_TEXT, &tool, 0, 0, NULL, "tool to take: its index or any (any)"},
         {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 86400, NULL, "how long (5)"},
+        {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &until, 0, 0, NULL,
+         "end before that once each client has seen so much: cycles, frames, answered, fields, patches, triangles, "
+         "orders, "
+         "topologies, cycles_of_it (the last topology's), members, joins, stalls, moved_mm, force_N, field_high"},
         {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 240, NULL, "poses per second (120)"},
         {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MOST, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
@@ -334,23 +353,20 @@ int main(int argc, char **argv)
         return 2;
     }
     pal_orders orders = {.n_line = 0};
-    pal_note note = {""};
-    if (sculpt && pal_orders_load(&orders, sculpt, &note)) {
-        fprintf(stderr, "palpate-trainee: %s\n", note.text);
-        return 1;
-    }
+    pal_until seen = {.any = false};
+    const int bad = main_read(sculpt, &orders, until, &seen);
+    if (bad) return bad;
     if (sculpt) base.orders = &orders;
     if (!quiet) base.told = main_told, base.user = &json;
     signal(SIGINT, main_on_signal);
     signal(SIGTERM, main_on_signal);
-    pal_log_set_level(PAL_LOG_WARN);
     crowd c = {.trainee = calloc((size_t)base.n_client, sizeof *c.trainee),
-               .name = calloc((size_t)base.n_client, sizeof *c.name)};
+               .name = calloc((size_t)base.n_client, sizeof *c.name),
+               .until = seen};
     const int result = c.trainee && c.name ? main_run(&c, &base, seconds, json, quiet) : 1;
     for (int i = 0; i < c.n; i++) pal_trainee_destroy(c.trainee[i]);
     pal_asset_store_destroy(c.store);
-    free(c.trainee);
-    free(c.name);
+    free(c.trainee), free(c.name);
     pal_orders_free(&orders);
     return result;
 }

@@ -286,6 +286,7 @@ static void trainee_tools(pal_trainee *t, const uint8_t *bytes, size_t n_byte)
     t->last_cycle_ns = now;
     t->cycle_seen = true;
     t->result.n_cycle++;
+    t->result.n_cycle_of_it += t->part[0].seen;
     const int tool = t->result.tool;
     const bool own = tool >= 0 && (uint32_t)tool < tools.n_tool && tools.tool[tool].holder == t->id;
     if (own) trainee_latency(t, &tools.tool[tool], now);
@@ -424,6 +425,7 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
     t->cycle_seen = false;
     t->asked = false; /* an order that was under way is given again */
     t->patched = -1;
+    t->result.n_cycle_of_it = 0;
     t->echo_seq = 0;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
         t->part[i].seq = 0;
@@ -451,13 +453,16 @@ static void trainee_on_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_HELLO) trainee_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
         t->result.n_topology++;
+        t->result.n_cycle_of_it = 0;
         t->reshaped = true;
         trainee_parts(t, c->topology.part, c->topology.n_part);
     }
     if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) trainee_answered(t, c);
-    if (c->type == PAL_CONTROL_MEMBERS)
+    if (c->type == PAL_CONTROL_MEMBERS) {
+        t->result.n_member = c->members.n_member;
         for (uint32_t i = 0; i < c->members.n_member; i++)
             if (c->members.member[i].id == t->id) t->result.tool = c->members.member[i].tool;
+    }
 }
 
 static void trainee_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)

@@ -73,7 +73,9 @@ typedef struct pal_trainee_result {
     uint64_t n_patch, patch_bytes;
     uint32_t n_triangle, n_place;              /* drawn now, and places, of all parts that adapt */
     bool field_given;                          /* a part of the session gives what was asked for */
+    uint32_t n_member;                         /* of the session, itself too                   */
     uint32_t n_topology;                       /* other topologies that came                   */
+    uint64_t n_cycle_of_it;                    /* cycles since a frame of the last one, or join, was seen */
     int n_order, n_refused;                    /* answered, and those of them that might not fail and did */
     char refused[256];                         /* the first of these                           */
     pal_samples latency_ms, decode_ms, gap_ms; /* owned by the trainee */

@@ -160,7 +160,7 @@ static void sleeps_between_runs(void)
     int count[6] = {0}, awake = -1;
     REQUIRE(pal_team_create(6, &team) == PAL_ERR_OK);
     pal_team_run(team, 6, add_one, count);
-    for (int wait = 0; wait < 2000 && (awake = count_awake()) > 0; wait++) usleep(1000);
+    for (int wait = 0; wait < 30000 && (awake = count_awake()) > 0; wait++) usleep(1000);
     CHECK_INT(awake, 0);
     pal_team_run(team, 6, add_one, count);
     for (int i = 0; i < 6; i++) CHECK_INT(count[i], 2);

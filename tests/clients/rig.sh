@@ -91,6 +91,9 @@ start_server() {
     url="ws://127.0.0.1:$port/ws"
 }
 
+# members N: until the session has so many, for a minute at most
+members() { timeout 70 "$bin/palpate-trainee" "$url" --script idle --name waits --seconds 60 --until members=$(($1 + 1)),frames=1 --quiet; }
+
 # json KEY FILE: first number (or word) of that key
 json() { tr ',{}' '\n\n\n' <"$2" | sed -n "s/^\"$1\":\"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p" | head -1; }
 

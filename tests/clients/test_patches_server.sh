@@ -9,7 +9,7 @@ start_server --port 0
 run() { # NAME flags: report in $work/NAME, exit code in $code
     name=$1
     shift
-    timeout 60 "$bin/palpate-trainee" "$url" --json "$@" >"$work/$name" 2>"$work/$name.err"
+    timeout 100 "$bin/palpate-trainee" "$url" --json "$@" >"$work/$name" 2>"$work/$name.err"
     code=$?
     [ $code -eq 0 ] || cat "$work/$name.err"
 }
@@ -23,11 +23,12 @@ check "of as many places as the finest level has" "$(patches places "$work/idle"
 check "and no patch, for nothing changes" "$(patches n "$work/idle")" == 0
 
 # pulled by one, seen by a slow reader and by one that stalls
-timeout 60 "$bin/palpate-trainee" "$url" --json --script idle --slow 4000 --seconds 4.5 --name slow >"$work/slow" 2>"$work/slow.err" &
+timeout 100 "$bin/palpate-trainee" "$url" --json --script idle --slow 4000 --seconds 60 --until patches=1,cycles=60 --name slow >"$work/slow" 2>"$work/slow.err" &
 slow=$!
-timeout 60 "$bin/palpate-trainee" "$url" --json --script idle --stall 2 --seconds 4.5 --name stalls >"$work/stall" 2>"$work/stall.err" &
+timeout 100 "$bin/palpate-trainee" "$url" --json --script idle --stall 2 --seconds 60 --until patches=1,stalls=1 --name stalls >"$work/stall" 2>"$work/stall.err" &
 stall=$!
-run pull --script pull --seconds 4
+members 2
+run pull --script pull --seconds 60 --until patches=4,triangles=230
 check "a pull passes every check" $code == 0
 check "and brings patches" "$(patches n "$work/pull")" '>' 3
 check "of more triangles than at load" "$(patches triangles "$work/pull")" '>' 224
@@ -39,14 +40,14 @@ wait $stall
 check "one that stalls passes every check" $? == 0
 check "and is brought along" "$(patches n "$work/stall")" '>' 0
 
-run crowd --clients 4 --script press --seconds 2
+run crowd --clients 4 --script press --seconds 60 --until patches=2,cycles=60
 check "four at once, late to what was pulled, pass every check" $code == 0
 check "each with its patches" "$(patches n "$work/crowd")" '>' 3
 
 # a connection that ends begins at the asset again
-timeout 60 "$bin/palpate-trainee" "$url" --json --seconds 6 >"$work/again" 2>"$work/again.err" &
+timeout 100 "$bin/palpate-trainee" "$url" --json --seconds 60 --until joins=2,cycles_of_it=20 >"$work/again" 2>"$work/again.err" &
 again=$!
-sleep 2
+members 1
 kill "$server_job"
 wait "$server_job" 2>/dev/null
 start_server --port "$port"

@@ -5,6 +5,7 @@
 #include "clients/trainee/orders.h"
 #include "clients/trainee/samples.h"
 #include "clients/trainee/script.h"
+#include "clients/trainee/until.h"
 #include "tests/check.h"
 
 #include <pthread.h>
@@ -282,6 +283,27 @@ static void a_side_is_the_middle_of_what_lies_furthest(void)
     CHECK_NEAR(order.arg[3].value, -1, 0);
 }
 
+static void what_is_waited_for_is_reached_when_all_of_it_is(void)
+{
+    pal_until until;
+    pal_trainee_result r = {.n_frame = 7, .moved_m = 0.003};
+    CHECK_INT(pal_until_read(&until, "frames=8,moved_mm=2.5", NULL), PAL_ERR_OK);
+    CHECK(!pal_until_reached(&until, &r));
+    r.n_frame = 8;
+    CHECK(pal_until_reached(&until, &r));
+    r.moved_m = 0.0024;
+    CHECK(!pal_until_reached(&until, &r));
+    CHECK_INT(pal_until_read(&until, "", NULL), PAL_ERR_OK);
+    CHECK(!pal_until_reached(&until, &r)); /* nothing is never reached: the time ends it */
+    static const char *const bad[] = {"frame=1",  "frames",    "frames=", "frames=x",
+                                      "frames=0", "frames=1x", "=1",      "frames=1,,"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        pal_note note = {""};
+        CHECK_INT(pal_until_read(&until, bad[i], &note), PAL_ERR_REFUSED);
+        CHECK(strstr(note.text, "until: \"") == note.text);
+    }
+}
+
 int main(void)
 {
     RUN(addresses_are_understood_or_refused_by_name);
@@ -294,5 +316,6 @@ int main(void)
     RUN(flags_are_taken_from_the_table_and_the_rest_refused);
     RUN(orders_are_read_or_refused_with_their_line);
     RUN(a_side_is_the_middle_of_what_lies_furthest);
+    RUN(what_is_waited_for_is_reached_when_all_of_it_is);
     return check_report();
 }

@@ -15,7 +15,7 @@ static pal_prepared mesh;
 static const pal_frame *wait_tick(pal_session *s, uint64_t tick)
 {
     const pal_frame *f = NULL;
-    for (int i = 0; i < 20000; i++) {
+    for (int i = 0; i < 120000; i++) {
         const pal_frame *next = pal_session_take_frame(s);
         if (next) f = next;
         if (f && f->tick >= tick) return f;
@@ -201,7 +201,7 @@ static _Atomic uint64_t stepped;
 static void rehearse_slowly(void *change, pal_world *next)
 {
     uint64_t from = stepped;
-    for (int i = 0; i < 20000 && stepped < from + 10; i++) nanosleep(&(struct timespec){0, 500000}, NULL);
+    for (int i = 0; i < 120000 && stepped < from + 10; i++) nanosleep(&(struct timespec){0, 500000}, NULL);
     CHECK(stepped >= from + 10);
     pal_switch_rehearse(change, next);
 }
