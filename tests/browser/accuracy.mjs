@@ -112,7 +112,7 @@ try {
   const pressed = new Set();
   for (let press = 0; press < 3; press++) {
     const left = (s) => s.estimate?.neighbours?.find((n) => !pressed.has(n.knob));
-    const before = await until(() => shown(ada), (s) => left(s) && !s.busy, 15000), near = left(before);
+    const before = await until(() => shown(ada), (s) => left(s) && !s.busy, 40000), near = left(before);
     if (!near) break;
     pressed.add(near.knob);
     const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.knob }).first(), title = await button.getAttribute("title");

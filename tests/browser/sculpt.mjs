@@ -98,7 +98,7 @@ try {
   const probe = async () => {
     await tool(ada, "probe");
     await ada.mouse.click(spot.x, spot.y);
-    return (await until(() => shown(ada), (s) => /Pa/.test(s.said))).said;
+    return (await until(() => shown(ada), (s) => /Pa,/.test(s.said))).said; // not "Paint"
   };
   const soft = await probe();
   check("a probe tells the material", soft === "5 kPa, 1000 kg/m³", soft);
@@ -124,7 +124,8 @@ try {
   await until(() => shown(ada), (s) => s.busy === "false");
   await ada.click("#sculpt-release");
   const back = await until(() => moved(ada), (m) => m < 0.3 * more);
-  check("and goes back when it is released", back < 0.3 * more && (await ada.isDisabled("#sculpt-release")), `${(1e3 * back).toFixed(2)} mm`);
+  const released = await until(() => ada.isDisabled("#sculpt-release"), (d) => d);
+  check("and goes back when it is released", back < 0.3 * more && released, `${(1e3 * back).toFixed(2)} mm`);
 
   await ada.selectOption("#sculpt-axis", "x");
   const cut = await after(ada, painted.epoch);
