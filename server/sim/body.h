@@ -140,8 +140,9 @@ static inline double pal_body_cap_N(const pal_body *body, double young_Pa)
 {
     return 10 * (body->given_Pa > 0 ? body->given_Pa : young_Pa) * body->h_m * body->h_m;
 }
-/* most of a lasting load that a node bears: load_cap_N, and of that the part that the node is of the corner of a full
- * voxel, or of a solid's mean cell, as a sliver is as much softer */
+/* most of a lasting load that a node bears (less of it beyond 2 S from its rest place, world_load.c): load_cap_N, and
+ * of that the part that the node is of the corner of a full voxel, or of a solid's mean cell, as a sliver is as much
+ * softer */
 static inline double pal_body_bears_N(const pal_body *body, int node)
 {
     double part = body->corner_kg > 0 ? body->node_mass_kg[node] / body->corner_kg : 1;

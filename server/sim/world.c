@@ -15,7 +15,7 @@
 
 /* ---- load ---- */
 
-static pal_step step_of(pal_world *w, int b)
+pal_step pal_world_step_of(pal_world *w, int b)
 {
     pal_plan *p = &w->plan;
     return (pal_step){.body = &p->body[b],
@@ -31,11 +31,11 @@ static pal_step step_of(pal_world *w, int b)
 }
 
 /* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is no number is frozen */
-static double find_limit(pal_world *w, int sub)
+double pal_world_find_limit(pal_world *w, int sub)
 {
     double least = INFINITY;
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = step_of(w, b);
+        pal_step step = pal_world_step_of(w, b);
         step.sub = sub;
         const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         if (step.body->frozen || step.body->asleep || !solve->effect->limit) continue;
@@ -84,7 +84,7 @@ static double find_rest_limit(pal_world *w)
         body->x = body->x_rest;
         if (!body->embed) body->d = body->x_rest;
         pal_body_place(body);
-        pal_step step = step_of(w, b);
+        pal_step step = pal_world_step_of(w, b);
         step.n_contact = 0;
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
@@ -99,7 +99,7 @@ static double find_rest_limit(pal_world *w)
     return least;
 }
 
-static pal_err check_budget(pal_world *w, pal_note *note)
+pal_err pal_world_check_budget(pal_world *w, pal_note *note)
 {
     double limit = find_rest_limit(w);
     int n = count_substeps(w, w->step_s, limit);
@@ -163,9 +163,9 @@ static void make_tools(pal_world *w, const pal_scene *scene)
     }
 }
 
-static void show(pal_world *w, int b)
+void pal_world_show(pal_world *w, int b)
 {
-    pal_step step = step_of(w, b);
+    pal_step step = pal_world_step_of(w, b);
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
         row->n_run++;
@@ -179,7 +179,7 @@ static void show(pal_world *w, int b)
 
 void pal_world_show_all(pal_world *w)
 {
-    for (int b = 0; b < w->plan.n_body; b++) show(w, b);
+    for (int b = 0; b < w->plan.n_body; b++) pal_world_show(w, b);
 }
 
 static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
@@ -199,8 +199,8 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
         PAL_TRY(make_part(w, b));
     }
     PAL_TRY(pal_field_check(&w->plan, note));
-    PAL_TRY(check_budget(w, note));
-    w->n_substep = count_substeps(w, w->step_s, find_limit(w, 0));
+    PAL_TRY(pal_world_check_budget(w, note));
+    w->n_substep = count_substeps(w, w->step_s, pal_world_find_limit(w, 0));
     pal_world_show_all(w);
     return PAL_ERR_OK;
 }
@@ -229,102 +229,10 @@ void pal_world_destroy(pal_world *world)
     free(world);
 }
 
-/* ---- commands between steps ---- */
-
-pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
-{
-    if (tool < 0 || tool >= world->tools.n_tool) return PAL_ERR_REFUSED;
-    if (pose && !pal_pose_ok(pose, 100 * world->plan.body[0].size_m)) return PAL_ERR_REFUSED;
-    world->has_asked[tool] = pose != NULL;
-    if (pose) {
-        world->asked[tool] = *pose;
-        world->pose_ns[tool] = pal_clock_ns();
-    } else {
-        pal_brush_rows_end(&world->brushes, tool);
-    }
-    return PAL_ERR_OK;
-}
-
-pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3])
-{
-    if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
-    pal_body *b = &world->plan.body[body];
-    if (node < 0 || node >= b->n_node || (b->shell && !pal_shell_has(b->shell, node))) return PAL_ERR_REFUSED;
-    if (!b->outer) b->outer = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
-    if (!b->outer) return PAL_ERR_MEMORY;
-    pal_copy3(b->outer + 3 * node, force_N);
-    b->asleep = false;
-    return PAL_ERR_OK;
-}
-
-/* one body at rest, its rows as at load */
-static void rest_body(pal_world *w, int b)
-{
-    pal_body *body = &w->plan.body[b];
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof, n_load = 3 * sizeof(double) * (size_t)body->n_node;
-    memcpy(body->x, body->x_rest, n_byte);
-    memset(body->v, 0, n_byte);
-    memset(body->g, 0, n_byte);
-    memset(body->f, 0, n_load);
-    memset(body->load, 0, n_load);
-    if (body->outer) memset(body->outer, 0, n_load);
-    pal_body_place(body);
-    body->frozen = body->asleep = false;
-    body->brake_1_s = body->brake_s = 0;
-    body->why[0] = 0;
-    body->rescue = (pal_rescues){0};
-    for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_row *row = &w->plan.row[i];
-        if (w->plan.row_body[i] == b && row->effect->reset) row->effect->reset(row->self, body);
-    }
-}
-
-pal_err pal_world_reset_body(pal_world *world, int body)
-{
-    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
-    rest_body(world, body);
-    find_limit(world, 0);
-    pal_world_show_all(world);
-    return PAL_ERR_OK;
-}
-
-void pal_world_reset(pal_world *world)
-{
-    for (int b = 0; b < world->plan.n_body; b++) rest_body(world, b);
-    for (int t = 0; t < world->tools.n_tool; t++) {
-        const pal_tool *old = &world->tools.tool[t];
-        world->tools.tool[t] = (pal_tool){.radius_m = old->radius_m, .force_cap_N = old->force_cap_N};
-        world->has_asked[t] = false;
-    }
-    world->tick = 0;
-    world->time_s = 0;
-    find_limit(world, 0);
-    pal_world_show_all(world);
-}
-
-static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_note *note)
-{
-    pal_body *body = &w->plan.body[b];
-    if (body->solid) pal_solid_material(body, to);
-    for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_row *row = &w->plan.row[i];
-        if (w->plan.row_body[i] != b || !row->effect->material) continue;
-        PAL_TRY(row->effect->material(row->self, body, to, note));
-    }
-    double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
-    for (int i = 0; i < body->n_dof && !body->solid; i++) body->mass_kg[i] *= ratio;
-    if (body->shell) {
-        body->shell->options.mass_kg *= ratio;
-        for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
-    }
-    body->load_cap_N = pal_body_cap_N(body, to->young_Pa);
-    body->corner_kg *= ratio;
-    w->material[b] = *to;
-    return PAL_ERR_OK;
-}
+/* ---- a step ---- */
 
 /* stored in the rows of a body */
-static double row_energy_J(const pal_world *w, int b)
+double pal_world_row_energy_J(const pal_world *w, int b)
 {
     double sum = 0;
     for (int i = 0; i < w->plan.n_row; i++) {
@@ -334,143 +242,13 @@ static double row_energy_J(const pal_world *w, int b)
     return sum;
 }
 
-pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note)
-{
-    if (body < 0 || body >= world->plan.n_body)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist", body);
-    pal_material to = *material, was = world->material[body];
-    PAL_TRY(pal_material_check(&to, note));
-    world->plan.body[body].asleep = false;
-    /* asking rows for their energy may change what they keep: only where it may matter */
-    bool brakes = !world->plan.body[body].implicit && !world->plan.body[body].embed && to.young_Pa > 10 * was.young_Pa;
-    double before_J = brakes ? row_energy_J(world, body) : 0;
-    pal_err err = apply_material(world, body, &to, note);
-    if (!err) err = check_budget(world, note);
-    if (!err && brakes) pal_brake_begin(&world->plan.body[body], before_J, row_energy_J(world, body));
-    /* constants are functions of the material, so putting the old one back puts everything back */
-    if (err) (void)apply_material(world, body, &was, NULL);
-    find_limit(world, 0);
-    return err;
-}
-
-bool pal_world_gives(const pal_world *world, int body, pal_field field)
-{
-    return pal_field_given(&world->plan, body, field);
-}
-
-pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note)
-{
-    pal_step step = {.dt_s = 0};
-    if (body >= 0 && body < world->plan.n_body) step = step_of(world, body);
-    if (wanted) return pal_field_add(&world->fields, &world->plan, body, field, &step, note);
-    pal_field_drop(&world->fields, &world->plan, body, field);
-    return PAL_ERR_OK;
-}
-
-pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note)
-{
-    if (body >= 0 && body < world->plan.n_body && brush && brush->kind != PAL_BRUSH_NONE)
-        world->plan.body[body].asleep = false;
-    return pal_brush_rows_set(&world->brushes, &world->plan, body, slot, brush, note);
-}
-
-pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
-                             pal_note *note)
-{
-    bool changed = false;
-    const pal_material *now = body >= 0 && body < PAL_BODY_MAX ? &world->material[body] : NULL;
-    PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, note, &changed));
-    if (!changed) return PAL_ERR_OK;
-    /* what the solver knows of its limit is of the rows before */
-    pal_world_moved(world, body);
-    pal_err err = check_budget(world, note);
-    if (err) {
-        /* it was within the budget without the row */
-        (void)pal_plan_switch(&world->plan, scene, body, row, false, now, NULL, &changed);
-        pal_world_moved(world, body);
-        (void)check_budget(world, NULL);
-    }
-    pal_world_moved(world, body);
-    return err;
-}
-
-void pal_world_wake(pal_world *world)
-{
-    for (int b = 0; b < world->plan.n_body; b++) world->plan.body[b].asleep = false;
-}
-
-void pal_world_watch(pal_world *world, bool watched)
-{
-    world->unwatched = !watched;
-    for (int b = 0; b < world->plan.n_body && watched; b++)
-        if (world->plan.body[b].stale && pal_body_finite(&world->plan.body[b])) show(world, b);
-}
-
-pal_err pal_world_ease(pal_world *world, int body, const double *force_N)
-{
-    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
-    world->plan.body[body].asleep = false;
-    return pal_ease_rows_set(&world->eases, &world->plan, body, force_N);
-}
-
-pal_err pal_world_lag(pal_world *world, int body, const float *lag_m)
-{
-    if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
-    world->plan.body[body].asleep = false;
-    PAL_TRY(pal_ease_rows_lag(&world->eases, &world->plan, body, lag_m));
-    show(world, body);
-    return PAL_ERR_OK;
-}
-
-void pal_world_tidy(pal_world *world)
-{
-    pal_brush_rows_tidy(&world->brushes, &world->plan);
-    pal_ease_rows_tidy(&world->eases, &world->plan);
-}
-
-/* ---- a step ---- */
-
-/* loads anew: the lasting ones. Nodes out of use have none (shell.h) and keep theirs in `outer` until they return */
-static void begin_loads(pal_body *body)
-{
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
-    for (int k = 0; k < body->n_active && body->active; k++) {
-        double *load = body->load + 3 * (size_t)body->active[k];
-        if (body->outer)
-            pal_copy3(load, body->outer + 3 * (size_t)body->active[k]);
-        else
-            pal_set3(load, 0, 0, 0);
-    }
-    if (body->active) return;
-    if (body->outer)
-        memcpy(body->load, body->outer, n_byte);
-    else
-        memset(body->load, 0, n_byte);
-}
-
 pal_err pal_world_pull(pal_world *world, int body)
 {
-    pal_step step = step_of(world, body);
-    begin_loads(step.body);
+    pal_step step = pal_world_step_of(world, body);
+    pal_body_begin_loads(step.body);
     pal_err err = pal_gather(&step);
     pal_arena_reset(world->scratch);
     return err;
-}
-
-/* lasting: what else presses the nodes is not there yet */
-static void cap_loads(pal_body *body, bool lasting)
-{
-    for (int k = 0; k < pal_body_nodes(body); k++) {
-        int i = pal_body_point(body, k);
-        double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
-        if (load2 == 0) continue;
-        double cap = lasting ? pal_body_bears_N(body, i) : body->load_cap_N;
-        if (load2 <= cap * cap) continue;
-        uint64_t before = pal_clock_ns();
-        pal_scale3(load, cap / sqrt(load2), load);
-        body->rescue.n_capped++;
-        body->rescue.ns += pal_clock_ns() - before;
-    }
 }
 
 /* a row that fails stops its body alone; true: it has */
@@ -487,8 +265,8 @@ static bool fails(pal_world *w, pal_body *body, const pal_row *row, pal_err err)
 static void run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
-    begin_loads(body);
-    if (body->outer) cap_loads(body, true);
+    pal_body_begin_loads(body);
+    if (body->outer) pal_body_cap_loads(body, true);
     for (int i = 0; i < step->n_contact; i++) {
         pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
@@ -496,7 +274,7 @@ static void run_contact(pal_world *w, pal_step *step, int b)
         if (fails(w, body, row, row->effect->run(row->self, step))) return;
         row->spent_ns += pal_clock_ns() - before;
     }
-    if (!body->implicit && step->n_contact > 0) cap_loads(body, false);
+    if (!body->implicit && step->n_contact > 0) pal_body_cap_loads(body, false);
 }
 
 static uint64_t force_ns(const pal_step *step)
@@ -510,7 +288,7 @@ static void run_substep(pal_world *w, pal_step *shared)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
         if (w->plan.body[b].frozen || w->plan.body[b].asleep) continue;
-        pal_step step = step_of(w, b);
+        pal_step step = pal_world_step_of(w, b);
         step.body->stale = true;
         step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
         step.time_s = shared->time_s;
@@ -534,7 +312,7 @@ static void run_substep(pal_world *w, pal_step *shared)
 static void run_stage(pal_world *w, pal_stage stage, double dt_s)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = step_of(w, b);
+        pal_step step = pal_world_step_of(w, b);
         step.dt_s = dt_s;
         step.n_sub = 1;
         bool output = stage == PAL_STAGE_OUTPUT,
@@ -567,14 +345,14 @@ static void begin_step(pal_world *w, double dt_s)
     bool held = false;
     for (int t = 0; t < w->tools.n_tool; t++) held |= w->tools.tool[t].present || w->tools.tool[t].ramp > 0;
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = step_of(w, b);
+        pal_step step = pal_world_step_of(w, b);
         step.dt_s = dt_s, step.n_sub = 1;
         for (int i = 0; i < w->plan.n_of[PAL_STAGE_GUARD][b] && step.body->asleep; i++) {
             const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_GUARD][b] + i];
             if (row->effect->wakes && row->effect->wakes(row->self, &step)) step.body->asleep = false;
         }
         bool touched = held && step.n_contact > 0 && !step.body->frozen && !step.body->asleep;
-        if (w->unwatched && touched && step.body->stale) show(w, b);
+        if (w->unwatched && touched && step.body->stale) pal_world_show(w, b);
     }
 }
 
@@ -585,7 +363,7 @@ static void run_substeps(pal_world *w, double dt_s)
     int n_sub = 0;
     pal_step step = {.dt_s = 0};
     for (int sub = 0; sub == 0 || sub < n_sub; sub++) {
-        double limit = find_limit(w, sub), left_s = dt_s - done_s;
+        double limit = pal_world_find_limit(w, sub), left_s = dt_s - done_s;
         int budget = w->most_substep - sub;
         if (sub == 0 || step.dt_s > limit) {
             int n = count_substeps(w, left_s, limit);
@@ -650,7 +428,7 @@ double pal_world_energy_J(const pal_world *world)
 {
     double sum = 0;
     for (int b = 0; b < world->plan.n_body; b++)
-        sum += pal_body_kinetic_J(&world->plan.body[b]) + row_energy_J(world, b);
+        sum += pal_body_kinetic_J(&world->plan.body[b]) + pal_world_row_energy_J(world, b);
     return sum;
 }
 
@@ -668,16 +446,6 @@ int pal_world_bodies(const pal_world *world)
 pal_body *pal_world_body(pal_world *world, int body)
 {
     return &world->plan.body[body];
-}
-
-void pal_world_moved(pal_world *world, int body)
-{
-    const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
-    world->plan.body[body].asleep = false;
-    world->plan.body[body].stale = true;
-    pal_body_place(&world->plan.body[body]);
-    if (solve->effect->reset) solve->effect->reset(solve->self, &world->plan.body[body]);
-    find_limit(world, 0);
 }
 
 const pal_tools *pal_world_tools(const pal_world *world)

@@ -62,7 +62,9 @@ pal_err pal_world_reset_body(pal_world *world, int body);
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
 /* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body
  * takes memory. Of a body that adapts a node out of use is no such node, and the load of one that goes out of use waits
- * until it is in use again. REFUSED: not finite, no such node; MEMORY. [load] */
+ * until it is in use again. A node bears pal_body_bears_N of it, and of a body that is held still less and less from 2
+ * S off its rest place on, a hundredth of that from 4 S (rescue.n_capped). REFUSED: not finite, no such node; MEMORY.
+ * [load] */
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
 /* A field of a body in colour (row field_out, 10 times a simulated second): wanted, the row is put into the running

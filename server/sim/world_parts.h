@@ -1,4 +1,5 @@
-/* What world.c, world_show.c, world_follow.c and transfer_carry.c share: the world's record. Private to these. */
+/* What world.c, world_edit.c, world_load.c, world_show.c, world_follow.c and transfer_carry.c share: the world's
+ * record. Private to these. */
 #ifndef PAL_SIM_WORLD_PARTS_H
 #define PAL_SIM_WORLD_PARTS_H
 #include "server/sim/brush_rows.h"
@@ -34,7 +35,24 @@ struct pal_world {
     pal_ease_rows eases;
 };
 
-/* OUTPUT rows of all bodies, so that what is shown is where they are */
+/* what the rows of body b may touch, without times */
+pal_step pal_world_step_of(pal_world *world, int b);
+/* the least limit of all bodies that move, infinite when nothing limits, for sub-step `sub`; a body whose limit is no
+ * number is frozen. s */
+double pal_world_find_limit(pal_world *world, int sub);
+/* BUDGET: at rest, on the finest level, a step needs more sub-steps than the scene allows */
+pal_err pal_world_check_budget(pal_world *world, pal_note *note);
+/* stored in the rows of a body, J */
+double pal_world_row_energy_J(const pal_world *world, int b);
+
+/* load [n_node][3] anew: the lasting ones (`outer`) */
+void pal_body_begin_loads(pal_body *body);
+/* shortens what is beyond what nodes bear (pal_body_bears_N, load_cap_N), counted as rescues; lasting: what else
+ * presses the nodes is not there yet, and nodes that stray from their rest places bear less */
+void pal_body_cap_loads(pal_body *body, bool lasting);
+
+/* OUTPUT rows of one body, of all bodies, so that what is shown is where they are */
+void pal_world_show(pal_world *world, int b);
 void pal_world_show_all(pal_world *world);
 
 /* ", node 512 at (1, 2, 3) mm sets it": the node that the rows' bounds make responsible. Where bounds are of nodes that

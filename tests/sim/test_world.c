@@ -485,6 +485,51 @@ static void nodes_of_springs_bear_what_their_edges_stand_for(void)
     }
 }
 
+/* the load of a node after a step that begins with the whole body so many S off its rest places, over the cap */
+static double borne_at(pal_world *world, int node, double far_S)
+{
+    pal_body *body = pal_world_body(world, 0);
+    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = body->x_rest[i] + (i % 3 == 1 ? far_S * body->size_m : 0);
+    pal_world_moved(world, 0);
+    CHECK(!pal_world_step(world, 1e-5) && pal_world_substeps(world) == 1);
+    return body->load[3 * node] / body->load_cap_N;
+}
+
+/* what many loads pull out of a body that stands still, each within its cap, lets go of them on its way */
+static void a_node_that_strays_bears_less_of_a_lasting_load(void)
+{
+    pal_prepared box;
+    REQUIRE(!box_make(3, 3, 3, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, false);
+    pal_world *world;
+    REQUIRE(!pal_world_create(scene, &note, &world));
+    pal_body *body = pal_world_body(world, 0);
+    int full = 0;
+    for (int i = 0; i < body->n_dof; i++)
+        if (!body->held[i] && body->mass_kg[i] >= body->corner_kg) full = i;
+    REQUIRE(!pal_world_load(world, 0, full, (const double[3]){1e6, 0, 0}));
+    CHECK_NEAR(borne_at(world, full, 1.99), 1, 1e-9);
+    CHECK_NEAR(borne_at(world, full, 2.5), 0.75, 1e-9);
+    CHECK_NEAR(borne_at(world, full, 3), 0.5, 1e-9);
+    CHECK_NEAR(borne_at(world, full, 6), 0.01, 1e-9);
+    /* one that is led, or held by nothing, may be anywhere */
+    int held = 0;
+    while (!body->held[held]) held++;
+    body->held[held] = 2;
+    CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
+    for (int i = 0; i < body->n_dof; i++) body->held[i] = 0;
+    CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
+    body->held[held] = 1;
+    CHECK_NEAR(borne_at(world, full, 3), 0.5, 1e-9);
+    /* what is little is borne wherever it is */
+    REQUIRE(!pal_world_load(world, 0, full, (const double[3]){0.009 * body->load_cap_N, 0, 0}));
+    CHECK_NEAR(borne_at(world, full, 6), 0.009, 1e-12);
+    pal_world_destroy(world);
+    free(scene);
+    box_free(&box);
+}
+
 int main(void)
 {
     RUN(goes_on_where_another_world_was);
@@ -501,6 +546,7 @@ int main(void)
     RUN(has_rows_only_for_what_the_scene_calls_for);
     RUN(spring_scenes_pay_nothing_for_finite_elements);
     RUN(a_sliver_bears_less_of_a_lasting_load);
+    RUN(a_node_that_strays_bears_less_of_a_lasting_load);
     RUN(nodes_of_springs_bear_what_their_edges_stand_for);
     return check_report();
 }
