@@ -21,7 +21,7 @@ typedef struct pal_rest {
     bool sized; /* of other voxels, not of merged ones: nodes of the running body may lie outside */
 } pal_rest;
 
-/* scene: of one body, without tools (estimate_work.c); element, law: NULL keeps those of its model, which becomes fem
+/* scene: of one body, without tools (estimate_open.c); element, law: NULL keeps those of its model, which becomes fem
  * where they are given. body: the running one, as made from `scene`. REFUSED, MEMORY */
 pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                       pal_note *note, pal_rest *out);
