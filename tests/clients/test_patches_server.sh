@@ -40,7 +40,7 @@ wait $stall
 check "one that stalls passes every check" $? == 0
 check "and is brought along" "$(patches n "$work/stall")" '>' 0
 
-run crowd --clients 4 --script press --seconds 60 --until patches=2,cycles=60
+run crowd --clients 4 --script press --seconds 60 --until patches=2,cycles=20
 check "four at once, late to what was pulled, pass every check" $code == 0
 check "each with its patches" "$(patches n "$work/crowd")" '>' 3
 
