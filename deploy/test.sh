@@ -73,9 +73,10 @@ built() { # PRESET
     failed=$((failed + 1))
     return 1
 }
-# the tests of one build, PRESET [ctest options]: what computes, and what mostly waits (tests/clients/CMakeLists.txt), side by side
+# the tests of one build, PRESET [ctest options]: what computes, and what mostly waits (tests/clients/CMakeLists.txt), side by
+# side; one more of the former than cores, as some sleep now and then
 compute() {
-    (cd "$build/$1" && shift && $idle ctest --output-on-failure -j 2 "$@") >"$build/ctest_$1.log" 2>&1
+    (cd "$build/$1" && shift && $idle ctest --output-on-failure -j 3 "$@") >"$build/ctest_$1.log" 2>&1
 }
 waits() {
     (cd "$build/$1" && shift && ctest --output-on-failure -j 4 -L waits "$@") >"$build/ctest_waits_$1.log" 2>&1

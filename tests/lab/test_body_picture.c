@@ -410,7 +410,7 @@ int main(void)
     RUN(a_slope_of_values_is_divided);
     RUN(held_vertices_and_loads_are_marked);
     RUN(pictures_side_by_side_share_frame_and_range);
-    RUN(large_surfaces_are_drawn_coarser);
+    RUN_LONG(large_surfaces_are_drawn_coarser);
     RUN(nothing_to_draw_and_bad_input_are_refused);
     return check_report();
 }

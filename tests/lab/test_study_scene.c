@@ -262,7 +262,7 @@ int main(void)
     RUN(the_step_of_the_scene_is_the_one_that_is_swept);
     RUN_LONG(a_full_organ_is_pressed);
     RUN(a_hollow_organ_is_pressed_and_pulled);
-    RUN(cells_are_pressed);
+    RUN_LONG(cells_are_pressed);
     RUN(what_makes_no_sense_is_refused_in_a_sentence);
     return check_report();
 }

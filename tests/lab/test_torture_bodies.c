@@ -163,7 +163,7 @@ static void what_sleeps_under_a_meganewton_is_let_go(void)
 
 int main(void)
 {
-    RUN(a_poisoned_body_stops_alone);
+    RUN_LONG(a_poisoned_body_stops_alone);
     RUN(a_body_out_of_bounds_stops_alone);
     RUN(tortured_together_each_is_judged);
     RUN(what_sleeps_under_a_meganewton_is_let_go);

@@ -340,11 +340,11 @@ int main(void)
         return 1;
     RUN(hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level);
     RUN(tables_are_the_worlds_after_many_changes);
-    RUN(who_skips_cycles_gets_one_patch_with_all_of_it);
+    RUN_SERIAL(who_skips_cycles_gets_one_patch_with_all_of_it);
     RUN(who_comes_late_gets_all_of_it_before_the_first_frame);
     RUN_LONG(a_change_of_accuracy_loses_no_triangle);
     RUN(triangles_that_change_while_nothing_moves_come_with_a_frame);
-    RUN(at_rest_nothing_is_sent);
+    RUN_SERIAL(at_rest_nothing_is_sent);
     adaptive_scene_free(&calm);
     adaptive_scene_free(&storm);
     adaptive_scene_free(&weightless);

@@ -398,14 +398,14 @@ int main(void)
 {
     clay_make(&clay, 2, 0.1);
     RUN(a_cell_grows_and_the_frames_are_of_the_new_epoch);
-    RUN(assets_that_have_been_replaced_can_still_be_fetched);
+    RUN_SERIAL(assets_that_have_been_replaced_can_still_be_fetched);
     RUN(paint_is_what_a_probe_finds);
     RUN(a_material_that_was_refused_does_not_stick);
     RUN(a_cut_shows_the_inside_and_goes_again);
     RUN(what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing);
     RUN(hands_blow_up_and_pull_until_they_let_go);
     RUN(who_holds_no_tool_and_teaches_nobody_sculpts_nothing);
-    RUN(sixteen_wait_and_the_next_one_is_told);
+    RUN_SERIAL(sixteen_wait_and_the_next_one_is_told);
     RUN(everybody_is_told_and_who_comes_late_begins_at_the_new_asset);
     RUN(the_tool_stays_held_and_its_poses_go_on);
     RUN(a_field_that_is_looked_at_goes_on_with_the_new_vertices);

@@ -213,7 +213,7 @@ int main(void)
     setting(0, "subdivision_fem", "", 1);
     setting(1, "fem", "hex8_bbar", 8);
     setting(2, "subdivision_fem", "", 2);
-    RUN(two_clients_see_a_point_of_the_study);
+    RUN_SERIAL(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
     RUN_SERIAL(a_pressure_goes_on);
     RUN_SERIAL(a_handle_goes_on);

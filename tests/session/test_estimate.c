@@ -265,7 +265,7 @@ int main(void)
     if (!estimate_scene(CHECK_REPEATS(8, 4))) return 1;
     RUN(nothing_exists_while_nobody_looks);
     RUN(what_is_not_there_is_refused);
-    RUN(looking_changes_nothing);
+    RUN_SERIAL(looking_changes_nothing);
     RUN(who_looks_goes_on_looking_at_what_follows);
     RUN(a_pressed_body_is_estimated_while_it_runs);
     RUN_SERIAL(a_sleeping_body_is_looked_at_once);

@@ -361,11 +361,11 @@ int main(void)
     RUN(a_running_session_changes_its_method_and_comes_back);
     RUN_SERIAL(step_by_step_the_energy_is_kept);
     RUN_SERIAL(beyond_the_bound_of_displacements_the_velocity_makes_up);
-    RUN(a_tool_is_held_on_however_long_it_takes);
+    RUN_SERIAL(a_tool_is_held_on_however_long_it_takes);
     RUN(a_switch_is_rehearsed_while_the_session_runs_on);
-    RUN(a_row_that_is_off_stays_off_through_a_method_without_it);
+    RUN_SERIAL(a_row_that_is_off_stays_off_through_a_method_without_it);
     RUN(what_cannot_be_made_is_refused_with_a_sentence);
-    RUN(what_is_not_taken_changes_nothing);
+    RUN_SERIAL(what_is_not_taken_changes_nothing);
     pal_prepared_free(&mesh);
     return check_report();
 }

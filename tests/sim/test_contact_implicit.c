@@ -233,6 +233,6 @@ int main(void)
     RUN(two_tools_share_a_place);
     RUN(keeps_to_its_cap);
     RUN(leads_what_is_stiff_but_bends);
-    RUN(friction_drags_and_slides);
+    RUN_LONG(friction_drags_and_slides);
     return check_report();
 }

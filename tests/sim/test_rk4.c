@@ -429,7 +429,7 @@ int main(void)
     RUN(limit_sees_a_stiff_patch);
     RUN(a_look_at_the_limit_leaves_the_body);
     RUN(limit_holds_with_strong_damping);
-    RUN(limit_falls_by_level_as_the_law_says);
+    RUN_LONG(limit_falls_by_level_as_the_law_says);
     RUN(limit_follows_levels_and_factors);
     RUN(held_nodes_stand_and_led_ones_keep_their_velocity);
     RUN(moves_are_clamped);

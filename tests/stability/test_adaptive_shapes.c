@@ -280,7 +280,7 @@ static void bodies_beside_each_other_do_not_meet(void)
 
 int main(void)
 {
-    RUN(bodies_beside_each_other_do_not_meet);
+    RUN_LONG(bodies_beside_each_other_do_not_meet);
     RUN(whatever_can_be_split_is_borne);
     return check_report();
 }
