@@ -6,6 +6,11 @@ static const double least_share = 0.02, least_corner = 0.05;
 /* and above which: blown up, where the neo-Hookean energy, which grows with the square, lets nothing else count, and
  * where nearly incompressible bodies take detours */
 static const double most_corner = 30;
+/* where a body on its split is whole again, at least and at most */
+static const double least_whole = 0.3, most_needed = 0.9, most_whole = 20;
+/* tangled again within so many looks, one a Newton iteration: in vain; then its corners have to be that much better */
+enum { SOON = 600 };
+static const double better = 0.05;
 /* of the split: turned over voxels have no volume to keep, and five tetrahedra each lock well below 0.5 */
 static const double most_poisson = 0.3;
 
@@ -48,6 +53,7 @@ void pal_hex_reset(pal_hex_row *row)
             for (int i = 0; i < 9; i++) row->turn[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
     row->tangled = false;
+    row->n_whole = SOON, row->needed = row->tried = least_whole;
     pal_kept_forget(&row->kept);
     row->n_tangled = row->n_switch = 0;
     row->n_slow = 0;
@@ -199,13 +205,21 @@ bool pal_hex_untangle(pal_hex_row *row, const pal_body *body)
     if (!row->split) return false;
     double low, high;
     corner_range(row, body, &low, &high);
-    bool tangled = low < least_corner || high > most_corner;
-    bool changed = tangled != row->tangled;
-    if (changed && tangled) pal_elastic_tets_reset(row->split);
-    row->tangled = tangled;
-    row->n_tangled += tangled;
-    row->n_switch += changed;
-    return changed;
+    const bool before = row->tangled;
+    if (before) {
+        row->tangled = low < row->needed || high > most_whole;
+        if (!row->tangled) row->n_whole = 0, row->tried = low;
+    } else {
+        row->tangled = low < least_corner || high > most_corner;
+        if (row->n_whole < SOON) row->n_whole++;
+    }
+    if (row->tangled && !before) {
+        row->needed = row->n_whole < SOON ? fmin(fmax(row->needed, row->tried) + better, most_needed) : least_whole;
+        pal_elastic_tets_reset(row->split);
+    }
+    row->n_tangled += row->tangled;
+    row->n_switch += row->tangled != before;
+    return row->tangled != before;
 }
 
 /* where each pair of corners stands in the pattern */

@@ -10,7 +10,9 @@
  * below 0.05 h^3 or above 30 h^3 (blown up: the neo-Hookean energy grows with the square of it)
  * the whole body takes its forces from the five-tetrahedra split of the same nodes, corotational with the rule of
  * elastic_tet.h. Poisson ratios above 0.3 are taken as 0.3 there: what is turned over has no volume to keep, and with
- * 0.45 one shuffled body in a hundred stayed tangled, with 0.3 none of 720.
+ * 0.45 one shuffled body in a hundred stayed tangled, with 0.3 none of 720. It goes back when all corners are between
+ * 0.3 and 20 h^3. Cubes that a lasting load turns over where the split is whole would take turns with it for ever, each
+ * some millimetres from the other: where they were tried in vain they are tried again only when they are less crushed.
  *
  * Memory: the world's arena. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_ELASTIC_HEX_H
@@ -48,6 +50,8 @@ typedef struct pal_hex_row {
     pal_kept kept; /* implicit: of the cubes, not of the split */
 
     bool tangled;
+    int n_whole;                  /* looks since it went back to cubes, up to SOON                                */
+    double tried, needed;         /* least corner when it did; that it takes to go back                           */
     uint64_t n_tangled, n_switch; /* looks that found the body tangled; changes of cubes, split, straight */
     pal_elastic_tets *split;      /* NULL: untangle is false or the law is linear */
     float *split_fill;            /* [n_tet]                                       */

@@ -181,7 +181,8 @@ static pal_err take_room(pal_transfer *t)
     bool all = (t->x = calloc(dof, sizeof(double))) && (t->v = calloc(dof, sizeof(double))) &&
                (t->place = calloc(to, sizeof(double))) && (t->rate = calloc(to, sizeof(double))) &&
                (t->pull = calloc(to, sizeof(double))) && (t->bound = calloc(to, sizeof(double))) &&
-               (t->old = calloc(from, sizeof(double)));
+               (t->old = calloc(from, sizeof(double))) && (t->load = calloc(from, sizeof(double))) &&
+               (t->moving = calloc(from, sizeof(double)));
     for (int k = 0; k < 5; k++) all = (t->work[k] = calloc(dof, sizeof(double))) && all;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -230,7 +231,8 @@ void pal_transfer_free(pal_transfer *t)
     pal_point_rows_free(&t->in);
     pal_point_rows_free(&t->back);
     for (int k = 0; k < 5; k++) free(t->work[k]);
-    free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old);
+    free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old), free(t->load),
+        free(t->moving);
     free(t->fix), free(t->seen_room);
     pal_point_rows_free(&t->spread);
     free(t);

@@ -9,7 +9,8 @@
  * one has, as far as it can.
  * Forces go the other way: those on old nodes are shared out to the new ones around them by their masses as well, so
  * that no net force is lost and nodes that are light (at the rim of cut elements) are not thrown; where the new mesh is
- * the finer one to all new nodes that look to the old one, so that they do not gather in few.
+ * the finer one to all new nodes that look to the old one, so that they do not gather in few. What is not balanced, and
+ * moves the old nodes, goes as their acceleration to new ones of less than half the mass.
  *
  * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
  * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),

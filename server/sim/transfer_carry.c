@@ -21,8 +21,6 @@ enum { N_SMOOTH = 40, N_SMOOTH_AGAIN = 10, N_SMOOTH_FAR = 200, N_SCALE = 8 };
 /* velocities stay as they are while the kinetic energy is off by less than this part of all */
 #define SPARE 0.01
 #define PULL  1e-6
-/* of an old node's mass: new nodes that look to it with less take as much less of its force */
-#define LEAST_SHARE 0.25
 
 /* ---- sums ---- */
 
@@ -66,6 +64,23 @@ static double world_J(pal_world *w)
 {
     double sum = 0;
     for (int b = 0; b < w->plan.n_body; b++) sum += elastic_J(w, b) + pal_body_kinetic_J(&w->plan.body[b]);
+    return sum;
+}
+
+/* pulled_J of the old body, t->moving, and the energy of its world unless NULL; its loads stay those of its last step
+ */
+static double look_at(pal_transfer *t, pal_world *old, double *all_J)
+{
+    pal_body *from = &old->plan.body[t->body];
+    size_t n = 3 * (size_t)from->n_node;
+    memcpy(t->load, from->load, n * sizeof *t->load);
+    if (all_J)
+        *all_J = world_J(old);
+    else
+        (void)elastic_J(old, t->body);
+    for (size_t i = 0; i < n; i++) t->moving[i] = t->load[i] + from->f[i] - from->load[i];
+    double sum = pulled_J(old, t->body);
+    memcpy(from->load, t->load, n * sizeof *t->load);
     return sum;
 }
 
@@ -249,119 +264,6 @@ static bool refines(const pal_world *w, int b)
 }
 
 /* ---- forces ---- */
-
-/* entries of t->in by old nodes: new nodes that look to old node i and by how much, who[first[i]..first[i+1]-1] */
-typedef struct lookers {
-    int32_t *first, *who;
-    double *weight;
-} lookers;
-
-static bool find_lookers(const pal_point_rows *in, int n_from, lookers *out)
-{
-    int32_t n = in->start[in->n_row];
-    out->first = calloc((size_t)n_from + 2, sizeof *out->first);
-    out->who = malloc(sizeof *out->who * (size_t)(n + 1));
-    out->weight = malloc(sizeof *out->weight * (size_t)(n + 1));
-    if (!out->first || !out->who || !out->weight) return false;
-    /* first[i + 1] is where the next entry of i goes, until all are there */
-    for (int32_t k = 0; k < n; k++) out->first[in->point[k] + 2]++;
-    for (int i = 0; i < n_from; i++) out->first[i + 2] += out->first[i + 1];
-    for (int32_t j = 0; j < in->n_row; j++)
-        for (int32_t k = in->start[j]; k < in->start[j + 1]; k++) {
-            int32_t at = out->first[in->point[k] + 1]++;
-            out->who[at] = j, out->weight[at] = in->weight[k];
-        }
-    return true;
-}
-
-/* old node i's force goes to the new nodes that look to it, over their masses as they do; the remainder (of nodes that
- * no new one, or next to none, looks to) by place */
-static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const lookers *l, int i,
-                       pal_row_build *rows)
-{
-    double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
-    for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
-    double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
-    for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
-        pal_row_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
-    for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)
-        pal_row_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
-    pal_row_end(rows);
-}
-
-/* old node i's force to the new nodes around it, by their masses as well: light ones, at the rim of cut elements, would
- * be thrown by what their heavy neighbours bear with ease */
-static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_row_build *rows)
-{
-    const pal_point_rows *back = &t->back;
-    double sum = 0;
-    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++)
-        sum += fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
-    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++) {
-        double share = fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
-        pal_row_add(rows, back->point[k], sum > 0 ? share / sum : back->weight[k]);
-    }
-    pal_row_end(rows);
-}
-
-/* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
- * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
- * look to the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
-static void find_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    bool lumped = !from->embed && from->n_node >= to->n_node;
-    lookers l = {0};
-    pal_row_build rows;
-    if (t->shell || t->spread.n_row > 0) return;
-    if (lumped || find_lookers(&t->in, from->n_node, &l)) {
-        pal_row_build_begin(&rows, from->n_node, to->n_node, INT32_MAX);
-        for (int i = 0; i < from->n_node && !rows.err; i++) {
-            if (lumped)
-                add_by_mass(t, to, i, &rows);
-            else
-                add_spread(t, from, to, &l, i, &rows);
-        }
-        (void)pal_row_build_finish(&rows, &t->spread);
-    }
-    free(l.first), free(l.who), free(l.weight);
-}
-
-/* how forces at old nodes go to new ones; without memory for a better way by place */
-static const pal_point_rows *force_rows(const pal_transfer *t)
-{
-    return t->spread.n_row > 0 ? &t->spread : &t->back;
-}
-
-/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
- * before as it stands, whose g goes */
-static void find_pull(pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    size_t n = 3 * (size_t)from->n_node;
-    memset(t->pull, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    if (from->embed) {
-        double *a = from->g;
-        for (int i = 0; i < from->n_dof; i++)
-            pal_scale3(a + 3 * i, from->held[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
-        pal_point_rows_place(from->embed, a, t->old);
-        for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
-    } else {
-        memcpy(t->old, from->f, n * sizeof *t->old);
-        for (int i = 0; i < from->n_node; i++)
-            if (from->held[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
-    }
-    pal_point_rows_pull(force_rows(t), t->old, t->pull);
-}
-
-/* lasting loads */
-static void carry_loads(pal_transfer *t, const pal_body *from, pal_world *next)
-{
-    pal_body *to = &next->plan.body[t->body];
-    if (!from->outer) return;
-    if (!to->outer) to->outer = PAL_NEW(next->arena, double, 3 * (size_t)to->n_node);
-    if (!to->outer) return;
-    memset(to->outer, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    pal_point_rows_pull(&t->back, from->outer, to->outer);
-}
 
 /* the difference of forces goes out in steps; of a body that nothing holds it moves and turns nothing */
 static void ease(pal_transfer *t, pal_world *next)
@@ -549,7 +451,7 @@ static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
         if (from && known)
             row->effect->hand(row->self, &next->plan.body[b], from->self,
                               &(pal_hand){.from = &before->plan.body[b],
-                                          .place = b == t->body ? force_rows(t) : NULL,
+                                          .place = b == t->body ? pal_transfer_rows(t) : NULL,
                                           .rest_m = next->part[b].rest_m,
                                           .same_shown = pal_transfer_same_shown(next, before, b),
                                           .left_N = b == t->body ? t->pull : NULL});
@@ -588,9 +490,9 @@ static int approach(pal_transfer *t, pal_world *next, const pal_body *from, doub
     for (int i = 0; i < 3 * to->n_dof && t->rehearsed; i++) to->x[i] += t->fix[i];
     if (t->rehearsed) pal_body_place(to);
     if (t->back.n_row == 0) return 0;
-    find_spread(t, from, to);
-    carry_loads(t, from, next);
-    find_pull(t, from, to);
+    pal_transfer_spread(t, from, to);
+    pal_transfer_loads(t, from, to, next->arena);
+    pal_transfer_pull(t, from, to);
     return smooth(t, next, want_J);
 }
 
@@ -600,13 +502,14 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
     pal_world *old = (pal_world *)(uintptr_t)before; /* its forces are worked out again */
     pal_body *from = &old->plan.body[t->body], *to = &next->plan.body[t->body];
     size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
-    *out = (pal_transfer_report){.energy_before_J = world_J(old), .scale = 1};
-    double elastic_before_J = pulled_J(old, t->body), kinetic_J = pal_body_kinetic_J(from);
+    *out = (pal_transfer_report){.scale = 1};
+    double elastic_before_J = look_at(t, old, &out->energy_before_J), kinetic_J = pal_body_kinetic_J(from);
     double spare_J = SPARE * (elastic_before_J + kinetic_J);
     place_points(t, from, next);
     pal_world_follow(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_J(next);
     out->n_smooth = approach(t, next, from, elastic_before_J);
+    pal_world_moved(next, t->body); /* rows look anew at what is smooth now, as they will at the end */
     out->scale = scale_displacement(t, next, elastic_before_J);
     if (is_free(to)) keep_momentum(from, to);
     /* the velocity makes up for what the displacement could not */
@@ -650,7 +553,7 @@ bool pal_transfer_look(pal_transfer *t, const pal_world *before)
     if (t->shell || from->frozen || !make_seen(t, from)) return false;
     size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
     double *room = t->seen_room;
-    t->seen_J = pulled_J(old, t->body);
+    t->seen_J = look_at(t, old, NULL);
     t->seen = *from;
     t->seen.x = keep(&room, from->x, dof), t->seen.v = keep(&room, from->v, dof);
     t->seen.g = keep(&room, from->g, dof), t->seen.f = keep(&room, from->f, node);

@@ -18,6 +18,8 @@ struct pal_transfer {
     double *bound;         /* of stiffness; work                         [n_to]        */
     double *work[5];       /* of least squares                           [n_dof][3]    */
     double *old;           /* work                                       [n_from][3]   */
+    double *load;          /* loads of the old body's last step, N       [n_from][3]   */
+    double *moving;        /* what accelerates its nodes, with these, N  [n_from][3]   */
     /* while the old world goes on */
     bool rehearsed;
     double *fix;       /* what smoothing added to places by interpolation, NULL: none yet [n_dof][3] */
@@ -26,6 +28,14 @@ struct pal_transfer {
     double seen_J;     /* its elastic energy then */
 };
 
+/* Forces. Rows of t->spread, made once: forces at old nodes -> at new ones, no net force is lost, by masses */
+void pal_transfer_spread(pal_transfer *t, const pal_body *from, const pal_body *to);
+const pal_point_rows *pal_transfer_rows(const pal_transfer *t); /* those; without memory for them t->back */
+/* lasting loads, in memory of the new body's arena where it has none; without memory they are gone */
+void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena);
+/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
+ * before as it stands, whose g goes, and t->moving. Takes t->old, t->rate, t->bound */
+void pal_transfer_pull(pal_transfer *t, const pal_body *from, const pal_body *to);
 /* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);

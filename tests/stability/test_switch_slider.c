@@ -2,13 +2,15 @@
  * rehearsed, some before the one before has been let in, the hand going on meanwhile. No frame tears: no shown vertex
  * goes farther in a frame than the errors of both settings allow, no edge that is shown is drawn out, the grip holds
  * and pulls without a jump, and at last pulls as if only the last setting had ever been there. --table prints every
- * switch. */
+ * switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many seeds, and asserts nothing. */
 #include "server/mesh/organ.h"
 #include "server/num/random.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
 
 enum { SWITCHES = 20, SETTINGS = 4 };
+
+static bool sweep;
 
 static const pal_setting list[SETTINGS] = {
     {.model = "tet_springs", .size = 9, .k_area_J = -1},
@@ -81,6 +83,12 @@ static double find_errors(pulled *p)
     return longest;
 }
 
+/* of all switches of a seed */
+typedef struct worst {
+    double frame_m, energy, force;
+    int n_energy; /* switches that are off by more than 2 % */
+} worst;
+
 typedef struct seen {
     double frame, edge, least_N, most_N, first_J; /* first_J: kinetic energy after a step */
 } seen;
@@ -104,10 +112,9 @@ static void watch(const pulled *p, pal_world *w, double step_s, int n, double bo
     }
 }
 
-static pal_world *change(const pulled *p, int from, int to, bool rehearsed, pal_world *w, double *energy_J)
+static pal_world *change(const pulled *p, int from, int to, bool rehearsed, pal_world *w, pal_transfer_report *out)
 {
     pal_transfer *x = NULL;
-    pal_transfer_report r;
     pal_note note = {""};
     if (pal_transfer_make(&p->set[from]->scene, &p->set[to]->scene, 0, &note, &x)) CHECK_FAIL("%s", note.text);
     pal_world *next = open_world(&p->set[to]->scene);
@@ -115,9 +122,8 @@ static pal_world *change(const pulled *p, int from, int to, bool rehearsed, pal_
         CHECK(pal_transfer_look(x, w));
         pal_transfer_rehearse(x, next);
     }
-    pal_transfer_carry(x, next, w, &r);
-    *energy_J = r.energy_before_J;
-    CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
+    pal_transfer_carry(x, next, w, out);
+    if (!sweep) CHECK_NEAR(out->energy_after_J / out->energy_before_J, 1, 0.02);
     pal_transfer_free(x);
     pal_world_destroy(w);
     return next;
@@ -129,10 +135,10 @@ static double pull_of(const pulled *p, int setting, double part)
 {
     const int first = p->at_once ? setting : 0;
     const double step_s = p->set[setting]->scene.step_s;
-    double energy_J;
+    pal_transfer_report r;
     pal_world *w = open_world(&p->set[first]->scene);
     pull(p, w, p->set[first]->scene.step_s);
-    if (setting != first) w = change(p, first, setting, false, w, &energy_J);
+    if (setting != first) w = change(p, first, setting, false, w, &r);
     for (double t = 0, at = 1; t < 2; t += step_s) {
         at = fmin(part, at + 0.4 * step_s);
         pull_to(p, w, at);
@@ -143,11 +149,39 @@ static double pull_of(const pulled *p, int setting, double part)
     return force_N;
 }
 
-static void slide(pulled *p, uint64_t seed)
+/* what one switch showed, against what the settings and the way pulled allow */
+static void judge(const pulled *p, int to, const seen *s, double bound_m, double longest, double energy_J)
 {
-    const double longest = find_errors(p);
+    HARD_CASE("switch", list[to].model,
+              "slider under a pull: farthest move of the surface in a frame, over the "
+              "errors of both",
+              s->frame, 1, "");
+    /* light nodes at the rim of cut elements are not thrown */
+    HARD_CASE("switch", list[to].model, "slider under a pull: farthest move in a frame, of the way pulled",
+              100 * s->frame * bound_m / pal_norm3(p->by_m), 10, "%");
+    HARD_CASE("switch", list[to].model, "slider under a pull: longest edge over the longest without a switch",
+              s->edge / longest, 1.25, "");
+    /* what was not let go yet is not lost at the next switch: nothing springs back */
+    CHECK_LE(s->first_J, 0.09 * energy_J);
+}
+
+/* no switch has taken anything from the pull for good: a second later, in which the body's own damping lets go what is
+ * left, force over that of a world without the other switches, less 1 */
+static double force_left(const pulled *p, int setting, double part, pal_world *w)
+{
+    const double step_s = p->set[setting]->scene.step_s;
+    step(w, step_s, (int)(1 / step_s));
+    const double now_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N), right_N = pull_of(p, setting, part);
+    if (table) printf("  at last %.3f N, without the other switches %.3f N\n", now_N, right_N);
+    return now_N / right_N - 1;
+}
+
+static worst slide(pulled *p, uint64_t seed)
+{
+    const double longest = sweep && !table ? 1 : find_errors(p);
     int at_setting = 0;
     double part = 1;
+    worst all = {0};
     pal_world *w = open_world(&p->set[0]->scene);
     pull(p, w, p->set[0]->scene.step_s);
     const size_t n_byte = 3 * sizeof(float) * (size_t)pal_world_look(w, 0)->n_shown;
@@ -157,81 +191,92 @@ static void slide(pulled *p, uint64_t seed)
     for (uint64_t k = 0; k < SWITCHES; k++) {
         int to = (at_setting + 1 + (int)(pal_random_unit(seed, 3 * k) * (SETTINGS - 1))) % SETTINGS;
         int n = 2 + (int)(12 * pal_random_unit(seed, 3 * k + 1));
-        double energy_J, before_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
+        pal_transfer_report r;
+        double before_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
         seen s = {.least_N = before_N, .most_N = before_N};
-        double bound_m = p->error_m[at_setting] + p->error_m[to];
-        w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &energy_J);
+        double bound_m = sweep ? 1 : p->error_m[at_setting] + p->error_m[to];
+        w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
         CHECK_LE(check_farthest(last, pal_world_look(w, 0)->shown, pal_world_look(w, 0)->n_shown), 1e-6);
         watch(p, w, p->set[to]->scene.step_s, n, bound_m, last, &part, &s);
+        double energy = r.energy_after_J / r.energy_before_J - 1;
         if (table)
-            printf("  %d -> %d, %2d steps: %.3f of %.2f mm in a frame, edges %.2f (%.2f), force %.2f, %.2f to %.2f N\n",
-                   at_setting, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.least_N, s.most_N);
-        HARD_CASE("switch", list[to].model,
-                  "slider under a pull: farthest move of the surface in a frame, over the "
-                  "errors of both",
-                  s.frame, 1, "");
-        /* light nodes at the rim of cut elements are not thrown */
-        HARD_CASE("switch", list[to].model, "slider under a pull: farthest move in a frame, of the way pulled",
-                  100 * s.frame * bound_m / pal_norm3(p->by_m), 10, "%");
-        HARD_CASE("switch", list[to].model, "slider under a pull: longest edge over the longest without a switch",
-                  s.edge / longest, 1.25, "");
-        /* what was not let go yet is not lost at the next switch: nothing springs back */
-        CHECK_LE(s.first_J, 0.09 * energy_J);
-        if (table) printf("      kinetic %.4f of all\n", s.first_J / energy_J);
+            printf("  %d -> %d, %2d steps: %.3f of %.2f mm in a frame, edges %.2f (%.2f), force %.2f, %.2f to %.2f N, "
+                   "energy %+.2f %%, kinetic %.4f of all\n",
+                   at_setting, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.least_N, s.most_N,
+                   100 * energy, s.first_J / r.energy_before_J);
+        if (!sweep) judge(p, to, &s, bound_m, longest, r.energy_before_J);
+        all.frame_m = fmax(all.frame_m, s.frame * bound_m);
+        all.energy = fmax(all.energy, fabs(energy)), all.n_energy += fabs(energy) > 0.02;
         at_setting = to;
     }
-    /* no switch has taken anything from the pull for good */
-    const double step_s = p->set[at_setting]->scene.step_s;
-    step(w, step_s, (int)(0.5 / step_s));
-    const double now_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N), right_N = pull_of(p, at_setting, part);
-    if (table) printf("  at last %.3f N, without the other switches %.3f N\n", now_N, right_N);
-    HARD_CASE("switch", list[at_setting].model, "slider under a pull: off the force without the other switches",
-              100 * fabs(now_N / right_N - 1), 10, "%");
+    all.force = force_left(p, at_setting, part, w);
+    if (!sweep)
+        HARD_CASE("switch", list[at_setting].model, "slider under a pull: off the force without the other switches",
+                  100 * fabs(all.force), 5, "%");
     free(last);
     pal_world_destroy(w);
+    return all;
 }
 
-/* gripped at the vertex farthest along `way`, held at the other end */
-static void pull_and_slide(const pal_surface *surface, int along, bool at_once, uint64_t seed)
+typedef struct how {
+    int along; /* gripped at the vertex farthest along this axis, held at the other end */
+    bool at_once;
+    double by_m;
+    uint64_t seed;
+} how;
+
+static void make_pulled(const pal_surface *surface, const how *h, pal_prepared *mesh, pulled *out)
 {
     const pal_setting right = {.model = "fem", .element = "hex8_bbar", .size = 12};
     const pal_voxel_options options = {.resolution = 9, .border = true};
-    pulled p = {.by_m = {0, 0, 0.02}, .at_once = at_once};
     pal_note note = {""};
-    pal_prepared mesh;
     pal_prepare_report report;
-    REQUIRE(!pal_prepared_make(surface, &options, &mesh, &report, &note));
-    p.scene = malloc(sizeof *p.scene);
-    if (!p.scene) abort();
-    pal_scene_default(p.scene);
-    p.scene->up[0] = along == 0, p.scene->up[1] = 0, p.scene->up[2] = along == 2;
-    pal_body_def *def = &p.scene->body[0];
-    pal_body_default(def, "thing", &mesh);
-    p.scene->n_body = 1;
-    p.scene->step_s = 1.0 / 60;
+    *out = (pulled){.by_m = {0, 0, h->by_m}, .at_once = h->at_once};
+    if (pal_prepared_make(surface, &options, mesh, &report, &note)) abort();
+    pal_scene *scene = out->scene = malloc(sizeof *scene);
+    if (!scene) abort();
+    pal_scene_default(scene);
+    scene->up[0] = h->along == 0, scene->up[1] = 0, scene->up[2] = h->along == 2;
+    pal_body_def *def = &scene->body[0];
+    pal_body_default(def, "thing", mesh);
+    scene->n_body = 1;
+    scene->step_s = 1.0 / 60;
     def->material = (pal_material){.young_Pa = 8e3, .poisson = 0.4, .density_kg_m3 = 1050, .damping_1_s = 8};
     def->support[0].fraction = 0.15;
     add_effects(def, false);
-    pal_tools_default(p.scene, 1);
-    p.scene->tool[0].radius_m = 0.015;
+    pal_tools_default(scene, 1);
+    scene->tool[0].radius_m = 0.015;
     int top = 0;
     for (int i = 0; i < surface->n_vertex; i++)
-        if (surface->x[3 * i + along] > surface->x[3 * top + along]) top = i;
-    pal_copy3(p.from_m, surface->x + 3 * (size_t)top);
+        if (surface->x[3 * i + h->along] > surface->x[3 * top + h->along]) top = i;
+    pal_copy3(out->from_m, surface->x + 3 * (size_t)top);
     for (int i = 0; i <= SETTINGS; i++)
-        if (pal_setting_make(p.scene, 0, i < SETTINGS ? &list[i] : &right, &note, &p.set[i]))
+        if (pal_setting_make(scene, 0, i < SETTINGS ? &list[i] : &right, &note, &out->set[i]))
             CHECK_FAIL("%s", note.text);
-    slide(&p, seed);
-    for (int i = 0; i <= SETTINGS; i++) pal_set_scene_free(p.set[i]);
-    pal_prepared_free(&mesh);
-    free(p.scene);
+}
+
+static void free_pulled(pulled *p, pal_prepared *mesh)
+{
+    for (int i = 0; i <= SETTINGS; i++) pal_set_scene_free(p->set[i]);
+    pal_prepared_free(mesh);
+    free(p->scene);
+}
+
+static worst pull_and_slide(const pal_surface *surface, const how *h)
+{
+    pal_prepared mesh;
+    pulled p;
+    make_pulled(surface, h, &mesh, &p);
+    worst all = slide(&p, h->seed);
+    free_pulled(&p, &mesh);
+    return all;
 }
 
 static void an_organ_under_a_pull_does_not_tear(void)
 {
     pal_surface organ;
     REQUIRE(!pal_organ_make(1500, &organ));
-    pull_and_slide(&organ, 2, false, 7);
+    (void)pull_and_slide(&organ, &(how){.along = 2, .by_m = 0.03, .seed = 7});
     pal_surface_free(&organ);
 }
 
@@ -243,15 +288,61 @@ static void a_beam_under_a_pull_does_not_tear(void)
     pal_surface surface = {0};
     REQUIRE(!pal_cells_block(count, size, &cells, NULL));
     REQUIRE(!pal_cells_boundary(&cells, &surface, NULL, NULL));
-    for (int k = 0; k < 2; k++) pull_and_slide(&surface, 0, k == 1, 11);
+    for (int k = 0; k < 2; k++) (void)pull_and_slide(&surface, &(how){.at_once = k == 1, .by_m = 0.02, .seed = 11});
     pal_surface_free(&surface);
     pal_cells_free(&cells);
+}
+
+/* cubes that a pull turns over do not take turns with their split for ever, some millimetres apart: they are tried
+ * again only where they are less crushed */
+static void crushed_cubes_come_to_rest(void)
+{
+    enum { COARSE = 1 };
+    pal_surface organ;
+    pal_prepared mesh;
+    pulled p;
+    REQUIRE(!pal_organ_make(1500, &organ));
+    make_pulled(&organ, &(how){.along = 2, .by_m = 0.04}, &mesh, &p);
+    pal_world *w = open_world(&p.set[COARSE]->scene);
+    pull(&p, w, 1.0 / 60);
+    const pal_rescues *r = &pal_world_look(w, 0)->rescue;
+    const uint64_t before = r->n_split;
+    CHECK(r->n_tangled > 0);
+    step(w, 1.0 / 60, 120);
+    if (table) printf("  %d changes in a second, %d in the next two\n", (int)before, (int)(r->n_split - before));
+    CHECK_LE((double)(r->n_split - before), 2); /* some 200 when cubes were tried whenever they were whole */
+    pal_world_destroy(w);
+    free_pulled(&p, &mesh);
+    pal_surface_free(&organ);
+}
+
+static int sweep_seeds(double by_m, int n_seed)
+{
+    pal_surface organ;
+    worst most = {0};
+    if (pal_organ_make(1500, &organ)) return 1;
+    for (uint64_t seed = 1; seed <= (uint64_t)n_seed; seed++) {
+        worst one = pull_and_slide(&organ, &(how){.along = 2, .by_m = by_m, .seed = seed});
+        printf("seed %d: %.2f mm in a frame (%.1f %% of the way), energy off by %.2f %%, at last by %+.1f %% of the "
+               "force\n",
+               (int)seed, 1e3 * one.frame_m, 100 * one.frame_m / by_m, 100 * one.energy, 100 * one.force);
+        most.frame_m = fmax(most.frame_m, one.frame_m), most.energy = fmax(most.energy, one.energy);
+        most.force = fmax(most.force, fabs(one.force)), most.n_energy += one.n_energy;
+    }
+    printf("worst of %d: %.2f mm (%.1f %%), %.2f %%, %d switches beyond 2 %%, %.1f %%\n", n_seed, 1e3 * most.frame_m,
+           100 * most.frame_m / by_m, 100 * most.energy, most.n_energy, 100 * most.force);
+    pal_surface_free(&organ);
+    return 0;
 }
 
 int main(int argc, char **argv)
 {
     table = argc > 1 && !strcmp(argv[1], "--table");
+    table = table || argc > 4;
+    sweep = argc > 3 && !strcmp(argv[1], "--sweep");
+    if (sweep) return sweep_seeds(1e-3 * atof(argv[2]), atoi(argv[3]));
     RUN(an_organ_under_a_pull_does_not_tear);
     RUN(a_beam_under_a_pull_does_not_tear);
+    RUN(crushed_cubes_come_to_rest);
     return check_report();
 }
