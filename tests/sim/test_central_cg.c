@@ -382,7 +382,7 @@ int main(void)
     RUN(order_is_two_with_and_without_drag);
     RUN(order_is_two_with_uneven_steps);
     RUN(limit_is_the_true_one_within_two_percent);
-    RUN(just_below_the_true_limit_is_stable_and_just_above_is_not);
+    RUN_LONG(just_below_the_true_limit_is_stable_and_just_above_is_not);
     RUN(limit_holds_in_flight);
     RUN(a_look_at_the_limit_leaves_the_body);
     RUN(limit_follows_mass_and_supports);

@@ -231,7 +231,7 @@ int main(void)
     RUN_LONG(publishes_the_slope_of_slow_pressing);
     RUN(pulls_what_it_grabbed_and_holds_still);
     RUN(two_tools_share_a_place);
-    RUN(keeps_to_its_cap);
+    RUN_LONG(keeps_to_its_cap);
     RUN(leads_what_is_stiff_but_bends);
     RUN_LONG(friction_drags_and_slides);
     return check_report();

@@ -339,9 +339,9 @@ int main(void)
     RUN(what_the_world_does_to_it_wakes_it);
     RUN(a_field_is_shown_without_waking_it);
     RUN(frames_say_so_and_keep_their_positions);
-    RUN(sleeping_runs_repeat);
+    RUN_LONG(sleeping_runs_repeat);
     RUN(does_not_sleep_while_something_goes_on);
-    RUN(what_a_far_tool_holds_or_presses_stays_awake);
+    RUN_LONG(what_a_far_tool_holds_or_presses_stays_awake);
     RUN(refuses_what_is_no_threshold);
     return check_report();
 }

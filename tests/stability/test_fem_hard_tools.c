@@ -158,8 +158,8 @@ static void two_tools_press_against_one_another(void)
 int main(void)
 {
     RUN(poses_and_loads_that_are_no_numbers_are_refused);
-    RUN(a_tool_that_jumps_into_the_body_gives_no_more_than_cap_times_clamp);
+    RUN_LONG(a_tool_that_jumps_into_the_body_gives_no_more_than_cap_times_clamp);
     RUN(a_tool_that_appears_inside_pushes_out_gently);
-    RUN(two_tools_press_against_one_another);
+    RUN_LONG(two_tools_press_against_one_another);
     return check_report();
 }
