@@ -221,6 +221,63 @@ static void tools_hold_on(void)
     }
 }
 
+/* a tool 2 cm above the tip that grips it, lifts it by 6 mm and turns by 0.3 rad about the beam's length meanwhile,
+ * which swings the patch sideways by as much; frame k of 80 */
+static void lift_and_turn(pal_world *w, int k)
+{
+    double part = fmax(0, fmin(1, (k - 20) / 50.0));
+    pal_pose p = at(0.19, 0.025, WIDTH + 0.02 + 0.006 * part, 1);
+    p.quat[0] = cos(0.15 * part), p.quat[1] = sin(0.15 * part);
+    pal_world_pose(w, 0, &p);
+    step(w, 1.0 / 60, 1);
+}
+
+/* a grip is handed over while its tool turns: its force goes on in size and direction (a
+ * tool has no torque of its own), and tissue turns with the tool as in a body that
+ * was held so from the start */
+static void a_turning_grip_goes_on(void)
+{
+    const int pair[3][2] = {{0, 1}, {0, 6}, {6, 1}};
+    for (int n = 0; n < 3; n++) {
+        beam b;
+        begin(&b, false, false, 20);
+        b.scene->body[0].n_support = 1;
+        b.scene->body[0].support[0] = (pal_support){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
+        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene),
+                  *right = open_world(&b.set[1]->scene);
+        pal_transfer *x = make_transfer(&b, 0, 1);
+        pal_transfer_report r;
+        double force[3], tip[3], want[3], start[3], speed[3];
+        for (int k = 0; k < 45; k++) lift_and_turn(w, k), lift_and_turn(right, k);
+        const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0],
+                       *held = &pal_world_tools(right)->tool[0];
+        pal_copy3(force, before->mean_force_N);
+        pal_transfer_carry(x, next, w, &r);
+        tip_of(right, start, speed);
+        lift_and_turn(next, 45), lift_and_turn(w, 45), lift_and_turn(right, 45);
+        if (table)
+            printf("  turning grip %d: force %.3f -> %.3f (on: %.3f) N, apart by %.3f N\n", n, pal_norm3(force),
+                   pal_norm3(after->mean_force_N), pal_norm3(before->mean_force_N),
+                   pal_dist3(after->mean_force_N, before->mean_force_N));
+        CHECK(after->holding);
+        CHECK_LE(pal_dist3(after->mean_force_N, before->mean_force_N), 0.12 * pal_norm3(force));
+        for (int k = 46; k < 140; k++) lift_and_turn(next, k), lift_and_turn(right, k);
+        tip_of(next, tip, speed), tip_of(right, want, speed);
+        double way = pal_dist3(want, start), off = pal_dist3(tip, want);
+        if (table)
+            printf("    tip off by %.2f of %.2f mm, force %.3f of %.3f N, apart by %.3f N\n", 1e3 * off, 1e3 * way,
+                   pal_norm3(after->mean_force_N), pal_norm3(held->mean_force_N),
+                   pal_dist3(after->mean_force_N, held->mean_force_N));
+        CHECK(way > 0.003);
+        CHECK_LE(off, 0.01 * way);
+        CHECK_LE(pal_dist3(after->mean_force_N, held->mean_force_N), 0.01 * pal_norm3(held->mean_force_N));
+        pal_transfer_free(x);
+        pal_world_destroy(w), pal_world_destroy(next), pal_world_destroy(right);
+        end(&b);
+    }
+}
+
 /* and of another surface it holds the same tissue: what solids show are no voxels. After six switches it pulls as if
  * it had always held that body */
 static void grips_go_between_surfaces(void)
@@ -488,6 +545,7 @@ int main(int argc, char **argv)
     RUN(the_same_switch_gives_the_same_hash);
     RUN(there_and_back_fifty_times);
     RUN(tools_hold_on);
+    RUN(a_turning_grip_goes_on);
     RUN(grips_go_between_surfaces);
     RUN(friction_holds_on);
     RUN(lasting_loads_stay);
