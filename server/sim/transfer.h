@@ -13,16 +13,17 @@
  * moves the old nodes, goes as their acceleration to new ones of less than half the mass.
  *
  * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
- * elements left free. First every node is moved by its missing force over a bound of its stiffness (kinks go first),
- * until the elastic energy is what it was, or 40 times (200 where it is half as much again); what is left is made up
- * for by the length of the displacement from rest (of a body that nothing holds, from its best rigid place), by
- * PAL_TRANSFER_SCALE at most, and where that is not enough (the report's scale stands at its bound), or the mass is
- * another one, by the velocity, by PAL_TRANSFER_RATE at most. A body without velocity whose displacement stands at its
- * bound has another energy then: the report says so. A body that rests under a load with the same elastic energy stands
- * about half way between where it rested before and where it will: a point moves by half of what the methods differ in,
- * which is less than the sum of their errors. The other half is let go as the difference of all forces goes out
- * (ease.h). Momentum: a body that nothing holds keeps momentum and spin of before; what they ask for of the kinetic
- * energy they have (equal masses: the same).
+ * elements left free; of a surface that adapts fewer levels leave a sharp tip where a tool held fine vertices. First
+ * every node (of such a surface every vertex in use) is moved by its missing force over a bound of its stiffness (kinks
+ * go first), until the elastic energy is what it was, or 40 times (200 where it is half as much again), not at all
+ * where it is no more than that. What is left is made up for by the length of the displacement from rest (of a body
+ * that nothing holds, from its best rigid place), by PAL_TRANSFER_SCALE at most, and where that is not enough (the
+ * report's scale stands at its bound), or the mass is another one, by the velocity, by PAL_TRANSFER_RATE at most. A
+ * body without velocity whose displacement stands at its bound has another energy then: the report says so. A body that
+ * rests under a load with the same elastic energy stands about half way between where it rested before and where it
+ * will: a point moves by half of what the methods differ in, which is less than the sum of their errors. The other half
+ * is let go as the difference of all forces goes out (ease.h). Momentum: a body that nothing holds keeps momentum and
+ * spin of before; what they ask for of the kinetic energy they have (equal masses: the same).
  *
  * Sight and touch. The same nodes as near as they can stand show a skin elsewhere: the way from what the new body would
  * show to what the old one did is let go with the forces (pal_world_lag), so that nothing is seen to jump, and tools

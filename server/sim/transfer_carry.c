@@ -310,11 +310,12 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     pal_body *to = &next->plan.body[t->body];
     double *way = t->work[0], now_J = elastic_J(next, t->body), most_J = 1.5 * now_J;
     int n = 0;
-    if (to->embed || to->shell || !find_bound(next, t->body, t->bound)) return 0;
+    if (to->embed || !find_bound(next, t->body, t->bound)) return 0;
     memset(way, 0, 3 * sizeof *way * (size_t)to->n_dof);
     int n_most = now_J > FAR * want_J ? N_SMOOTH_FAR : t->rehearsed ? N_SMOOTH_AGAIN : N_SMOOTH;
     for (; n < n_most && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
-        for (int i = 0; i < to->n_node; i++) {
+        for (int k = 0; k < to->n_active; k++) {
+            int i = pal_body_point(to, k);
             if (to->held[i] || !(t->bound[i] > 0)) continue;
             for (int c = 3 * i; c < 3 * i + 3; c++) {
                 way[c] = INERTIA * way[c] + (to->f[c] - t->pull[c]) / t->bound[i];

@@ -366,12 +366,15 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
     tool_grab *grab = self;
     const tool_grab *old = before;
     if (!grab->handed) grab->handed = calloc((size_t)grab->n_tool, sizeof *grab->handed);
+    /* the nodes of before are shared out to those in use now: none of them is new to a grip */
+    if (grab->use) pal_in_use_look(grab->use, body);
     for (int t = 0; t < grab->n_tool && t < old->n_tool && grab->handed; t++) {
         const grip *b = &old->grip[t];
         grip *g = &grab->grip[t];
         pal_handed *h = &grab->handed[t];
         let_go(grab, g);
         g->button = b->button;
+        if (g->live) g->live->renewed = false, pal_set3(g->live->shift, 0, 0, 0);
         if (!b->held) continue;
         hand_nodes(grab, g, body, b, by);
         move_hold(g, body, b, by->from);
