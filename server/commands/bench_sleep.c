@@ -1,6 +1,6 @@
 /* palpate bench sleep: what a body costs that rests: awake and watched, awake and watched by nobody, asleep with a tool
  * in the room. Median over steps of the procedural organ as springs and as finite elements, the stomach as an adaptive
- * surface, a subdivided solid. Asked: asleep below 5 % of awake. */
+ * surface, a subdivided cube of 3 x 3 x 3 cells. Asked: asleep below 5 % of awake. */
 #include "server/commands/commands.h"
 
 #include "server/base/clock.h"
@@ -47,6 +47,7 @@ static pal_err measure_world(const pal_scene *scene, result *out, pal_note *note
     int n = 0;
     for (; n < MOST_STEP && !body->asleep && !err; n++) err = pal_world_step(world, scene->step_s);
     out->asleep_s = n * scene->step_s;
+    if (body->frozen) err = pal_note_set(note, PAL_ERR_NUMERIC, "%s stopped: %s", out->name, body->why);
     if (!err && !body->asleep)
         err = pal_note_set(note, PAL_ERR_NUMERIC, "%s does not come to rest in %g s", out->name, out->asleep_s);
     pal_pose pose = {.quat = {1, 0, 0, 0}};
@@ -128,7 +129,7 @@ int bench_sleep(bool json)
     if (!err) err = measure_organ(&fem, &r[1], &note);
     if (!err) err = measure_organ(&shell, &r[2], &note);
     r[3].name = "subdivision_fem";
-    if (!err) err = measure_solid(&pal_cell_model_list[0], &r[3], &note);
+    if (!err) err = measure_solid(pal_cell_model_find("block3"), &r[3], &note);
     if (err) {
         fprintf(stderr, "palpate bench: sleep: %s\n", note.text[0] ? note.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;

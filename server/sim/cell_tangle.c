@@ -19,7 +19,9 @@ static const double still_share = 1e-3;
 /* of mu V: elements that store more would fly apart when they take over; operator edges, whose forces have no energy,
  * feeds what moves more than a little */
 static const double calm_share[] = {[PAL_CELL_POLAR] = 0.1, [PAL_CELL_EDGES] = 1e-3};
-enum { LOOSE_LOOKS = 120, GROW_LOOKS = 30, EDGES_MOST = 12 };
+enum { LOOSE_LOOKS = 120, GROW_LOOKS = 30, FIRM_LOOKS = 4, EDGES_MOST = 12 };
+/* s of a patch under a lasting load, every FIRM_LOOKS looks */
+static const double firmer = 1.25;
 
 /* ---- load ---- */
 
@@ -254,13 +256,6 @@ static bool let_go(pal_cell_tangle *t, double spare_J, double calm, bool still)
 
 enum { NOT = -1, NEW = -2 };
 
-static bool is_loaded(const pal_body *body)
-{
-    double sum = 0;
-    for (int i = 0; i < 3 * body->n_node && body->outer; i++) sum += fabs(body->outer[i]);
-    return sum > 0;
-}
-
 /* what is turned over joins, with its neighbours; so do those of patches that do not come loose, but not while a
  * lasting load pulls at the body: it is that which turns them over, and larger patches are softer. True: some do */
 static bool take_in(pal_cell_tangle *t, const pal_solid *solid, bool loaded)
@@ -352,7 +347,21 @@ static void begin(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_bod
     }
 }
 
-bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body)
+/* what a lasting load turns over would hang by a patch that began soft, and be let out by 1 / s of what the elements
+ * give: s goes back to 1. True: one has changed */
+static bool firm_up(pal_cell_tangle *t)
+{
+    bool any = false;
+    for (int p = 0; p < t->n_patch; p++) {
+        pal_cell_patch *patch = &t->of[p];
+        if (patch->scale >= 1 || patch->age == 0 || patch->age % FIRM_LOOKS != 0) continue;
+        patch->scale = fmin(1, firmer * patch->scale);
+        any = true;
+    }
+    return any;
+}
+
+bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body, bool loaded)
 {
     bool bad = t->n_patch > 0;
     pal_cells_elastic_ratios(c, body->d);
@@ -372,9 +381,9 @@ bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const
     bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op],
                           kinetic_J < still_share * patches(t));
     memcpy(t->before, t->patch, sizeof *t->patch * (size_t)t->n_cell);
-    changed |= take_in(t, c->solid, is_loaded(body));
+    changed |= take_in(t, c->solid, loaded);
     if (changed && c->volume.n > 0) take_whole_cells(t, c);
-    if (!changed) return false;
+    if (!changed) return loaded && firm_up(t);
     number(t, c->solid);
     begin(t, c, body);
     if (first) t->first_J = whole(t, kinetic_J);

@@ -14,7 +14,8 @@
  * s <= 1 is such that a patch begins with no more energy than its elements had. It becomes elements again when none of
  * them is below 0.3 (above 20) any more, they store at most 0.1 mu V, and the body's motion and this row then have no
  * more energy than when patches first were, or after 120 looks in a row at a body that stands still (loads hold it). A
- * patch that does not come loose takes in its neighbours every 30 looks, unless a lasting load pulls at the body.
+ * patch that does not come loose takes in its neighbours every 30 looks, unless a lasting load or weight pulls at the
+ * body: then s goes back to 1, by a quarter every 4 looks, since what hangs by a soft patch is let out by 1 / s.
  * Memory: the world's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_CELL_TANGLE_H
 #define PAL_SIM_CELL_TANGLE_H
@@ -54,8 +55,9 @@ pal_err pal_cell_tangle_make(const pal_solid *solid, pal_arena *arena, pal_cell_
 /* constants after the samples have changed */
 void pal_cell_tangle_refresh(pal_cell_tangle *t, const struct pal_cells_elastic *c);
 void pal_cell_tangle_reset(pal_cell_tangle *t, struct pal_cells_elastic *c);
-/* looks at all elements; true: other elements are in patches than before. No heap */
-bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body);
+/* looks at all elements; loaded: something that lasts pulls at the body. True: other elements are in patches than
+ * before, or s of one is another. No heap */
+bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body, bool loaded);
 
 /* of all patches, at nodes d: energy, J; forces are added to f [n_node][3] where it is not NULL */
 double pal_cell_tangle_force(pal_cell_tangle *t, const pal_solid *solid, const double *d, double *f);

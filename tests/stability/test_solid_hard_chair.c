@@ -83,6 +83,13 @@ static void a_chair_that_is_bent_has_no_patches(void)
     solid_scene_close(&s);
 }
 
+static double farthest(const pal_body *body)
+{
+    double far = 0;
+    for (int k = 0; k < body->n_dof; k++) far = fmax(far, pal_dist3(body->x + 3 * k, body->x_rest + 3 * k));
+    return far;
+}
+
 /* a lasting load on the tip of a thin limb, beyond any cap: patches that grow under it are ever softer, and let it out
  * by 1.9 S */
 static void a_pulled_tail_is_not_let_out_by_what_untangles_it(void)
@@ -102,7 +109,7 @@ static void a_pulled_tail_is_not_let_out_by_what_untangles_it(void)
     REQUIRE(!pal_world_load(s.world, 0, tip, (double[3]){0, 0, 1e9}));
     for (int i = 0; i < 60; i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
-        for (int k = 0; k < s.body->n_dof; k++) far = fmax(far, pal_dist3(s.body->x + 3 * k, s.body->x_rest + 3 * k));
+        far = fmax(far, farthest(s.body));
     }
     printf("  %.2f S out, %d looks found patches\n", far / s.body->size_m, (int)s.body->rescue.n_tangled);
     CHECK(!s.body->frozen && s.body->rescue.n_tangled > 0);
@@ -110,10 +117,36 @@ static void a_pulled_tail_is_not_let_out_by_what_untangles_it(void)
     solid_scene_close(&s);
 }
 
+/* so soft that it falls over its foot and turns elements over: patches begin soft and, as its weight goes on pulling,
+ * grow firm; it was let out by 7.3 S */
+static void what_falls_over_its_foot_hangs_there(void)
+{
+    pal_cells cells = {0};
+    solid_scene s;
+    double far = 0;
+    REQUIRE(!pal_cell_model_make(pal_cell_model_find("monster"), &cells, &(pal_note){""}));
+    solid_scene_take(&s, cells, 1, "central_cg", "polar");
+    s.def->material = (pal_material){.young_Pa = 5000, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
+    s.def->support[s.def->n_support++] = (pal_support){.lowest = true, .fraction = 0.05};
+    s.scene->gravity_m_s2 = 9.81;
+    pal_item_init(&s.def->effect[s.def->n_effect], "effects[0]", "gravity");
+    s.def->n_effect++;
+    REQUIRE(solid_scene_open(&s));
+    for (int i = 0; i < 150; i++) {
+        REQUIRE(solid_scene_step(&s, 1, solid_step_s));
+        far = fmax(far, farthest(s.body));
+    }
+    printf("  %.2f S from rest at most, %d looks found patches\n", far / s.body->size_m, (int)s.body->rescue.n_tangled);
+    CHECK(!s.body->frozen && s.body->rescue.n_tangled > 0);
+    CHECK_LE(far, 1.8 * s.body->size_m);
+    solid_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(a_chair_comes_back_from_any_shape);
     RUN_LONG(a_pulled_tail_is_not_let_out_by_what_untangles_it);
+    RUN_LONG(what_falls_over_its_foot_hangs_there);
     RUN(a_chair_that_is_bent_has_no_patches);
     return check_report();
 }

@@ -14,6 +14,7 @@
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_law.h"
 
+#include <math.h>
 #include <string.h>
 
 static pal_err make(pal_item *item, pal_build *build, void **self)
@@ -76,11 +77,21 @@ static bool couple(void *self, pal_cliques *out)
     return row->volume.n > 0;
 }
 
+/* does something that lasts pull at the body: loads set, or a row that stores energy outside of it, as weight does */
+static bool is_loaded(const pal_step *step)
+{
+    const pal_body *body = step->body;
+    double sum = 0;
+    for (int i = 0; i < 3 * body->n_node && body->outer; i++) sum += fabs(body->outer[i]);
+    for (int i = 0; i < step->n_force; i++) sum += step->force[i].effect->energy && !step->force[i].effect->internal;
+    return sum > 0;
+}
+
 static unsigned untangle(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body);
+    const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body, is_loaded(step));
     if (changed) pal_kept_forget(&row->kept);
     return (row->tangle.n_patch > 0 ? PAL_TANGLED : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
 }
