@@ -23,7 +23,7 @@ static const double least_s = 60,
 static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
-#define PATIENCE    "10 s or ten of its slowest periods"
+#define PATIENCE    "10 s or ten of its slowest periods (at most 120 s)"
 static const char rule_back[] =
     "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE;
 static const char rule_shape[] =

@@ -10,7 +10,7 @@
 
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
 static const double settle_most_s = 30;
-static const double back_s = 10, longest_s = 60, n_period = 10;
+static const double back_s = 10, longest_s = 120, n_period = 10;
 static const double lead_s = 0.5; /* that a led scene is on its way before an insult */
 
 /* RMS speed of the fastest body over its S, 1/s */
@@ -33,12 +33,12 @@ double pal_rig_speed_S_s(const pal_rig *rig)
 /* ---- rest ---- */
 
 /* how long bodies have to come back, s: ten of the slowest periods (numerics.md part 3), no less than 10 s, no more
- * than a minute */
+ * than two minutes */
 double pal_rig_patience(const pal_rig *rig)
 {
     double most = 0;
     pal_preflight *look = malloc(sizeof *look);
-    if (look && !pal_preflight_look(rig->scene, PAL_PREFLIGHT_QUICK, look, NULL))
+    if (look && !pal_preflight_look(rig->scene, PAL_PREFLIGHT_FULL, look, NULL))
         for (int b = 0; b < look->n_body; b++) most = fmax(most, look->body[b].slow_s); /* of NaN the other */
     free(look);
     return fmax(back_s, fmin(longest_s, n_period * most));
