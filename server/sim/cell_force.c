@@ -66,7 +66,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int n_live = cell_live(group, block, lane);
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
     pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9], energy = {0};
-    if (n_live == 0) return 0;
+    if (n_live == 0 || (!(what & LINEARISE) && cell_away(c, group, block, lane, n_live))) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     if (what & LINEARISE)
@@ -144,7 +144,7 @@ PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, dou
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    double patches = c->tangle.n_away > 0 ? pal_cell_tangle_force(&c->tangle, c->solid, d, f) : 0;
+    double patches = c->tangle.n_away > 0 && !c->tangle.weighs ? pal_cell_tangle_force(&c->tangle, c->solid, d, f) : 0;
     if (c->op == PAL_CELL_EDGES) return patches + pal_cells_edges_energy(c, d);
     return patches + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
 }
@@ -166,7 +166,7 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
             const int n_live = cell_live(group, b, l);
             const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
             pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
-            if (n_live == 0) continue;
+            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
             cell_gather(node, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
@@ -189,7 +189,7 @@ PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const int n_live = cell_live(group, b, l);
             pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
-            if (n_live == 0) continue;
+            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
             cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);

@@ -298,6 +298,14 @@ PAL_INLINE int cell_live(const pal_cell_group *group, int block, int lane)
     int n = group->n - block * PAL_LANES - lane;
     return n < 0 ? 0 : n < PAL_WIDE ? n : PAL_WIDE;
 }
+/* all of half a block are in patches, and nobody asks for their own energies */
+PAL_INLINE bool cell_away(const pal_cells_elastic *c, const pal_cell_group *group, int block, int lane, int n_live)
+{
+    double here = 0;
+    if (c->tangle.n_away == 0 || c->tangle.weighs) return false;
+    for (int l = 0; l < n_live; l++) here += group->here[block * PAL_LANES + lane + l];
+    return here == 0;
+}
 PAL_INLINE double cell_sum(pal_wide a, int n_live)
 {
     double sum = 0;

@@ -195,7 +195,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
     pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9], energy = {0};
-    if (n_live == 0) return 0;
+    if (n_live == 0 || cell_away(c, group, block, lane, n_live)) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     displaced(rest, n_node, r, y, u);

@@ -368,7 +368,9 @@ bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const
     for (int cell = 0; cell < t->n_cell; cell++) bad |= is_bad(t, cell);
     if (!bad) return false;
     t->n_tangled++;
+    t->weighs = true;
     (void)pal_cells_elastic_energy(c, body->d, NULL);
+    t->weighs = false;
     for (int cell = 0; cell < t->n_cell; cell++) {
         int e;
         const pal_cell_kind kind = kind_of(t, cell, &e);
@@ -378,8 +380,8 @@ bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const
     memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_patch);
     const bool first = t->n_patch == 0;
     const double kinetic_J = pal_body_kinetic_J(body);
-    bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op],
-                          kinetic_J < still_share * patches(t));
+    t->still = kinetic_J < still_share * patches(t);
+    bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op], t->still);
     memcpy(t->before, t->patch, sizeof *t->patch * (size_t)t->n_cell);
     changed |= take_in(t, c->solid, loaded);
     if (changed && c->volume.n > 0) take_whole_cells(t, c);

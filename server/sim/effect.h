@@ -107,7 +107,8 @@ typedef void pal_stress_take(void *user, const pal_stress_point *point);
 /* what a row says that was asked for what is turned over */
 enum {
     PAL_TANGLED = 1, /* something runs on what untangles it: to be asked in the coming step, however little moved */
-    PAL_TANGLE_CHANGED = 2 /* forces and stiffness are others than before */
+    PAL_TANGLE_CHANGED = 2, /* forces and stiffness are others than before */
+    PAL_TANGLE_STILL = 4    /* besides PAL_TANGLED: the body moves with next to no energy of what untangles it */
 };
 
 /* how the body `from` of a row goes over to another one in its place */

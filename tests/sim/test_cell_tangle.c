@@ -184,6 +184,39 @@ static void patches_have_no_other_rest(void)
         }
 }
 
+/* half blocks of nothing but patches are not run: of numbers that are none there is nothing in the forces. A look asks
+ * for all */
+static void elements_in_patches_cost_nothing(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++) {
+        cell_body b;
+        cell_nth(&b, i);
+        const size_t n = 3 * (size_t)b.body.n_node;
+        cell_map(&b, (double[9]){-1, 0, 0, 0, 1, 0, 0, 0, 0}, 0);
+        CHECK(look(&b));
+        CHECK_INT(b.row->tangle.n_away, b.row->tangle.n_cell);
+        double *f = malloc(sizeof *f * n), *p = calloc(2 * n, sizeof *p), *kp = p + n;
+        for (size_t k = 0; k < n; k++) p[k] = pal_random_unit(7, k) - 0.5;
+        memcpy(f, cell_force(&b), sizeof *f * n);
+        const double energy_J = cell_energy(&b);
+        cell_effect->tangent->linearise(b.row, &b.body);
+        for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+            const pal_cell_group *g = &b.row->group[kind];
+            const size_t n_lane = (size_t)g->n_block * PAL_LANES;
+            for (size_t k = 0; k < n_lane * (size_t)g->n_node * 3; k++) g->rest[k] = NAN;
+            for (size_t k = 0; k < n_lane * 9; k++) g->turn[k] = NAN;
+        }
+        CHECK(!memcmp(f, cell_force(&b), sizeof *f * n));
+        CHECK(cell_energy(&b) == energy_J);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+        CHECK(isfinite(cell_dot(kp, kp, (int)n)) && cell_dot(p, kp, (int)n) > 0);
+        (void)look(&b);
+        CHECK(isnan(b.row->tangle.of[0].element_J));
+        free(f), free(p);
+        cell_free(&b);
+    }
+}
+
 static void held_parts_say_where_a_whole_body_turns_to(void)
 {
     cell_body b;
@@ -213,6 +246,7 @@ int main(void)
     RUN(the_tangent_of_patches_is_symmetric_and_never_negative);
     RUN(elements_come_back_when_nothing_is_turned_over);
     RUN(patches_have_no_other_rest);
+    RUN(elements_in_patches_cost_nothing);
     RUN(held_parts_say_where_a_whole_body_turns_to);
     return check_report();
 }

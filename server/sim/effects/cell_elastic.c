@@ -93,7 +93,8 @@ static unsigned untangle(void *self, pal_step *step)
     pal_cells_elastic_refresh(row);
     const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body, is_loaded(step));
     if (changed) pal_kept_forget(&row->kept);
-    return (row->tangle.n_patch > 0 ? PAL_TANGLED : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
+    const unsigned now = row->tangle.still ? PAL_TANGLED | PAL_TANGLE_STILL : PAL_TANGLED;
+    return (row->tangle.n_patch > 0 ? now : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
 }
 
 /* at rest, which solvers ask for between steps, there are no patches */

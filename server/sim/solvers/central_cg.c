@@ -22,7 +22,8 @@
  * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3); where
  * one would have moved farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three
  * times and grow again by 2 % of what was halved a sub-step. While elements are turned over sub-steps are 0.6 times as
- * long. Where the world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit is met.
+ * long, unless the body stands still. Where the world cannot afford the sub-steps (step->heavy) all masses are
+ * multiplied so that the limit is met.
  */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -364,7 +365,7 @@ static bool untangle(central *row, pal_step *step)
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
     if (seen & PAL_TANGLE_CHANGED) row->dt_s = 0;
-    row->tangled = seen & PAL_TANGLED;
+    row->tangled = (seen & PAL_TANGLED) && !(seen & PAL_TANGLE_STILL);
     return seen & PAL_TANGLE_CHANGED;
 }
 
