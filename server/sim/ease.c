@@ -3,11 +3,13 @@
 #include "server/sim/ease.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/shell.h"
 
 typedef struct ease {
-    int n_done;      /* steps begun; PAL_EASE_STEPS: the last one */
-    double *force_N; /* [n_node][3] */
-    float *lag_m;    /* [n_shown][3]; NULL: none */
+    int n_done; /* steps begun; PAL_EASE_STEPS: the last one */
+    double
+        *force_N; /* of a body that adapts per mass, N/kg, out of use as the ends of its edge in the mean [n_node][3] */
+    float *lag_m; /* [n_shown][3]; NULL: none */
     pal_body *body;
     bool gone;
 } ease;
@@ -21,6 +23,16 @@ static void let_show(const ease *row, double share)
     row->body->lag_part = share > 0 ? share : 0;
 }
 
+/* share of the load to `load` */
+static void add_load(const ease *row, double share, double *load)
+{
+    const pal_body *body = row->body;
+    for (int k = 0; k < pal_body_nodes(body); k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        pal_axpy3(load + i, body->shell ? share * body->mass_kg[i / 3] : share, row->force_N + i);
+    }
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     ease *row = self;
@@ -28,10 +40,7 @@ static pal_err run(void *self, pal_step *step)
     if (step->sub == 0) row->n_done++;
     row->gone = row->n_done >= PAL_EASE_STEPS && step->sub == step->n_sub - 1;
     double share = (double)(PAL_EASE_STEPS + 1 - row->n_done) / PAL_EASE_STEPS;
-    for (int k = 0; k < pal_body_nodes(body) && share > 0; k++) {
-        size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_axpy3(body->load + i, share, row->force_N + i);
-    }
+    if (share > 0) add_load(row, share, body->load);
     /* the frame of the change itself has all of it, that of the last step nothing */
     let_show(row, row->gone ? 0 : share - (double)(step->sub + 1) / (PAL_EASE_STEPS * (double)step->n_sub));
     return PAL_ERR_OK;
@@ -57,6 +66,22 @@ const pal_effect pal_effect_ease = {
     .name = "ease", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset, .settled_s = settled_s};
 
 /* ---- rows that come and go ---- */
+
+/* what is split later shall not leave all of a coarse vertex's load on the fine one that it becomes */
+static void share_out(const pal_body *body, double *force)
+{
+    const pal_shell *s = body->shell;
+    for (int32_t i = 0; i < body->n_node; i++) {
+        double *f = force + 3 * (size_t)i;
+        if (pal_shell_has(s, i)) {
+            pal_scale3(f, body->mass_kg[i] > 0 ? 1 / body->mass_kg[i] : 0, f);
+            continue;
+        }
+        const int32_t *end = s->levels.edge[pal_levels_vertex_parent(&s->levels, i)].vertex;
+        pal_set3(f, 0, 0, 0);
+        for (int k = 0; k < 2; k++) pal_axpy3(f, 0.5, force + 3 * (size_t)end[k]);
+    }
+}
 
 static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *force_N, const float *lag_m,
                        double lag_part, void **self)
@@ -104,7 +129,10 @@ static pal_err change(pal_ease_rows *rows, pal_plan *plan, int body, const doubl
 pal_err pal_ease_rows_set(pal_ease_rows *rows, pal_plan *plan, int body, const double *force_N)
 {
     const pal_body *b = &plan->body[body];
-    return change(rows, plan, body, force_N, b->lag_m, b->lag_part);
+    PAL_TRY(change(rows, plan, body, force_N, b->lag_m, b->lag_part));
+    ease *row = rows->self[body];
+    if (b->shell) share_out(b, row->force_N);
+    return PAL_ERR_OK;
 }
 
 pal_err pal_ease_rows_lag(pal_ease_rows *rows, pal_plan *plan, int body, const float *lag_m)
@@ -117,11 +145,7 @@ void pal_ease_rows_add(const pal_ease_rows *rows, int body, double scale, double
 {
     const ease *row = rows->self[body];
     if (!row || row->n_done >= PAL_EASE_STEPS) return;
-    double share = scale * (double)(PAL_EASE_STEPS - row->n_done) / PAL_EASE_STEPS;
-    for (int k = 0; k < pal_body_nodes(row->body); k++) {
-        size_t i = 3 * (size_t)pal_body_point(row->body, k);
-        pal_axpy3(load + i, share, row->force_N + i);
-    }
+    add_load(row, scale * (double)(PAL_EASE_STEPS - row->n_done) / PAL_EASE_STEPS, load);
 }
 
 void pal_ease_rows_tidy(pal_ease_rows *rows, pal_plan *plan)

@@ -1,6 +1,7 @@
 /* What makes up for a change of a running body and is let go over 10 steps (numerics.md part 3):
  * Forces. When another body takes its place (transfer.h), or its supports change, the difference between what pulled on
- * it before and what pulls now acts as a load on its nodes that falls from all to nothing.
+ * it before and what pulls now acts as a load on its nodes that falls from all to nothing. On a body that adapts it
+ * goes with their masses: what is split meanwhile leaves no coarse vertex's load on a fine one.
  * What is shown. The surface of another body hangs on other nodes and lies a little elsewhere where those of both stand
  * as near as they can: the way from there to where it was shown before is added to what is shown, and touched
  * (body.lag_m), all of it in the first frame, a tenth less in each of the next.

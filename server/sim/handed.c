@@ -7,6 +7,7 @@ void pal_handed_begin(pal_handed *h, const pal_handed_spring *s)
 {
     double shift[3];
     h->due = false;
+    h->left_s = PAL_HANDED_SHIFT_S;
     if (s->firm && h->k_N_m > 0) {
         /* what caps and haste held back still is, where that is no jump */
         pal_sub3(shift, s->was_hold, s->hold);
@@ -27,7 +28,8 @@ void pal_handed_begin(pal_handed *h, const pal_handed_spring *s)
 
 void pal_handed_add(pal_handed *h, double dt_s, double goal[3])
 {
-    double fade = fmax(0, 1 - dt_s / PAL_HANDED_SHIFT_S);
     pal_add3(goal, goal, h->shift);
-    pal_scale3(h->shift, fade, h->shift);
+    double fade = 1 - dt_s / (h->evenly ? fmax(h->left_s, dt_s) : PAL_HANDED_SHIFT_S);
+    pal_scale3(h->shift, fmax(0, fade), h->shift);
+    h->left_s -= dt_s;
 }

@@ -68,7 +68,7 @@ typedef struct grip {
     int n_node;
     int32_t *node;                  /* [n_node]                                                         */
     double *weight;                 /* sum 1 [n_node]                                                   */
-    uint16_t *share;                /* of each shown vertex, WHOLE: 1; NULL on bodies that adapt [n_shown] */
+    uint16_t *share;                /* of each shown vertex, WHOLE: 1                       [n_shown]   */
     double quat[4], at_m[3];        /* of the tool when it closed, and where of the tissue at rest      */
     double reach_m;                 /* then                                                             */
     double offset[3];               /* patch minus tool in the tool's axes at quaternion 1              */
@@ -88,7 +88,7 @@ typedef struct tool_grab {
     double *gather;     /* weights of a new grab [n_node], 0 between grabs */
     double asked_N_m, damping_s, asked_reach_m;
     double young_Pa, poisson;
-    pal_in_use *use;    /* bodies that adapt only, else NULL */
+    uint64_t revision;  /* bodies that adapt: of the nodes that grips are on */
     pal_handed *handed; /* heap, after hand; else NULL [n_tool] */
 } tool_grab;
 
@@ -120,7 +120,9 @@ static void let_go(tool_grab *grab, grip *g)
 
 static void destroy(void *self)
 {
-    free(((tool_grab *)self)->handed);
+    tool_grab *grab = self;
+    for (int t = 0; t < grab->n_tool && grab->grip; t++) pal_live_grip_free(grab->grip[t].live);
+    free(grab->handed);
 }
 
 static void reset(void *self, const pal_body *body)
@@ -133,13 +135,6 @@ static void reset(void *self, const pal_body *body)
     memset(grab->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
 }
 
-static pal_err make_live(grip *g, size_t n_node, pal_arena *arena)
-{
-    g->live = PAL_NEW(arena, pal_live_grip, 1);
-    if (g->live) g->live->even = PAL_NEW(arena, double, n_node);
-    return g->live && g->live->even ? PAL_ERR_OK : PAL_ERR_MEMORY;
-}
-
 static pal_err make_grip(grip *g, const pal_body *body, pal_arena *arena)
 {
     size_t n_node = (size_t)body->n_node;
@@ -147,7 +142,7 @@ static pal_err make_grip(grip *g, const pal_body *body, pal_arena *arena)
     g->weight = PAL_NEW(arena, double, n_node);
     if (!g->node || !g->weight) return PAL_ERR_MEMORY;
     if (body->implicit && !(g->firm = PAL_NEW(arena, firm_grip, 1))) return PAL_ERR_MEMORY;
-    if (body->shell) return make_live(g, n_node, arena);
+    if (body->shell && !(g->live = PAL_NEW(arena, pal_live_grip, 1))) return PAL_ERR_MEMORY;
     g->share = PAL_NEW(arena, uint16_t, (size_t)body->n_shown);
     return g->share ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -176,7 +171,6 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!grab->sum_weight || !grab->gather || !grab->grip) return PAL_ERR_MEMORY;
     for (int t = 0; t < grab->n_tool; t++) PAL_TRY(make_grip(&grab->grip[t], build->body, build->arena));
     material(grab, build->body, &build->def->material, NULL);
-    if (build->body->shell) PAL_TRY(pal_in_use_make(build->body, build->arena, &grab->use));
     *self = grab;
     return PAL_ERR_OK;
 }
@@ -191,19 +185,20 @@ static void add_vertex(tool_grab *grab, const pal_body *body, int vertex, double
 
 static void take_vertex(tool_grab *grab, grip *g, const pal_body *body, int vertex, double share)
 {
-    add_vertex(grab, body, vertex, share);
-    if (g->share) g->share[vertex] = (uint16_t)(WHOLE * share + 0.5);
+    g->share[vertex] = (uint16_t)fmax(1, WHOLE * share + 0.5);
+    if (!g->live) add_vertex(grab, body, vertex, share);
 }
 
-/* node weights of shown vertices (at shown, m) that lie within reach of p, left in gather; false: nothing there */
+/* node weights of shown vertices (at shown, m) that lie within reach of p, left in gather, of bodies that adapt in
+ * share alone; false: nothing there */
 static bool close_on(tool_grab *grab, grip *g, const pal_body *body, const float *shown, const double p[3],
                      double reach)
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
     int nearest = -1;
     int n_shown = body->shell ? body->n_active : body->n_shown;
-    g->by_vertex = g->share != NULL;
-    if (g->share) memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
+    g->by_vertex = true;
+    memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
     for (int k = 0; k < n_shown; k++) {
         int i = body->shell ? body->active[k] : k;
         const float *s = shown + 3 * (size_t)i;
@@ -244,7 +239,6 @@ static void take_gathered(tool_grab *grab, grip *g, const pal_body *body)
         int i = pal_body_point(body, k);
         if (grab->gather[i] == 0) continue;
         g->node[g->n_node] = i;
-        if (g->live) g->live->even[g->n_node] = grab->gather[i];
         sum += g->weight[g->n_node++] = grab->gather[i] * (g->live ? body->mass_kg[i] : 1);
         grab->gather[i] = 0;
     }
@@ -259,6 +253,10 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     double last[3], y[3], v[3], reach = reach_m(grab, tool);
     pal_sub3(last, tool->last.position_m, body->offset_m);
     if (!close_on(grab, g, body, body->shown, last, reach)) return;
+    if (g->live) {
+        pal_live_grip_close(g->live, body, tool->last.quat, g->share);
+        pal_live_grip_weigh(body, g->share, grab->gather);
+    }
     take_gathered(grab, g, body);
     if (grab->handed) grab->handed[g - grab->grip] = (pal_handed){.due = false};
     patch_place(g, body, y, v);
@@ -270,10 +268,6 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     pal_sub3(g->at_m, g->at_m, y), pal_add3(g->at_m, g->at_m, tool->last.position_m);
     g->reach_m = reach;
     g->held = true;
-    if (g->live) {
-        g->live->renewed = false;
-        pal_set3(g->live->shift, 0, 0, 0);
-    }
     double k = stiffness_N_m(grab, reach), tissue = 2 * grab->young_Pa * reach / (1 - grab->poisson * grab->poisson);
     g->k_start_N_m = g->k_felt_N_m = fmax(LEAST_K_N_M, k * tissue / (k + tissue));
     g->xx = g->xf = 0;
@@ -285,25 +279,22 @@ static void take_hold(tool_grab *grab, grip *g, const pal_tool *tool, const pal_
     }
 }
 
-/* the same grip on the points that are in use now */
-static void grip_again(tool_grab *grab, grip *g, const pal_body *body)
-{
-    for (int i = 0; i < g->n_node; i++) {
-        grab->sum_weight[g->node[i]] -= g->weight[i];
-        grab->gather[g->node[i]] = g->live->even[i];
-    }
-    pal_in_use_weigh(grab->use, body, g->node, g->n_node, grab->gather);
-    take_gathered(grab, g, body);
-    g->live->renewed = true;
-}
-
-/* once a step: points that came and went */
+/* once a step: the same grips on the points that are in use now */
 static void follow(tool_grab *grab, const pal_body *body)
 {
-    if (!grab->use || grab->use->revision == body->revision) return;
-    for (int t = 0; t < grab->n_tool; t++)
-        if (grab->grip[t].held) grip_again(grab, &grab->grip[t], body);
-    pal_in_use_look(grab->use, body);
+    if (!body->shell || grab->revision == body->revision) return;
+    grab->revision = body->revision;
+    for (int t = 0; t < grab->n_tool; t++) {
+        grip *g = &grab->grip[t];
+        double was[3], is[3];
+        if (!g->held) continue;
+        rest_place(g, body, was);
+        for (int i = 0; i < g->n_node; i++) grab->sum_weight[g->node[i]] -= g->weight[i];
+        pal_live_grip_weigh(body, g->share, grab->gather);
+        take_gathered(grab, g, body);
+        rest_place(g, body, is);
+        pal_live_grip_renew(g->live, was, is, g->offset);
+    }
 }
 
 /* once a step: the button's edges */
@@ -320,17 +311,22 @@ static void begin_tool(tool_grab *grab, grip *g, const pal_tool *tool, const pal
 static void hand_nodes(tool_grab *grab, grip *g, const pal_body *body, const grip *b, const pal_hand *by)
 {
     const pal_point_rows *place = by->place;
-    bool same = b->by_vertex && g->share && by->same_shown, found = same && place;
+    bool same = b->by_vertex && by->same_shown, found = same && place;
+    if (g->live) {
+        pal_live_grip_hand(g->live, body, g->share, b->live, by->from, b->share);
+        pal_live_grip_weigh(body, g->share, grab->gather);
+        take_gathered(grab, g, body);
+        return;
+    }
     for (int i = 0; i < body->n_shown && same; i++) g->share[i] = b->share[i];
     for (int i = 0; i < body->n_shown && found; i++)
         if (g->share[i] > 0) add_vertex(grab, body, i, g->share[i] / WHOLE);
-    if (!same && place && g->share) found = close_on(grab, g, body, by->rest_m, b->at_m, b->reach_m);
+    if (!same && place) found = close_on(grab, g, body, by->rest_m, b->at_m, b->reach_m);
     g->by_vertex = same || found;
     for (int i = 0; i < b->n_node && !found; i++) {
-        const double weight = b->live ? b->live->even[i] : b->weight[i];
-        if (!place) grab->gather[b->node[i]] += weight;
+        if (!place) grab->gather[b->node[i]] += b->weight[i];
         for (int32_t k = place ? place->start[b->node[i]] : 0; place && k < place->start[b->node[i] + 1]; k++)
-            grab->gather[place->point[k]] += weight * fmax(0, place->weight[k]);
+            grab->gather[place->point[k]] += b->weight[i] * fmax(0, place->weight[k]);
     }
     take_gathered(grab, g, body);
 }
@@ -354,7 +350,10 @@ static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_bo
     double was[3], moved[3], back[4] = {b->quat[0], -b->quat[1], -b->quat[2], -b->quat[3]};
     rest_place(g, body, moved), rest_place(b, from, was);
     pal_sub3(moved, moved, was);
-    pal_quat_rotate(moved, back, moved);
+    if (g->live)
+        pal_mul33(moved, g->live->axes, moved);
+    else
+        pal_quat_rotate(moved, back, moved);
     pal_add3(g->offset, b->offset, moved);
     memcpy(g->quat, b->quat, sizeof g->quat);
     pal_copy3(g->at_m, b->at_m);
@@ -366,15 +365,13 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
     tool_grab *grab = self;
     const tool_grab *old = before;
     if (!grab->handed) grab->handed = calloc((size_t)grab->n_tool, sizeof *grab->handed);
-    /* the nodes of before are shared out to those in use now: none of them is new to a grip */
-    if (grab->use) pal_in_use_look(grab->use, body);
+    grab->revision = body->revision;
     for (int t = 0; t < grab->n_tool && t < old->n_tool && grab->handed; t++) {
         const grip *b = &old->grip[t];
         grip *g = &grab->grip[t];
         pal_handed *h = &grab->handed[t];
         let_go(grab, g);
         g->button = b->button;
-        if (g->live) g->live->renewed = false, pal_set3(g->live->shift, 0, 0, 0);
         if (!b->held) continue;
         hand_nodes(grab, g, body, b, by);
         move_hold(g, body, b, by->from);
@@ -388,6 +385,7 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
             pal_copy3(h->hold, b->offset);
             h->k_N_m = b->firm ? b->firm->k_N_m : 0;
         }
+        h->evenly = g->live != NULL;
         leave(g, b, h->force_N, by);
         g->held = h->due = g->n_node > 0;
     }
@@ -451,7 +449,7 @@ static void pull(const tool_grab *grab, grip *g, pal_tool *tool, pal_step *step)
     for (int d = 0; d < 3; d++) drag[d] = tool->ramp * (c * (tool->velocity_m_s[d] - v[d]));
     hold_on(grab, g, tool, body, tool->ramp * k, drag);
     find_goal(grab, g, tool, step, goal);
-    if (g->live) pal_live_grip_keep(g->live, tool->next.quat, y, v, k, step->dt_s, g->offset, goal);
+    if (g->live) pal_live_grip_keep(g->live, tool->next.quat, y, v, k, step->dt_s, goal);
     for (int d = 0; d < 3; d++) force[d] = tool->ramp * (k * (goal[d] - y[d]) + c * (tool->velocity_m_s[d] - v[d]));
     pal_set3(g->force, 0, 0, 0);
     if (!pal_finite3(force)) return;
