@@ -32,6 +32,27 @@ const slide = (page, place) => page.evaluate((value) => {
   slider.dispatchEvent(new Event("change"));
   return { busy: window.palpate.cost.underWay !== null, said: document.querySelector("#cost-say").textContent };
 }, place);
+/** colours that a page offers and shows; every notice that it gave since the first call */
+const colours = (page) => page.evaluate(() => {
+  const { state } = window.palpate, notice = document.querySelector("#notice");
+  if (!window.told) {
+    window.told = [];
+    new MutationObserver(() => window.told.push(notice.textContent)).observe(notice, { childList: true, characterData: true, subtree: true });
+  }
+  return {
+    options: [...document.querySelector("#field").options].map((o) => o.value), chosen: document.querySelector("#field").value, field: state.field,
+    legend: !document.querySelector("#legend").hidden, note: document.querySelector("#field-note").textContent, told: window.told,
+    values: [...state.bodies.values()][0].values !== null, row: state.rows.includes("field_out"),
+  };
+});
+const choose = async (page, name) => {
+  await colours(page);
+  await page.evaluate((value) => {
+    const list = document.querySelector("#field");
+    list.value = value;
+    list.dispatchEvent(new Event("change"));
+  }, name);
+};
 const flip = (page, row) => page.click(`#rows input[aria-label="${row} is part of the plan"]`);
 
 /** the study's page as a file: a row's button puts a command on the clipboard that writes this row's scene */
@@ -93,10 +114,14 @@ try {
 
   await ben.keyboard.press("4");
   await until(() => shown(ben), (s) => s.points > 2 && s.estimate);
+  await choose(ben, "displacement");
   // to the other end of the front, and back: springs that were fitted have no knobs
   for (const [place, what] of [[0, "the cheapest"], [begin.most, "the most accurate"], [0, "the cheapest again"]]) {
     const before = await shown(ada);
     if (before.front[place] === before.estimate?.point) continue;
+    // a colour that this method alone has goes with it, one that both have stays
+    const own = /springs/.test(before.setting) ? "stiffness" : "von_mises";
+    await choose(ada, own);
     const making = await slide(ada, place);
     check(`let go at ${what}, the panel says what is made`, making.busy && /^Making /.test(making.said), making.said);
     const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && s.estimate?.point === s.front[place] && s.tick >= before.tick);
@@ -104,7 +129,14 @@ try {
     const seen = await until(() => shown(ben), (s) => s.epoch === after.epoch && s.drawn && s.estimate?.point === after.front[place]);
     check("who looks on sees the same setting and shape", seen.epoch === after.epoch && seen.setting === after.setting, seen.setting);
     check("no time was lost", after.tick >= before.tick, `${before.tick} to ${after.tick}`);
+    const springs = /springs/.test(after.setting), gone = springs !== (own === "stiffness");
+    const offer = await until(() => colours(ada), (c) => c.options.includes("stiffness") === springs && c.options.includes("von_mises") === !springs);
+    check("the colours offered are those of the method that runs now", offer.options.includes("stiffness") === springs && offer.options.includes("von_mises") === !springs && (offer.note !== "") === springs, `${offer.options.join()} ${offer.note}`);
+    check(`${own} ${gone ? "goes with its method, and that is told" : "stays"}`, gone ? offer.field === "none" && offer.chosen === "none" && !offer.legend && offer.told.some((text) => /not there with this method/.test(text)) : offer.field === own && offer.legend, `${before.setting} -> ${after.setting}: ${offer.told.join(" | ")}`);
+    const kept = await until(() => colours(ben), (c) => c.field === "displacement" && c.values && c.row && c.options.includes("stiffness") === springs);
+    check("who looks on keeps a colour that both methods have", kept.field === "displacement" && kept.legend && kept.values && kept.row && kept.options.includes("stiffness") === springs, kept.options.join());
   }
+  for (const page of [ada, ben]) await choose(page, "none");
   await until(() => ada.evaluate(() => !window.palpate.stage.dirty), (still) => still, 3000);
   await ada.screenshot({ path: join(pictures, "accuracy_switched.png") });
 

@@ -211,14 +211,23 @@ function chooseField(name) {
   stage.dirty = true;
 }
 
-/** what there is to choose, after hello; what was chosen stays if it can */
-function offerFields() {
-  const names = offered(state.hello.parts), note = missing(state.hello.parts);
+/**
+ * What there is to choose, after hello and with another method; what was chosen stays if it can.
+ * @param {boolean} anew nothing was asked for on this connection
+ */
+function offerFields(anew) {
+  const names = offered(state.hello.parts), note = missing(state.hello.parts), chosen = state.field;
   const option = (/** @type {string} */ value, /** @type {string} */ text) => Object.assign(document.createElement("option"), { value, textContent: text });
   byId("field").replaceChildren(option("none", "Tissue"), ...names.map((name) => option(name, FIELDS[name].title)));
   byId("field-note").textContent = note;
   byId("field-note").hidden = !note;
-  chooseField(names.includes(state.field) ? state.field : "none");
+  const stays = chosen === "none" || names.includes(chosen);
+  if (anew || !stays) chooseField(stays ? chosen : "none");
+  else {
+    byId("field").value = chosen;
+    askField(); // of a part that has it only now
+  }
+  if (!stays) notice(`${FIELDS[chosen].title} is not there with this method: tissue is shown.`, TOLD_MS);
 }
 
 /** the range of the colours follows the values of all parts */
@@ -279,7 +288,7 @@ const control = {
     byId("cost-toggle").hidden = !m.estimates;
     sculpt.begin(m.box_min_m, m.box_max_m);
     offerSculpt();
-    offerFields();
+    offerFields(true);
     showTitle();
     showTool();
   },
@@ -296,6 +305,7 @@ const control = {
     sculpt.changed();
     keepParts(m.parts.length);
     offerSculpt();
+    offerFields(false);
   },
   answer(m) {
     if (!cost.answer(m)) sculpt.answer(m);
