@@ -356,6 +356,7 @@ static bool firm_up(pal_cell_tangle *t)
         pal_cell_patch *patch = &t->of[p];
         if (patch->scale >= 1 || patch->age == 0 || patch->age % FIRM_LOOKS != 0) continue;
         patch->scale = fmin(1, firmer * patch->scale);
+        t->firmed_J += firmer * patch->patch_J;
         any = true;
     }
     return any;
@@ -364,6 +365,7 @@ static bool firm_up(pal_cell_tangle *t)
 bool pal_cell_tangle_look(pal_cell_tangle *t, struct pal_cells_elastic *c, const pal_body *body, bool loaded)
 {
     bool bad = t->n_patch > 0;
+    t->firmed_J = 0;
     pal_cells_elastic_ratios(c, body->d);
     for (int cell = 0; cell < t->n_cell; cell++) bad |= is_bad(t, cell);
     if (!bad) return false;

@@ -15,7 +15,8 @@
  * them is below 0.3 (above 20) any more, they store at most 0.1 mu V, and the body's motion and this row then have no
  * more energy than when patches first were, or after 120 looks in a row at a body that stands still (loads hold it). A
  * patch that does not come loose takes in its neighbours every 30 looks, unless a lasting load or weight pulls at the
- * body: then s goes back to 1, by a quarter every 4 looks, since what hangs by a soft patch is let out by 1 / s.
+ * body: then s goes back to 1, by a quarter every 4 looks, since what hangs by a soft patch is let out by 1 / s. What
+ * that puts in is braked away (firmed_J, brake.h), or it would throw the body about and turn over more of it.
  * Blocks of nothing but elements in patches are not run, except for their energies in a look.
  * Memory: the world's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_CELL_TANGLE_H
@@ -46,10 +47,11 @@ typedef struct pal_cell_tangle {
     int32_t *root;                             /* of nodes that patches join                        [n_node] */
     pal_cell_patch *of, *old;                  /*                                                   [n_cell] */
     int n_patch, n_away;                       /* patches, elements in them                                  */
-    double first_J; /* of the body's motion and of this row when there first were patches: what may be again */
-    bool still;     /* the body's motion has next to no energy                                                     */
-    bool off;       /* for one linearisation at rest: elements are all there                                       */
-    bool weighs;    /* while a look asks for energies: those of elements in patches too                            */
+    double first_J;  /* of the body's motion and of this row when there first were patches: what may be again */
+    double firmed_J; /* at the last look: of those patches whose s has grown                                    */
+    bool still;      /* the body's motion has next to no energy                                                     */
+    bool off;        /* for one linearisation at rest: elements are all there                                       */
+    bool weighs;     /* while a look asks for energies: those of elements in patches too                            */
     uint64_t n_tangled, n_change; /* looks that found patches, changes of what is in them; not yet told      */
 } pal_cell_tangle;
 

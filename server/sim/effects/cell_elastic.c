@@ -10,6 +10,7 @@
  * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
  * of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
+#include "server/sim/brake.h"
 #include "server/sim/cell_kernel.h"
 #include "server/sim/effect_list.h"
 #include "server/sim/elastic_law.h"
@@ -93,6 +94,7 @@ static unsigned untangle(void *self, pal_step *step)
     pal_cells_elastic_refresh(row);
     const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body, is_loaded(step));
     if (changed) pal_kept_forget(&row->kept);
+    if (row->tangle.firmed_J > 0) pal_brake_hold(step->body, row->tangle.firmed_J);
     const unsigned now = row->tangle.still ? PAL_TANGLED | PAL_TANGLE_STILL : PAL_TANGLED;
     return (row->tangle.n_patch > 0 ? now : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
 }

@@ -8,11 +8,12 @@
  * dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and whenever the
  * body was put somewhere else v is that at p and dt- = 0, which is the start p- = p - dt v + dt^2 a / 2.
  *
- * D~ is the rows' drag (hook `drag`) times M~, and where the samples' gamma/mu varies their matrix as well. Departure:
- * theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round within a sub-step lets it creep.
- * Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-), and end when |r| <= tolerance |k (f~ - D~ v)| (key,
- * 1e-4): in one iteration with the default preconditioner, a Cholesky factor of M~ (num/envelope.h), and in 40 to 100
- * with key preconditioner "diagonal", which the paper has. Its own 2 to 4 leave 1e-4 of the whole right side of eq. 20.
+ * D~ is the rows' drag (hook `drag`) and the body's brake (brake.h) times M~, and where the samples' gamma/mu varies
+ * their matrix as well. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round
+ * within a sub-step lets it creep. Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-), and end when |r|
+ * <= tolerance |k (f~ - D~ v)| (key, 1e-4): in one iteration with the default preconditioner, a Cholesky factor of M~
+ * (num/envelope.h), and in 40 to 100 with key preconditioner "diagonal", which the paper has. Its own 2 to 4 leave 1e-4
+ * of the whole right side of eq. 20.
  *
  * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
  * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
@@ -388,7 +389,7 @@ static double limit(void *self, pal_step *step)
 
 static double drag_rate(const pal_step *step)
 {
-    double rate = 0;
+    double rate = step->body->brake_1_s;
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
     return rate;
