@@ -33,6 +33,7 @@ void pal_live_grip_close(pal_live_grip *l, const pal_body *body, const double qu
         for (int c = 0; c < 3; c++) l->axes[3 * c + a] = axis[c];
     }
     l->n_known = 0;
+    l->k_N_m = 0;
     pal_set3(l->shift, 0, 0, 0);
     l->renewed = false;
 }
@@ -107,12 +108,15 @@ void pal_live_grip_keep(pal_live_grip *l, const double quat[4], const double y[3
 {
     double fade = fmax(0, 1 - dt_s / PAL_LIVE_SHIFT_S);
     pal_scale3(l->shift, fade, l->shift);
-    if (l->renewed && k_N_m > 0) {
+    if (k_N_m > 0 && l->k_N_m > 0 && (l->renewed || k_N_m != l->k_N_m)) {
         /* what the spring of before would be stretched by now */
         double was[3], moved[3];
-        pal_quat_rotate(moved, quat, l->moved);
-        pal_sub3(was, goal, moved), pal_add3(was, was, l->shift);
-        pal_sub3(was, was, l->y), pal_axpy3(was, -l->dt_s, v);
+        pal_add3(was, goal, l->shift), pal_sub3(was, was, y);
+        if (l->renewed) {
+            pal_quat_rotate(moved, quat, l->moved);
+            pal_sub3(was, was, moved), pal_add3(was, was, y);
+            pal_sub3(was, was, l->y), pal_axpy3(was, -l->dt_s, v);
+        }
         for (int c = 0; c < 3; c++) l->shift[c] = l->k_N_m / k_N_m * was[c] - (goal[c] - y[c]);
     }
     if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);

@@ -5,8 +5,9 @@
  * in use then is the mean of its edge's ends. Of these it pulls on those in use, and where none of them is, on the ends
  * of the edges of those that are not. So the patch, and with it the hold o (tool_grab.c), follows from the surface's
  * refinement alone, by whatever way it came to it: o goes by what the patch's place at rest does, turned as the body
- * was when the grip closed. The force is the same on both sides of a change: F = k (tool + o + shift - y), and shift
- * fades in PAL_LIVE_SHIFT_S, after which the force is that of the new patch.
+ * was when the grip closed. The force is the same on both sides of a change of nodes, and of k, which goes with the
+ * solver's sub-step (a jump at each would shake the tissue): F = k (tool + o + shift - y), and shift fades in
+ * PAL_LIVE_SHIFT_S, after which the force is that of the new patch and k.
  * Memory: the caller's, but for `known`, which is heap. Thread: [sim]. */
 #ifndef PAL_SIM_SHELL_GRIP_H
 #define PAL_SIM_SHELL_GRIP_H
@@ -35,7 +36,7 @@ void pal_live_grip_hand(pal_live_grip *live, const pal_body *body, uint16_t *sha
                         const pal_body *from, const uint16_t *share_before);
 /* other nodes on this body: offset by what the patch's place at rest goes from `was` to `is` */
 void pal_live_grip_renew(pal_live_grip *live, const double was[3], const double is[3], double offset[3]);
-/* goal, with the force as it was before the nodes changed; the patch y of now goes by v, the tool is turned by quat */
+/* goal, with the force as it was before nodes or k changed; the patch y of now goes by v, the tool is turned by quat */
 void pal_live_grip_keep(pal_live_grip *live, const double quat[4], const double y[3], const double v[3], double k_N_m,
                         double dt_s, double goal[3]);
 void pal_live_grip_free(pal_live_grip *live); /* heap memory; NULL is fine */
