@@ -247,6 +247,7 @@ typedef struct pal_wire_estimate {
     double point;                       /* its index in the study; NaN: it is none of those      */
     uint64_t tick;                      /* of the state that was looked at; 0: there is none yet */
     double time_s;
+    double age_s;   /* steps in which the body was awake since that state                     */
     double ms;      /* of a live step, median of the last second                              */
     double own_ms;  /* processor time that the estimate took                                  */
     double most_m;  /* largest displacement then                                              */

@@ -184,6 +184,7 @@ static const pal_control_field estimate_fields[] = {
     {"point", KNOWN, false, AT(pal_wire_estimate, point), 0, 0, 0, NULL},
     {"tick", U64, true, AT(pal_wire_estimate, tick), 0, 0, 0, NULL},
     {"time_s", F64, true, AT(pal_wire_estimate, time_s), 0, 0, 0, NULL},
+    {"age_s", KNOWN, false, AT(pal_wire_estimate, age_s), 0, 0, 0, NULL},
     {"ms", KNOWN, false, AT(pal_wire_estimate, ms), 0, 0, 0, NULL},
     {"own_ms", F64, true, AT(pal_wire_estimate, own_ms), 0, 0, 0, NULL},
     {"most_m", KNOWN, false, AT(pal_wire_estimate, most_m), 0, 0, 0, NULL},

@@ -130,6 +130,12 @@ static bool is_neighbour(const pal_setting *of, const pal_setting *to)
            near(of->tolerance, to->tolerance);
 }
 
+/* is it of a body that has gone on for a second since, or has woken? It bounds nothing then */
+static bool is_old(const pal_estimate *e)
+{
+    return e->age_s > PAL_HUB_ESTIMATE_OLD_S || (e->age_s > 0 && e->asleep);
+}
+
 void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
                           double *then_m)
 {
@@ -137,8 +143,9 @@ void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const p
     pal_setting now;
     bool looked = pal_session_estimate(room->session, body, &e);
     pal_setting_of(pal_session_scene(room->session), body, &now);
+    *now_m = *then_m = NAN;
+    if (looked && is_old(&e)) return;
     *now_m = looked && isfinite(e.error_m) ? e.error_m : error_of(room, point_of(room, body, &now));
-    *then_m = NAN;
     for (int i = 0; looked && point < 0 && i < e.n_neighbour; i++)
         if (is_neighbour(&e.neighbour[i].setting, to)) *then_m = e.neighbour[i].error_m;
     if (!isfinite(*then_m)) *then_m = error_of(room, point < 0 ? point_of(room, body, to) : (double)point);
@@ -183,7 +190,7 @@ static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *fr
 static void put_estimate(const pal_hub_room *room, const pal_estimate *from, const pal_setting *now,
                          pal_wire_estimate *to)
 {
-    to->tick = from->tick;
+    to->tick = from->tick, to->age_s = from->age_s;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
     if (isfinite(from->ms) && from->ms > 0) to->ms = price(room, from->ms, now->step_s);
@@ -228,7 +235,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     bool awake = !f || b >= f->n_part || !f->part[b].asleep;
     bool known_ms = awake && c->room->stream->step_ms > 0;
     out->ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
-    out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
+    out->age_s = out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
         out->zz_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     tell_far(c->room, out);

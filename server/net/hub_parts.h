@@ -126,6 +126,7 @@ bool pal_hub_switch_order(pal_hub *hub, pal_client *client, const pal_wire_order
 void pal_hub_works_turn(pal_hub *hub); /* what the workshop has done, and the next order */
 void pal_hub_works_end(pal_hub *hub);  /* closes the sessions that the hub made */
 /* hub_accuracy.c */
+#define PAL_HUB_ESTIMATE_OLD_S 1.0 /* of steps awake: an older estimate bounds no switch */
 /* the order `estimate` is dealt with; false: it is another one */
 bool pal_hub_estimate_order(pal_hub *hub, pal_client *client, const pal_wire_order *order);
 void pal_hub_estimate_none(pal_client *client);  /* it goes */
@@ -134,7 +135,8 @@ void pal_hub_estimates_due(pal_client *client);  /* a tick */
 bool pal_hub_wants_estimate(const pal_client *client);
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
 /* the errors that clients are shown of the setting that a body has (its estimate's, else its study's) and of the one
- * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown */
+ * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown. Neither of a
+ * body whose estimate is older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since */
 void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
                           double *then_m);
 /* hub_plan.c */

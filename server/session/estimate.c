@@ -14,6 +14,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -25,6 +26,7 @@ static const int niceness = 10; /* the simulation goes first */
 
 static _Atomic int n_thread;
 static _Atomic uint64_t n_made;
+static _Atomic bool held;
 
 struct pal_estimator {
     const pal_scene *scene;
@@ -42,7 +44,10 @@ struct pal_estimator {
     /* how often the body has frozen and come back: odd while it is frozen */
     _Atomic unsigned life;
     _Atomic uint64_t frozen_tick;
-    unsigned looked_life; /* of the state; goes with `place` */
+    unsigned looked_life;     /* of the state; goes with `place` */
+    uint64_t looked_awake;    /* n_awake then; the same */
+    uint64_t newest_awake;    /* of newest; under the lock */
+    _Atomic uint64_t n_awake; /* steps in which the body was awake: these make an estimate old */
     /* the simulation's own */
     uint64_t looked_ns, looked_tick;
     float ms[PAL_ESTIMATE_STEPS];
@@ -57,6 +62,7 @@ static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused
     e->newest = *estimate;
     e->there = true, e->refused = refused;
     e->newest_life = e->looked_life;
+    e->newest_awake = e->looked_awake;
     pthread_mutex_unlock(&e->lock);
     atomic_fetch_add_explicit(&n_made, 1, memory_order_relaxed);
 }
@@ -171,6 +177,11 @@ void pal_estimator_close(pal_estimator *e)
     release(e);
 }
 
+static uint64_t n_awake(const pal_estimator *e)
+{
+    return atomic_load_explicit(&e->n_awake, memory_order_relaxed);
+}
+
 /* the times of the last second's steps */
 static void copy_times(const pal_estimator *e, pal_estimate_state *to)
 {
@@ -194,8 +205,9 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
     const pal_body *body = pal_world_look(world, e->body);
     note_frozen(e, world, body->frozen);
     if (!isnan(step_ms) && !body->asleep) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
+    if (!isnan(step_ms) && !body->asleep) atomic_fetch_add_explicit(&e->n_awake, 1, memory_order_relaxed);
     if (!body->asleep) e->slept = false;
-    if (e->slept) return;
+    if (e->slept || atomic_load_explicit(&held, memory_order_relaxed)) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
     uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
     /* nothing has moved since */
@@ -205,9 +217,24 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
     e->looked_ns = now, e->looked_tick = tick;
     e->slept = body->asleep;
     e->looked_life = atomic_load_explicit(&e->life, memory_order_relaxed);
+    e->looked_awake = n_awake(e);
     copy_times(e, e->state);
     atomic_store_explicit(&e->place, BUSY, memory_order_release);
     sem_post(&e->wake);
+}
+
+/* n_step: in which the body was awake since the state was looked at */
+static void grow_old(pal_estimate *e, uint64_t n_step, double step_s)
+{
+    e->age_s = (double)n_step * step_s;
+    if (!e->asleep || n_step == 0) return;
+    char *said = strstr(e->note, PAL_ESTIMATE_ASLEEP);
+    if (!said) return;
+    const char *rest = said + strlen(PAL_ESTIMATE_ASLEEP);
+    rest += 2 * !strncmp(rest, "; ", 2);
+    memmove(said, rest, strlen(rest) + 1);
+    size_t n = strlen(e->note);
+    if (n > 1 && !strcmp(e->note + n - 2, "; ")) e->note[n - 2] = 0;
 }
 
 bool pal_estimator_read(pal_estimator *e, pal_estimate *out)
@@ -216,7 +243,9 @@ bool pal_estimator_read(pal_estimator *e, pal_estimate *out)
     pthread_mutex_lock(&e->lock);
     bool there = e->there && (e->refused || e->newest_life == life), frozen = life % 2 == 1;
     if (there) *out = e->newest;
+    uint64_t since = e->refused ? n_awake(e) : e->newest_awake;
     pthread_mutex_unlock(&e->lock);
+    if (there) grow_old(out, n_awake(e) - since, e->step_s);
     if (there || !frozen) return there;
     *out = nothing("the body is frozen: nothing is known of it until it is reset");
     out->tick = atomic_load_explicit(&e->frozen_tick, memory_order_relaxed);
@@ -231,4 +260,9 @@ int pal_estimator_threads(void)
 uint64_t pal_estimator_made(void)
 {
     return atomic_load_explicit(&n_made, memory_order_relaxed);
+}
+
+void pal_estimator_hold(bool hold)
+{
+    atomic_store_explicit(&held, hold, memory_order_relaxed);
 }

@@ -44,6 +44,8 @@ enum { PAL_ESTIMATE_NEIGHBOURS = 6 };
 typedef struct pal_estimate {
     uint64_t tick; /* of the state that was looked at; 0: there is none yet */
     double time_s;
+    double age_s;  /* steps in which the body was awake since then, as it is read: 0 while it sleeps as it did   */
+    bool asleep;   /* it slept then; with age_s 0 it still does                */
     double most_m; /* largest displacement then                              */
     /* largest displacement errors, m; NaN: not known for this body (note says why) */
     double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
@@ -80,4 +82,6 @@ bool pal_estimator_read(pal_estimator *estimator, pal_estimate *out);
 /* how many threads of estimators there are in this process, and how many estimates they have made, for tests [any] */
 int pal_estimator_threads(void);
 uint64_t pal_estimator_made(void);
+/* while held no estimator of this process takes another state, so that estimates grow old: for tests [any] */
+void pal_estimator_hold(bool hold);
 #endif

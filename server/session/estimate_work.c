@@ -273,7 +273,8 @@ static void price_sleep(pal_estimate_work *w, pal_estimate *out)
     if (!w->state.asleep) return;
     if (isnan(out->ms) && !w->awake_ms) (void)go_ahead(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
     if (isnan(out->ms)) out->ms = w->awake_ms;
-    tell(out, "asleep: ms are those of a step awake");
+    out->asleep = true;
+    tell(out, PAL_ESTIMATE_ASLEEP);
 }
 
 /* the steps ahead of a body that stands where it was made leave rounding alone */

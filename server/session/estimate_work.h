@@ -6,6 +6,8 @@
 
 #include <stdatomic.h>
 
+/* said of a body that sleeps */
+#define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
 /* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */

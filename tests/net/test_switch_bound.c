@@ -155,7 +155,7 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     wait_steps(&c, 60, pressed);
     send(&c, "estimate", "\"on\":1");
     const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
-    for (int i = 0; i < 4000 && !(e->tick > 0 && next_size(e)); i++) wait_steps(&c, 2, pressed);
+    for (int i = 0; i < 4000 && !(e->tick > 0 && e->age_s < 0.5 && next_size(e)); i++) wait_steps(&c, 2, pressed);
     const pal_wire_neighbour *next = next_size(e);
     REQUIRE(next);
     double now_m = e->error_m, then_m = next->error_m;
@@ -196,6 +196,33 @@ static void without_errors_shown_there_is_no_bound(void)
     end();
 }
 
+/* a study's error would be there, and an estimate; of a body that has gone on for a second since it is neither */
+static void an_old_estimate_bounds_nothing(void)
+{
+    mem_client c;
+    order_begin(&scene, point, POINTS);
+    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    CHECK(order(&c, "point", "\"index\":1"));
+    send(&c, "estimate", "\"on\":1");
+    const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
+    for (int i = 0; i < 4000 && !(e->tick > 0 && e->error_m > 0); i++) wait_steps(&c, 2, true);
+    pal_estimator_hold(true);
+    /* what was under way at the hold is of a state before it */
+    double held_s = c.last[PAL_CONTROL_STATUS].status.sim_time_s, now_s = held_s;
+    for (int i = 0; i < 4000 && now_s - held_s < 1.3; i++) {
+        wait_steps(&c, 2, true);
+        now_s = c.last[PAL_CONTROL_STATUS].status.sim_time_s;
+    }
+    for (int i = 0, n = c.n_text[PAL_CONTROL_ESTIMATE]; i < 4000 && c.n_text[PAL_CONTROL_ESTIMATE] == n; i++)
+        turn(&c, NULL);
+    CHECK(e->age_s > 1 && e->error_m > 0);
+    CHECK(order(&c, "knob", "\"step_ms\":4"));
+    CHECK(isnan(told(&c, "bound_m")) && strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
+    pal_estimator_hold(false);
+    mem_end(&c);
+    end();
+}
+
 int main(void)
 {
     make_study();
@@ -204,6 +231,7 @@ int main(void)
     RUN(a_knob_at_rest_keeps_the_errors_foreseen);
     RUN_LONG(a_knob_under_a_press_keeps_them_too);
     RUN(without_errors_shown_there_is_no_bound);
+    RUN_LONG(an_old_estimate_bounds_nothing);
     pal_prepared_free(&mesh);
     return check_report();
 }

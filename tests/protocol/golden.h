@@ -196,6 +196,7 @@ static inline void golden_estimate(pal_wire_estimate *e)
                              .point = 250,
                              .tick = 1234567890123,
                              .time_s = 1.5,
+                             .age_s = 0.25,
                              .ms = 16.25,
                              .own_ms = 81.5,
                              .most_m = 0.0125,
@@ -216,7 +217,7 @@ static inline void golden_estimate(pal_wire_estimate *e)
 static inline void golden_no_estimate(pal_wire_estimate *e)
 {
     *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .most_m = NAN};
-    e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->zz_percent = NAN;
+    e->age_s = e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->zz_percent = NAN;
 }
 
 static inline void golden_control(pal_control_type type, pal_control *c)

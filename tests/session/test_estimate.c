@@ -184,6 +184,18 @@ static uint64_t look_for(pal_estimator *e, pal_world *w, uint64_t n, uint64_t wh
     return pal_estimator_made() - made;
 }
 
+/* says it of the state at tick that it was made n steps awake ago? A newer one may have come meanwhile */
+static void check_age(pal_estimator *e, const pal_world *w, uint64_t tick, int n, double step_s)
+{
+    pal_estimate estimate;
+    REQUIRE(pal_estimator_read(e, &estimate));
+    bool newer = estimate.tick > tick;
+    double age_s = (newer ? (double)(pal_world_tick(w) - estimate.tick) : n) * step_s;
+    CHECK_NEAR(estimate.age_s, age_s, 1e-12);
+    CHECK(estimate.asleep == !newer);
+    CHECK((strstr(estimate.note, "asleep") != NULL) == (!newer && n == 0));
+}
+
 static void a_sleeping_body_is_looked_at_once(void)
 {
     pal_scene *fem = fem_scene();
@@ -200,9 +212,17 @@ static void a_sleeping_body_is_looked_at_once(void)
     uint64_t tick = pal_estimator_read(e, &estimate) ? estimate.tick : 0;
     CHECK(strstr(estimate.note, "asleep") && estimate.error_m == 0 && estimate.ms != 1);
     CHECK_INT((long long)look_for(e, w, 1, 600000000), 0);
-    CHECK(pal_estimator_read(e, &estimate) && estimate.tick == tick);
-    /* a load wakes it */
+    CHECK(pal_estimator_read(e, &estimate) && estimate.tick == tick && pal_world_tick(w) > tick);
+    check_age(e, w, tick, 0, fem->step_s);
+    /* a load wakes it: what was said of its sleep is of a while ago, and says so */
     CHECK(!pal_world_load(w, 0, 0, (double[3]){1e-3, 0, 0}));
+    pal_estimator_hold(true);
+    for (int n = 1; n <= 5; n++) {
+        CHECK(!pal_world_step(w, fem->step_s));
+        pal_estimator_look(e, w, 1);
+        check_age(e, w, tick, n, fem->step_s);
+    }
+    pal_estimator_hold(false);
     CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
     CHECK(pal_estimator_read(e, &estimate) && estimate.tick > tick && estimate.most_m > 0);
     pal_estimator_close(e);
