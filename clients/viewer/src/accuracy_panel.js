@@ -1,7 +1,7 @@
 // The panel of accuracy: the study's points, where the body stands and of what its error is made, its neighbours on each
 // knob, and a slider along the front. It asks for estimates while it is open, one body at a time. One switch is under way
 // at a time.
-import { LEAST_SAID_M, frontOf, knobOrder, layOut, milliseconds, millimetres, neighbourWords, partsOf, placeOn, switchWords } from "./accuracy_plot.js";
+import { errorWords, frontOf, knobOrder, layOut, milliseconds, millimetres, neighbourWords, partsOf, placeOn, switchWords } from "./accuracy_plot.js";
 
 /** @typedef {import("./accuracy_plot.js").Estimate} Estimate */
 /** @typedef {import("./accuracy_plot.js").Point} Point */
@@ -212,10 +212,10 @@ export class AccuracyPanel {
 
   /** the present error and its parts @param {Estimate | null} e */
   showError(e) {
-    const waits = !e || e.tick === 0;
+    const said = errorWords(e), parts = e && said.known ? partsOf(e) : [];
     this.at("ms").textContent = e ? milliseconds(e.ms) : "–";
-    this.at("error").textContent = waits ? "being estimated" : millimetres(e.error_m);
-    const parts = waits ? [] : partsOf(e);
+    this.at("error").textContent = said.error;
+    this.at("ago").textContent = said.ago;
     this.at("bar").replaceChildren(...parts.filter((p) => p.share > 0.004).map((p) => {
       const piece = this.page.createElement("i");
       piece.style.width = 100 * p.share + "%";
@@ -228,8 +228,7 @@ export class AccuracyPanel {
       item.append(p.title, Object.assign(this.page.createElement("span"), { textContent: millimetres(p.value) }));
       return item;
     }));
-    const notes = waits ? [] : [e.note ?? "", e.locking ? "It locks: the true error is larger." : "", typeof e.zz_percent === "number" && e.error_m !== undefined && e.error_m >= LEAST_SAID_M ? `In energy ${e.zz_percent.toPrecision(2)} %.` : ""];
-    this.at("note").textContent = notes.filter(Boolean).join(" ");
+    this.at("note").textContent = said.note;
   }
 
   showSlider() {

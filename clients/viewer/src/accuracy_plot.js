@@ -4,7 +4,7 @@
 /**
  * @typedef {{index: number, method: string, label: string, ms: number, error_m: number, front?: boolean}} Point of `study`
  * @typedef {{knob: string, label: string, ms?: number, error_m?: number, size?: number, step_ms?: number, tolerance?: number}} Neighbour of `estimate`
- * @typedef {{body: string, setting: string, point?: number, tick: number, ms?: number, own_ms: number, most_m?: number, error_m?: number,
+ * @typedef {{body: string, setting: string, point?: number, tick: number, age_s?: number, ms?: number, own_ms: number, most_m?: number, error_m?: number,
  *   discretisation_m?: number, algebraic_m?: number, time_m?: number, model_m?: number, zz_percent?: number, locking?: boolean, note?: string,
  *   neighbours?: Neighbour[]}} Estimate
  * @typedef {{low: number, high: number}} Range of one axis, powers of ten and round parts of them
@@ -22,12 +22,15 @@ export const METHOD_COLOURS = Object.freeze(["#5cb8ff", "#ffb45c", "#62d39a", "#
 export const PARTS = Object.freeze(/** @type {const} */ ([
   { key: "discretisation_m", title: "mesh", colour: "#5cb8ff" },
   { key: "algebraic_m", title: "solver", colour: "#62d39a" },
-  { key: "time_m", title: "time step", colour: "#ffb45c" },
+  { key: "time_m", title: "step", colour: "#ffb45c" },
   { key: "model_m", title: "model", colour: "#e08bd8" },
 ]));
 
 /** is it a number that a logarithm takes? @param {number | undefined} v @returns {v is number} */
 const positive = (v) => typeof v === "number" && Number.isFinite(v) && v > 0;
+
+/** is it an error? None is one too @param {number | undefined} v @returns {v is number} */
+const known = (v) => typeof v === "number" && Number.isFinite(v) && v >= 0;
 
 /** the widest range that holds all values, out to 1, 2 or 5 times a power of ten, at least a factor of `least`
  * @param {number[]} values @param {number} least @returns {Range} */
@@ -87,6 +90,21 @@ export const millimetres = (m) => (m === undefined ? "not known" : m !== 0 && m 
 /** @param {number | undefined} ms */
 export const milliseconds = (ms) => (ms === undefined ? "not known" : `${short(ms)} ms`);
 
+/** an estimate whose body has been awake for longer since is said to be of a while ago, s */
+const OLD_S = 1;
+
+/**
+ * The largest error and what there is to say of it. `known`: there are figures.
+ * @param {Estimate | null} e @returns {{error: string, ago: string, note: string, known: boolean}}
+ */
+export function errorWords(e) {
+  if (!e) return { error: "being estimated", ago: "", note: "", known: false };
+  if (e.tick === 0) return { error: e.note ? "not estimated" : "being estimated", ago: "", note: e.note ?? "", known: false };
+  const notes = [(e.note ?? "").replace(/([^.])$/, "$1."), e.locking ? "It locks: the true error is larger." : "", typeof e.zz_percent === "number" && e.error_m !== undefined && e.error_m >= LEAST_SAID_M ? `In energy ${e.zz_percent.toPrecision(2)} %.` : ""];
+  const ago = (e.age_s ?? 0) > OLD_S ? `${short(Math.round(/** @type {number} */ (e.age_s)))} s ago` : "";
+  return { error: millimetres(e.error_m), ago, note: notes.filter(Boolean).join(" "), known: true };
+}
+
 /** the points of the front by their milliseconds: what the slider goes along @param {Point[]} points @returns {Point[]} */
 export function frontOf(points) {
   return points.filter((p) => p.front && positive(p.ms) && positive(p.error_m)).sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
@@ -135,12 +153,12 @@ export function layOut(points, estimate, box) {
 
 /** which of the known parts makes how much of the error, for stacked bars @param {Estimate} estimate */
 export function partsOf(estimate) {
-  const known = PARTS.flatMap((part) => {
+  const there = PARTS.flatMap((part) => {
     const value = estimate[part.key];
-    return typeof value === "number" && value >= 0 ? [{ ...part, value }] : [];
+    return known(value) ? [{ ...part, value }] : [];
   });
-  const sum = known.reduce((all, part) => all + part.value, 0);
-  return known.map((part) => ({ ...part, share: sum > 0 ? part.value / sum : 0 }));
+  const sum = there.reduce((all, part) => all + part.value, 0);
+  return there.map((part) => ({ ...part, share: sum > 0 ? part.value / sum : 0 }));
 }
 
 /**
@@ -150,8 +168,9 @@ export function partsOf(estimate) {
 export function neighbourWords(now, to) {
   const cost = positive(now.ms) && positive(to.ms) ? to.ms - now.ms : null;
   const price = cost === null ? "" : Math.abs(cost) < 0.005 ? ": same cost" : `: ${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
-  if (!positive(now.error_m) || !positive(to.error_m)) return to.label + price;
-  const ratio = to.error_m / now.error_m;
+  if (!known(now.error_m) || !known(to.error_m)) return to.label + price;
+  // what is said to be less than a length is not told apart below it
+  const ratio = Math.max(LEAST_SAID_M, to.error_m) / Math.max(LEAST_SAID_M, now.error_m);
   const gain = ratio > 0.43 && ratio < 0.57 ? "halve the error"
     : ratio > 1.75 && ratio < 2.3 ? "twice the error"
     : Math.abs(ratio - 1) < 0.02 ? "same error"

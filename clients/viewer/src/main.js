@@ -112,6 +112,16 @@ function showState(word, text) {
   byId("state-text").textContent = text;
 }
 
+/** the organ and what is said of it stand beside the panels; on a narrow page panels lie below */
+function standBeside() {
+  const wide = innerWidth > 640, covers = (/** @type {string[]} */ ids) => (wide ? Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18)) : 0);
+  const left = covers(["cost-panel", "sculpt"]), right = covers(["panel"]), style = document.documentElement.style;
+  style.setProperty("--left", `${left}px`);
+  style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
+  style.setProperty("--free", `calc(100vw - ${left + right}px)`);
+  stage.beside(left, right);
+}
+
 /** @param {string} text empty hides it @param {number} ms goes by itself after this, 0: stays */
 function notice(text, ms = 0) {
   clearTimeout(told);
@@ -490,6 +500,7 @@ function setMode(mode) {
   if (mode === "sculpt") openCost(false);
   input.letGo();
   byId("sculpt").hidden = mode !== "sculpt";
+  standBeside();
   byId("hint").classList.toggle("gone", mode === "sculpt" || byId("hint").classList.contains("gone"));
   for (const name of ["pull", "press", "sculpt"]) {
     const button = byId("mode-" + name);
@@ -504,6 +515,7 @@ const togglePause = () => command(state.status?.paused ? "resume" : "pause");
 const togglePanel = () => {
   byId("panel").hidden = !byId("panel").hidden;
   byId("panel-toggle").setAttribute("aria-expanded", String(!byId("panel").hidden));
+  standBeside();
   showFigures();
 };
 /** @param {boolean} opened */
@@ -513,8 +525,10 @@ const openCost = (opened) => {
   byId("cost-panel").hidden = !opened;
   byId("cost-toggle").setAttribute("aria-expanded", String(opened));
   cost.open(opened);
+  standBeside();
 };
 const toggleCost = () => openCost(!cost.opened);
+window.addEventListener("resize", standBeside);
 byId("cost-toggle").onclick = toggleCost;
 byId("mode-pull").onclick = () => setMode("pull");
 byId("mode-press").onclick = () => setMode("press");

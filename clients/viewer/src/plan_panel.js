@@ -22,7 +22,7 @@ export function activeLines(active, parts) {
   });
 }
 
-/** @typedef {{name: string, part: number, why: string, fixed: boolean, on: boolean, ms: number | null}} Row of the panel; fixed: it cannot be switched; ms: index in `row_ms`, null: off */
+/** @typedef {{name: string, part: number, why: string, fixed: boolean, planned: boolean, on: boolean, ms: number | null}} Row of the panel; fixed: it cannot be switched; planned: the scene called for it; ms: index in `row_ms`, null: off */
 
 /**
  * The rows to list: those of the plan in order, then those that were switched off.
@@ -35,7 +35,7 @@ export function rowsOf(plan, status) {
   const why = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_whys?.[i] ?? ""]));
   const fixed = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_fixed?.[i] === 1]));
   const now = status?.rows?.length ? status : plan;
-  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "", fixed: fixed.get(key(name, part)) ?? plan.row_fixed !== undefined }); // what came while it runs goes with who looks
+  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "", fixed: fixed.get(key(name, part)) ?? plan.row_fixed !== undefined, planned: why.has(key(name, part)) }); // what came while it runs goes with who looks
   const on = (now.rows ?? []).map((name, i) => ({ ...row(name, now.row_parts?.[i] ?? 0), on: true, ms: i }));
   const off = (status?.off ?? []).map((o) => ({ ...row(o.row, o.part), on: false, ms: null }));
   return [...on, ...off];
@@ -64,6 +64,20 @@ export function unwatchedLine({ field, estimate, estimates, unwatched }) {
   const said = idle.length ? `Not computed, nobody looks here: ${idle.join(", ")}.` : "";
   const skins = unwatched > 0 ? `${count(unwatched)} steps were not skinned while nobody watched.` : "";
   return [said, skins].filter(Boolean).join(" ");
+}
+
+const LEAST_BAR_MS = 0.01; // a bar that would be longer than its figure says is none: a plan asleep has rows of nothing
+
+/** the parts of the longest bar that the rows' bars are, 0: none @param {number[]} ms of rows */
+export function barsOf(ms) {
+  const most = Math.max(LEAST_BAR_MS, ...ms);
+  return ms.map((v) => (v < 0.0005 ? 0 : v / most));
+}
+
+/** why a row has no switch @param {Row} row */
+export function fixedWhy({ planned }) {
+  return planned ? "It cannot be switched off: it moves the body, shows it, or alone holds it together."
+    : "It cannot be switched off: it came while the scene runs, and goes with what called for it.";
 }
 
 export class PlanPanel {
@@ -102,11 +116,12 @@ export class PlanPanel {
   /** @param {Row[]} rows @param {{name: string}[]} parts @param {boolean} switches may this member switch them? */
   plan(rows, parts, switches) {
     this.rows.replaceChildren();
-    this.bars = rows.map(({ name, part, why, fixed, on, ms }) => {
+    this.bars = rows.map((it) => {
+      const { name, part, why, on, ms } = it;
       const row = this.rows.insertRow();
       row.title = why;
       row.className = on ? "" : "off";
-      if (switches) row.append(this.switchOf(name, part, on, fixed));
+      if (switches) row.append(this.switchOf(it));
       const title = row.insertCell();
       title.textContent = name.replaceAll("_", " ");
       if (parts.length > 1 && parts[part]) title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
@@ -120,19 +135,24 @@ export class PlanPanel {
     });
   }
 
-  /** @param {string} name @param {number} part @param {boolean} on @param {boolean} fixed */
-  switchOf(name, part, on, fixed) {
+  /** @param {Row} row */
+  switchOf(row) {
+    const { name, part, on, fixed } = row;
     const cell = document.createElement("td"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
     cell.className = "switch";
     box.setAttribute("aria-label", `${name} is part of the plan`);
     box.disabled = fixed;
-    if (fixed) cell.title = "It cannot be switched off: it moves the body, shows it, or alone holds it together.";
+    cell.title = box.title = fixed ? fixedWhy(row) : on ? "Switch it off" : "Switch it on";
     box.onchange = () => {
       this.order("row", name, { part, on: box.checked ? 1 : 0 });
       // it is as the server says: what it refuses stays
       box.checked = on;
       box.disabled = true;
-      setTimeout(() => (box.disabled = false), 3000);
+      box.title = "The server is asked";
+      setTimeout(() => {
+        box.disabled = false;
+        box.title = on ? "Switch it off" : "Switch it on";
+      }, 3000);
     };
     cell.append(box);
     return cell;
@@ -176,11 +196,12 @@ export class PlanPanel {
     this.figure("vertices shown", here.vertices.toLocaleString("en"));
     this.activity(activeLines(s.active ?? [], parts));
     this.bodyStates(bodyLines(s.parts ?? [], parts));
-    const most = Math.max(1e-6, ...s.row_ms);
+    const lengths = barsOf(s.row_ms);
     this.bars.forEach(({ bar, value, ms: at }) => {
       if (at === null) return;
       const ms = s.row_ms[at] ?? 0;
-      bar.style.width = (100 * ms) / most + "%";
+      bar.style.width = 100 * (lengths[at] ?? 0) + "%";
+      bar.hidden = !lengths[at];
       value.textContent = ms.toFixed(3);
     });
   }

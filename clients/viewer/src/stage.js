@@ -3,6 +3,8 @@ import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
 
 const LEAST_RATIO = 0.4; // drawn pixels per pixel of the page, where drawing is slow
+const HOME_PART = 0.94; // of the picture's height that the scene's longest line takes at first
+const LEAST_ZOOM = 0.45; // beside panels
 const POLL_MS = 2; // between questions whether a picture is there
 
 /** does the processor draw in place of a graphics card? Some browsers say so, others only name what draws */
@@ -67,6 +69,7 @@ export class Stage {
     this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
     this.scene.environment = makeStudio(this.renderer);
     this.scene.environmentIntensity = 0.8;
+    this.left = this.right = 0; // pixels that panels cover
     this.dirty = true;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.pace = new Pace(LEAST_RATIO / ratio, software ? 0.6 / ratio : 1);
@@ -93,7 +96,7 @@ export class Stage {
 
   home() {
     const narrow = Math.min(1, this.camera.aspect);
-    this.distance = (0.53 * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
+    this.distance = (0.5 / HOME_PART * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
     this.azimuth = -0.6;
     this.elevation = 0.42;
     this.dirty = true;
@@ -108,6 +111,22 @@ export class Stage {
     this.renderer.setPixelRatio(this.pixelRatio());
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    this.placePicture();
+  }
+
+  /** what is looked at stands in the middle of what panels leave free, and fits there @param {number} left @param {number} right pixels that they cover */
+  beside(left, right) {
+    if (left === this.left && right === this.right) return;
+    this.left = left;
+    this.right = right;
+    this.placePicture();
+  }
+
+  placePicture() {
+    const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, covered = this.left + this.right;
+    this.camera.zoom = covered ? Math.max(LEAST_ZOOM, Math.min(1, (width - covered) / Math.min(width, HOME_PART * height))) : 1;
+    if (this.left === this.right) this.camera.clearViewOffset();
+    else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, 0, width, height);
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }
@@ -135,7 +154,7 @@ export class Stage {
 
   /** move the point looked at by pixels @param {number} dx @param {number} dy */
   pan(dx, dy) {
-    const perPixel = (2 * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
+    const perPixel = (2 / this.camera.zoom * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
     const e = this.camera.matrixWorld.elements;
     this.target.x += (-dx * e[0] + dy * e[4]) * perPixel;
     this.target.y += (-dx * e[1] + dy * e[5]) * perPixel;

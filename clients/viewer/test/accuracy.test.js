@@ -1,8 +1,8 @@
 // What accuracy costs: axes, places, the front, words and orders; rows and bodies of the plan's panel.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { frontOf, knobOrder, layOut, logPlace, logRange, logTicks, millimetres, neighbourWords, partsOf, placeOn, short, switchWords } from "../src/accuracy_plot.js";
-import { bodyLines, rowsOf, unwatchedLine } from "../src/plan_panel.js";
+import { errorWords, frontOf, knobOrder, layOut, logPlace, logRange, logTicks, millimetres, neighbourWords, partsOf, placeOn, short, switchWords } from "../src/accuracy_plot.js";
+import { barsOf, bodyLines, fixedWhy, rowsOf, unwatchedLine } from "../src/plan_panel.js";
 
 /** @param {number} index @param {number} ms @param {number} error_m @param {boolean} front @param {string} method */
 const point = (index, ms, error_m, front, method = "fem") => ({ index, method, label: `${method} ${index}`, ms, error_m, front });
@@ -91,6 +91,26 @@ test("a neighbour says what it brings and what it costs", () => {
   assert.equal(neighbourWords(estimate({ error_m: undefined }), { ...to, ms: 8.5 }), "24 voxels: +4.1 ms");
 });
 
+test("lengths that are said alike are the same error", () => {
+  const at = (/** @type {number} */ now, /** @type {number} */ then) => neighbourWords(estimate({ error_m: now }), { knob: "resolution", label: "8 voxels", size: 8, ms: 4.4, error_m: then });
+  assert.equal(at(6e-7, 9.5e-7), "same error: same cost", "58 % of less than 0.001 mm");
+  assert.equal(at(9.5e-7, 9e-7), "same error: same cost");
+  assert.equal(at(0, 0), "same error: same cost", "at rest");
+  assert.equal(at(0, 5e-6), "5 times the error: same cost");
+  assert.equal(at(2e-6, 1e-9), "halve the error: same cost", "no more than is shown");
+  assert.equal(at(2e-6, 3e-6), "50 % more error: same cost");
+});
+
+test("an error that is not known yet, not at all, or of a while ago says so", () => {
+  const none = { error: "being estimated", ago: "", note: "", known: false };
+  assert.deepEqual(errorWords(null), none);
+  assert.deepEqual(errorWords(estimate({ tick: 0, note: "" })), none);
+  assert.deepEqual(errorWords(estimate({ tick: 0, error_m: undefined, note: "it is refined while it runs" })), { error: "not estimated", ago: "", note: "it is refined while it runs", known: false });
+  assert.deepEqual(errorWords(estimate({ age_s: 0.4, note: "n" })), { error: "0.9 mm", ago: "", note: "n.", known: true });
+  assert.deepEqual(errorWords(estimate({ age_s: 12.3, zz_percent: 5, locking: true })), { error: "0.9 mm", ago: "12 s ago", note: "It locks: the true error is larger. In energy 5.0 %.", known: true });
+  assert.equal(errorWords(estimate({ age_s: undefined })).ago, "", "a server of before");
+});
+
 test("a knob is turned by its numbers alone, a method by none", () => {
   assert.deepEqual(knobOrder("liver", { knob: "resolution", label: "", size: 24, step_ms: 0, tolerance: 0 }), { verb: "knob", target: "liver", args: { size: 24 } });
   assert.deepEqual(knobOrder("liver", { knob: "step", label: "", step_ms: 8.5 }), { verb: "knob", target: "liver", args: { step_ms: 8.5 } });
@@ -124,6 +144,17 @@ test("rows that were switched off stay on the list, with whose they are and why"
   assert.deepEqual(fixed.map((r) => [r.name, r.fixed]), [["hex_elastic", true], ["hex_elastic", true], ["field_out", true], ["gravity", false]], "what cannot go has no switch");
   assert.deepEqual(off.map((r) => r.fixed), [false, false, false, false], "a server that does not say");
   assert.deepEqual(rowsOf({ rows: ["a"] }, { rows: [] }).map((r) => [r.name, r.part, r.why]), [["a", 0, ""]], "a server of before");
+});
+
+test("a row without a switch says why, and a bar is as long as its figure", () => {
+  const rows = rowsOf({ rows: ["verlet"], row_parts: [0], row_fixed: [1] }, { rows: ["verlet", "field_out"], row_parts: [0, 0] });
+  assert.deepEqual(rows.map((r) => [r.fixed, r.planned]), [[true, true], [true, false]]);
+  assert.match(fixedWhy(rows[0]), /moves the body/);
+  assert.match(fixedWhy(rows[1]), /came while the scene runs/);
+  assert.deepEqual(barsOf([1, 0.5, 0.0004]), [1, 0.5, 0]);
+  assert.deepEqual(barsOf([0.0004, 0.0001]), [0, 0], "asleep");
+  assert.deepEqual(barsOf([0.001]).map((v) => Number(v.toFixed(2))), [0.1]);
+  assert.deepEqual(barsOf([]), []);
 });
 
 test("a stopped body says why, a rescued one how often and at what price", () => {
