@@ -33,8 +33,9 @@ static double farthest_vertex(pal_world *w, double *x, int n)
 }
 
 /* a tool closes at `from` and goes up by up_m in `lift` steps, and on by `creep` of that in each step; wait[k] steps in
- * setting[k], the last one `wait[n]` */
+ * setting[k], the last one `wait[n]`; turned: all of it a quarter about the x axis */
 typedef struct pull_plan {
+    bool turned;
     double from_m[3], up_m, creep;
     int lift, n, setting[LEVELS_MOST_SWITCH + 1], wait[LEVELS_MOST_SWITCH + 1];
 } pull_plan;
@@ -50,10 +51,24 @@ static inline double grip_N(pal_world *w)
     return pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
 }
 
+static void turn_quarter(double x[3])
+{
+    pal_set3(x, x[0], -x[2], x[1]);
+}
+
+static void turn_body(pal_world *w)
+{
+    pal_body *body = pal_world_body(w, 0);
+    for (int k = 0; k < body->n_active; k++) turn_quarter(body->x + 3 * body->active[k]);
+    pal_world_moved(w, 0);
+    step(w, 1.0 / 60, 1); /* and is shown there */
+}
+
 static void pull_step(pal_world *w, const pull_plan *p, int k)
 {
     double part = k < p->lift ? (double)k / p->lift : fmin(1.2, 1 + p->creep * (k - p->lift));
     pal_pose pose = at(p->from_m[0], p->from_m[1], p->from_m[2] + p->up_m * part, 1);
+    if (p->turned) turn_quarter(pose.position_m);
     pal_world_pose(w, 0, &pose);
     step(w, 1.0 / 60, 1);
 }
@@ -80,6 +95,7 @@ static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
     double *x = calloc(3 * (size_t)n, sizeof *x);
     REQUIRE(x != NULL);
     pal_world_destroy(finest);
+    if (p->turned) turn_body(w);
     for (int s = 0; s <= p->n; s++) {
         double was_N = grip_N(w);
         if (s > 0) w = change_levels(b, p->setting[s - 1], p->setting[s], w, out);
