@@ -254,9 +254,21 @@ static double shape_energy(const pal_rig *rig)
     return now;
 }
 
+static uint64_t count_splits(const pal_rig *rig)
+{
+    uint64_t n = 0;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        /* patches of springs begin and end with no more than there was */
+        if (!body->tangle) n += body->rescue.n_split;
+    }
+    return n;
+}
+
 void pal_rig_rebase(pal_rig *rig)
 {
     rig->base_J = shape_energy(rig);
+    rig->n_split = count_splits(rig); /* of another world it begins anew */
     rig->allowed_J = 0;
     rig->scale_J = fmax(rig->scale_J, fabs(pal_world_energy_J(rig->world) - rig->rest_J));
 }
@@ -332,17 +344,6 @@ static void sample(pal_rig *rig)
     }
     out->time_s[out->n_sample] = out->simulated_s;
     out->energy_J[out->n_sample++] = pal_world_energy_J(rig->world) - rig->rest_J;
-}
-
-static uint64_t count_splits(const pal_rig *rig)
-{
-    uint64_t n = 0;
-    for (int b = 0; b < rig->scene->n_body; b++) {
-        const pal_body *body = pal_world_body(rig->world, b);
-        /* patches of springs begin and end with no more than there was */
-        if (!body->tangle) n += body->rescue.n_split;
-    }
-    return n;
 }
 
 static void look(pal_rig *rig)

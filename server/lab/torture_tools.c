@@ -312,7 +312,7 @@ void pal_insult_supports(pal_rig *rig)
     }
     const double left = speed_S_s(rig);
     double share = rig->scale_J > 0 ? jump / rig->scale_J : 0;
-    pal_rig_say(rig, "energy rises by %.2g of what is stored, still after %.2g s", share,
+    pal_rig_say(rig, "energy rises by %.2g of what is stored at a switch, still after %.2g s", share,
                 rig->out->simulated_s - begin);
     if (!(share <= 0.01)) pal_rig_fail(rig, "more than 1 %%");
     if (good && since_s < hold_s) pal_rig_fail(rig, "it still moves, at the end by %.2g S a second", left);

@@ -52,7 +52,7 @@ typedef struct pal_hex_row {
     bool tangled;
     int n_whole;                  /* looks since it went back to cubes, up to SOON                                */
     double tried, needed;         /* least corner when it did; that it takes to go back                           */
-    uint64_t n_tangled, n_switch; /* looks that found the body tangled; changes of cubes, split, straight */
+    uint64_t n_tangled, n_switch; /* looks that found the body tangled; changes of cubes, split, straight; since run */
     pal_elastic_tets *split;      /* NULL: untangle is false or the law is linear */
     float *split_fill;            /* [n_tet]                                       */
 } pal_hex_row;

@@ -1,4 +1,4 @@
-/* What transfer.c and transfer_carry.c share. Private to these. */
+/* What the files transfer*.c share. Private to these. */
 #ifndef PAL_SIM_TRANSFER_PARTS_H
 #define PAL_SIM_TRANSFER_PARTS_H
 #include "server/sim/transfer.h"

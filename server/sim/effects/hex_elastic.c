@@ -37,7 +37,8 @@ static pal_err run(void *self, pal_step *step)
     pal_hex_row *row = self;
     pal_body *body = step->body;
     if (!row->implicit) pal_hex_untangle(row, body);
-    body->rescue.n_tangled = row->n_tangled, body->rescue.n_split = row->n_switch;
+    body->rescue.n_tangled += row->n_tangled, body->rescue.n_split += row->n_switch;
+    row->n_tangled = row->n_switch = 0;
     if (row->tangled) {
         uint64_t before = pal_clock_ns();
         pal_elastic_tets_force(row->split, body->d, body->f);

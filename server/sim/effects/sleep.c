@@ -131,6 +131,7 @@ static bool tool_near(sleeper *row, const pal_step *step)
             if (of->effect->reach_m) reach = fmax(reach, of->effect->reach_m(of->self, tool));
         }
         if (reach == 0) continue;
+        if (isinf(reach)) return true; /* it holds the body */
         if (!row->boxed) measure(row, body);
         /* no place of a triangle is farther from its nearest corner */
         reach += row->edge_m * 0.57735026918962573;

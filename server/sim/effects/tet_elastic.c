@@ -38,7 +38,7 @@ typedef struct tet_row {
     double *rest;                 /* six times the volume of each piece at rest [n_piece] */
     double least_volume_m3;       /* of those that are looked at, times six */
     bool tangled, cheap;          /* cheap: whole.n_inverted tells that the body is tangled */
-    uint64_t n_tangled, n_switch; /* since reset */
+    uint64_t n_tangled, n_switch; /* since run, which tells the body */
     pal_kept kept;                /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
@@ -141,7 +141,8 @@ static pal_elastic_tets *acting(void *self)
 static pal_err run(void *self, pal_step *step)
 {
     tet_row *row = self;
-    if (row->split) step->body->rescue.n_tangled = row->n_tangled, step->body->rescue.n_split = row->n_switch;
+    step->body->rescue.n_tangled += row->n_tangled, step->body->rescue.n_split += row->n_switch;
+    row->n_tangled = row->n_switch = 0;
     if (!row->tangled && pal_kept_at(&row->kept, step->body->d)) {
         pal_kept_add(&row->kept, step->body->f);
         return PAL_ERR_OK;
