@@ -38,6 +38,14 @@ for scene in fem springs; do
     end
 done
 
+begin "what a body's way to its split stores is no gain, after a switch of supports too"
+"$palpate" prepare --shape sphere --hold 12 --resolution 6 --model fem -o soft --quiet || exit 2
+sed -i 's/"young_Pa":.*/"young_Pa": 2000,/' soft/scene.json
+check "the scene is soft" has soft/scene.json '"young_Pa": 2000,'
+gives 0 soft --only supports --seconds 12
+check "it went there" has out "supports *passed .*([1-9][0-9]* rescues"
+end
+
 begin "a beam of springs with solver rk4 untangles as well"
 altered springs rk4 's/"model":/"solver": {"name": "rk4"}, &/' '"rk4"'
 for shape in point mirrored shuffled; do

@@ -651,7 +651,8 @@ static bool settle(void *self, pal_step *step, const double *moved)
         again |= settle_tool(g, &tools->tool[t], step->body, moved);
         if (step->sub != step->n_sub - 1) continue;
         /* a grip that was handed over leads as the one before from its second step on */
-        int n_find = first ? (grab->handed && g->firm->n_give < 3 ? 3 : 1) : 0;
+        const bool goes_on = grab->handed && grab->handed[t].left_s > 0;
+        int n_find = first ? (goes_on && g->firm->n_give < 3 ? 3 : 1) : 0;
         for (int k = 0; k < n_find; k++) find_give(g, &tools->tool[t], step);
         publish(grab, g, &tools->tool[t], true);
     }
