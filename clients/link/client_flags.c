@@ -11,7 +11,12 @@ static void flags_help(const pal_client_table *table)
     for (int i = 0; i < table->n_flag; i++) {
         char left[64];
         snprintf(left, sizeof left, "%s %s", table->flag[i].name, table->flag[i].value ? table->flag[i].value : "");
-        printf("  %-26s %s\n", left, table->flag[i].help);
+        printf("  %-26s ", left);
+        for (const char *c = table->flag[i].help; *c; c++) {
+            putchar(*c);
+            if (*c == '\n') printf("%29s", "");
+        }
+        putchar('\n');
     }
     printf("  %-26s %s\n", "--help", "this text");
 }

@@ -14,7 +14,7 @@ typedef struct pal_client_flag {
     void *out;        /* bool *, const char ** or double *; untouched when absent */
     double low, high; /* range of a number                              */
     const char *bare; /* text meant by the flag alone (as last word or before another flag), or NULL */
-    const char *help; /* one line                                       */
+    const char *help; /* one line, or several                           */
 } pal_client_flag;
 
 typedef struct pal_client_table {

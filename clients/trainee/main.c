@@ -285,6 +285,10 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
 static int main_read(const char *sculpt, pal_orders *orders, const char *until, pal_until *seen)
 {
     pal_note note = {""};
+    if (until && !*until) {
+        fputs("palpate-trainee: --until \"\" waits for nothing: NAME=N,... is wanted\n", stderr);
+        return 2;
+    }
     const int code = until && pal_until_read(seen, until, &note) ? 2 : sculpt && pal_orders_load(orders, sculpt, &note);
     if (code) fprintf(stderr, "palpate-trainee: %s\n", note.text);
     return code;
@@ -303,9 +307,9 @@ int main(int argc, char **argv)
         {"--tool", "N", PAL_CLIENT_TEXT, &tool, 0, 0, NULL, "tool to take: its index or any (any)"},
         {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 86400, NULL, "how long (5)"},
         {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &until, 0, 0, NULL,
-         "end before that once each client has seen so much: cycles, frames, answered, fields, patches, triangles, "
-         "orders, "
-         "topologies, cycles_of_it (the last topology's), members, joins, stalls, moved_mm, force_N, field_high"},
+         "end before that once each client has seen so much:\n"
+         "cycles, frames, answered, fields, patches, triangles, orders, topologies,\n"
+         "cycles_of_it (the last topology's), members, joins, stalls, moved_mm, force_N, field_high"},
         {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 240, NULL, "poses per second (120)"},
         {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MOST, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},

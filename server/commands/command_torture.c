@@ -138,7 +138,7 @@ int command_torture(int argc, char **argv)
     bool known = !only;
     for (int k = 0; k < pal_insults() && !known; k++) known = !strcmp(only, pal_insult_name(k));
     if (!known) {
-        fprintf(stderr, "torture: there is no insult \"%.60s\", see palpate torture --help\n", only);
+        fprintf(stderr, "palpate torture: there is no insult \"%.60s\" (see palpate torture --help)\n", only);
         return 2;
     }
     pal_torture_options options;

@@ -272,6 +272,7 @@ static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_set_s
     pal_body_def *body = &scene->body[0];
     pal_body_default(body, "body", &set->mesh);
     snprintf(scene->name, sizeof scene->name, "problem");
+    if (p->name[0]) snprintf(scene->title, sizeof scene->title, "%s", p->name);
     pal_item_init(&body->model, "bodies[0].model", "fem");
     pal_item_init(&body->solver, "bodies[0].solver", "implicit_euler");
     body->n_effect = 3;

@@ -70,10 +70,21 @@ static bool is_loopback(const char *listen)
     return inet_pton(AF_INET, listen, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
 }
 
+/* an address alone: names of hosts and ports behind a colon are none */
+static bool is_address(const char *listen)
+{
+    unsigned char bytes[sizeof(struct in6_addr)];
+    return inet_pton(AF_INET, listen, bytes) == 1 || inet_pton(AF_INET6, listen, bytes) == 1;
+}
+
 static pal_err make_url(const pal_server_options *options, char *url, size_t cap, pal_note *note)
 {
     const char *listen = options->listen && options->listen[0] ? options->listen : "127.0.0.1";
     if (!strcmp(listen, "localhost")) listen = "127.0.0.1";
+    if (!is_address(listen))
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port",
+                            listen);
     if (!options->allow_remote && !is_loopback(listen))
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "listening on %s lets other machines in, without password or encryption: add "

@@ -3,6 +3,12 @@
 # comes back, nobody at the address. usage: test_trainee_server.sh FOLDER_OF_PROGRAMS
 bin=$1
 . "$(dirname "$0")/rig.sh"
+"$bin/palpate-trainee" --help >"$work/help"
+check "no line of the help is longer than 120" "$(awk 'length > 120' "$work/help" | wc -l)" == 0
+timeout 20 "$bin/palpate-trainee" ws://127.0.0.1:1/ws --until "" 2>"$work/nothing"
+code=$?
+check "to wait for nothing is wrong usage" $code == 2
+check "which is said in one line that names the flag" "$(grep -c -e '--until ""' "$work/nothing")/$(wc -l <"$work/nothing")" == 1/1
 make_scene
 start_server --port 0
 run() { # NAME flags: report in $work/NAME, exit code in $code

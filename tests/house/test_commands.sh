@@ -501,6 +501,8 @@ run bench mesh --picture x.svg
 refused 2 '--picture belongs to adaptive'
 run serve box.obj --port 70000
 refused 2 "--port: 70000 is outside 0 .. 65535"
+run serve box.obj --listen 127.0.0.1:19011 --quiet
+refused 1 "--listen 127.0.0.1:19011: wanted an IP address alone.*--port"
 check "a folder was made" no_such x
 end
 

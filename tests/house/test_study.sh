@@ -181,6 +181,7 @@ for row in 2 "$all"; do
     check "row $row: its setting is not said" has out "\"setting\":\"$(echo "$model" | tr -d '"').* $size voxels"
     check "row $row: the scene has another model" has "row_$row/scene.json" "$model"
     check "row $row: the study is not beside it" [ -s "row_$row/study.json" ]
+    check "row $row: the scene is not called as its problem" has "row_$row/scene.json" '"title":.*soft cantilever'
 done
 run study row_2 --pick 1 -o row_1
 check "exit code $code" code_is 0

@@ -157,7 +157,7 @@ end
 begin "what is no insult and no scene is refused with one line"
 gives 2 fem --only tickle
 check "one line" [ "$(wc -l <err)" -eq 1 ]
-check "it names the word" has err 'there is no insult "tickle"'
+check "it names the word" has err '^palpate torture: there is no insult "tickle"'
 gives 1 nowhere.json
 check "one line" [ "$(wc -l <err)" -eq 1 ]
 run

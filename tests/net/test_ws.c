@@ -395,6 +395,14 @@ static void address_and_port_are_refused_with_a_sentence(void)
     CHECK(strstr(note.text, "--allow-remote"));
     options = (pal_server_options){.listen = "not an address", .allow_remote = true};
     CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+    /* what is no address is told so, and where a port goes */
+    static const char *const no_address[] = {"127.0.0.1:19011", "localhost:80", "[::1]", "not an address"};
+    for (int i = 0; i < 4; i++) {
+        options = (pal_server_options){.listen = no_address[i]};
+        CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+        CHECK(strstr(note.text, "--listen") == note.text && strstr(note.text, no_address[i]));
+        CHECK(strstr(note.text, "--port") && !strstr(note.text, "other machines"));
+    }
     options = (pal_server_options){.viewer_folder = "/no/such/folder"};
     CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_IO);
     CHECK(second == NULL);
