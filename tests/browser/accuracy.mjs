@@ -53,6 +53,13 @@ const choose = async (page, name) => {
     list.dispatchEvent(new Event("change"));
   }, name);
 };
+/** where the organ is drawn between the open panels, and where the hint stands, pixels */
+const places = (page) => page.evaluate(() => {
+  const { stage, state } = window.palpate, { rest } = [...state.bodies.values()][0], xs = [];
+  for (let i = 0; i < rest.length; i += 3) xs.push(stage.project(stage.target.clone().set(rest[i], rest[i + 1], rest[i + 2])).x);
+  const box = (id) => document.querySelector(id).getBoundingClientRect(), hint = box("#hint");
+  return { organ: [Math.min(...xs), Math.max(...xs)], hint: [hint.left, hint.right], free: [box("#cost-panel").right, box("#panel").left], dirty: stage.dirty };
+});
 const flip = (page, row) => page.click(`#rows input[aria-label="${row} is part of the plan"]`);
 
 /** the study's page as a file: a row's button puts a command on the clipboard that writes this row's scene */
@@ -155,6 +162,15 @@ try {
   }
   check("there were knobs to press", pressed.size >= 2, [...pressed].join());
   await ada.locator("#cost-panel").screenshot({ path: join(pictures, "accuracy_panel.png") });
+  await ada.keyboard.press("p");
+  for (const width of [1000, 1100, 1600]) {
+    await ada.setViewportSize({ width, height: 800 });
+    const within = (p) => !p.dirty && [...p.organ, ...p.hint].every((x) => x >= p.free[0] - 1 && x <= p.free[1] + 1) && p.free[1] < width;
+    const at = await until(() => places(ada), within, 20000);
+    check(`${width} pixels wide, organ and hint stand between the panels`, within(at), JSON.stringify(at));
+  }
+  await ada.setViewportSize({ width: 1200, height: 800 });
+  await ada.keyboard.press("p");
   await ada.keyboard.press("4");
   check("the panel closes", !(await shown(ada)).visible);
 

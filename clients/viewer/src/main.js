@@ -17,6 +17,7 @@ const POSE_MS = 16; // poses while a tool moves
 const HOLD_MS = 50; // and while it rests: a silent tool is let go by the server
 const GRAB_MS = 1500; // longest wait for the server to take hold
 const NEAR = 2e-5; // of the scene's size: what moves less is drawn as it was
+const LEAST_ROOM = 260; // pixels between panels that the organ can stand in
 const TOLD_MS = 4000; // how long the server's answer to a refused wish is shown
 /** timer of a notice that goes by itself, 0: none */
 let told = 0;
@@ -112,10 +113,11 @@ function showState(word, text) {
   byId("state-text").textContent = text;
 }
 
-/** the organ and what is said of it stand beside the panels; on a narrow page panels lie below */
+/** the organ and what is said of it stand beside the panels, where these leave room; on a narrow page they lie below */
 function standBeside() {
-  const wide = innerWidth > 640, covers = (/** @type {string[]} */ ids) => (wide ? Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18)) : 0);
-  const left = covers(["cost-panel", "sculpt"]), right = covers(["panel"]), style = document.documentElement.style;
+  const covers = (/** @type {string[]} */ ids) => Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18));
+  const covered = [covers(["cost-panel", "sculpt"]), covers(["panel"])], room = innerWidth > 640 && innerWidth - covered[0] - covered[1] >= LEAST_ROOM;
+  const [left, right] = room ? covered : [0, 0], style = document.documentElement.style;
   style.setProperty("--left", `${left}px`);
   style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
   style.setProperty("--free", `calc(100vw - ${left + right}px)`);
