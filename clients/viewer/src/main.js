@@ -19,6 +19,8 @@ const GRAB_MS = 1500; // longest wait for the server to take hold
 const NEAR = 2e-5; // of the scene's size: what moves less is drawn as it was
 const LEAST_ROOM = 260; // pixels between panels that the organ can stand in
 const TOLD_MS = 4000; // how long the server's answer to a refused wish is shown
+/** the organ stands where the panels leave room */
+let beside = true;
 /** timer of a notice that goes by itself, 0: none */
 let told = 0;
 
@@ -68,6 +70,7 @@ const input = new ToolInput(
   },
   (wish) => {
     state.wish = wish;
+    if (!wish && !beside) standBeside();
     stage.dirty = true;
     sendPose(true);
   },
@@ -115,6 +118,9 @@ function showState(word, text) {
 
 /** the organ and what is said of it stand beside the panels, where these leave room; on a narrow page they lie below */
 function standBeside() {
+  // not under a hand that holds tissue: its place would be another one
+  beside = state.wish === null;
+  if (!beside) return;
   const covers = (/** @type {string[]} */ ids) => Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18));
   const covered = [covers(["cost-panel", "sculpt"]), covers(["panel"])], room = innerWidth > 640 && innerWidth - covered[0] - covered[1] >= LEAST_ROOM;
   const [left, right] = room ? covered : [0, 0], style = document.documentElement.style;
