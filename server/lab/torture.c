@@ -268,7 +268,7 @@ static uint64_t count_splits(const pal_rig *rig)
 void pal_rig_rebase(pal_rig *rig)
 {
     rig->base_J = shape_energy(rig);
-    rig->n_split = count_splits(rig); /* of another world it begins anew */
+    rig->n_split = count_splits(rig); /* of a world that was made or reset it begins anew */
     rig->allowed_J = 0;
     rig->scale_J = fmax(rig->scale_J, fabs(pal_world_energy_J(rig->world) - rig->rest_J));
 }

@@ -136,7 +136,7 @@ bool pal_hub_wants_estimate(const pal_client *client);
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
 /* the errors that clients are shown of the setting that a body has (its estimate's, else its study's) and of the one
  * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown. Neither of a
- * body whose estimate is older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since */
+ * body whose estimate is now older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since */
 void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
                           double *then_m);
 /* hub_plan.c */

@@ -38,6 +38,8 @@ void pal_brake_hold(pal_body *body, double stored_J)
 {
     double mass, way = way_kg_m2(body, &mass);
     if (!(way > 0) || !isfinite(stored_J)) return;
-    body->brake_1_s = 2 * sqrt(2 * stored_J / way);
-    body->brake_s = hold_s;
+    const double c = 2 * sqrt(2 * stored_J / way);
+    /* one that is still at work goes on */
+    body->brake_1_s = body->brake_s > hold_s ? fmax(body->brake_1_s, c) : c;
+    body->brake_s = fmax(body->brake_s, hold_s);
 }

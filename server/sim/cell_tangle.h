@@ -17,7 +17,7 @@
  * patch that does not come loose takes in its neighbours every 30 looks, unless a lasting load or weight pulls at the
  * body: then s goes back to 1, by a quarter every 4 looks, since what hangs by a soft patch is let out by 1 / s. What
  * that puts in is braked away (firmed_J, brake.h), or it would throw the body about and turn over more of it.
- * Blocks of nothing but elements in patches are not run, except for their energies in a look.
+ * Half blocks of nothing but elements in patches are not run, except for their energies in a look and to linearise.
  * Memory: the world's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_CELL_TANGLE_H
 #define PAL_SIM_CELL_TANGLE_H

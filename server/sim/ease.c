@@ -7,8 +7,8 @@
 
 typedef struct ease {
     int n_done; /* steps begun; PAL_EASE_STEPS: the last one */
-    double
-        *force_N; /* of a body that adapts per mass, N/kg, out of use as the ends of its edge in the mean [n_node][3] */
+    /* [n_node][3]; of a body that adapts N/kg, that of a vertex not in use the mean of its edge's ends */
+    double *force_N;
     float *lag_m; /* [n_shown][3]; NULL: none */
     pal_body *body;
     bool gone;

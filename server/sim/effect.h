@@ -151,8 +151,8 @@ typedef struct pal_effect {
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest */
     /* FORCE: the row's springs, which others switch off where they are turned over (spring_tangle.h) */
     struct pal_spring_row *(*springs)(void *self);
-    /* FORCE: looks for elements that are turned over and chooses what they run on from now on; PAL_TANGLED,
-     * PAL_TANGLE_CHANGED or both, 0: nothing is turned over. Solvers ask between sub-steps, never within one */
+    /* FORCE: looks for elements that are turned over and chooses what they run on from now on: PAL_TANGLED
+     * and what else is true of PAL_TANGLE_*; 0: nothing is turned over. Solvers ask between sub-steps, not within */
     unsigned (*untangle)(void *self, pal_step *step);
     /* CONTACT, ADAPT: this row goes on where the row `before` of the same effect on another body is (transfer.h). Both
      * bodies stand still */

@@ -4,9 +4,10 @@
  * What a grip holds is a share of every vertex of all levels, as it was when it closed: that of a vertex that was not
  * in use then is the mean of its edge's ends. Of these it pulls on those in use, and where none of them is, on the ends
  * of the edges of those that are not. So the patch, and with it the hold o (tool_grab.c), follows from the surface's
- * refinement alone, by whatever way it came to it: o goes by what the patch's place at rest does, turned as the body
- * was when the grip closed. The force is the same on both sides of a change of nodes, and of k, which goes with the
- * solver's sub-step (a jump at each would shake the tissue): F = k (tool + o + shift - y), and shift fades in
+ * refinement alone, by whatever way it came to it: only where all that is held is finer than this surface and than one
+ * in between the ends of the coarser one's edges go on holding. o goes by what the patch's place at rest does, turned
+ * as the body was when the grip closed. The force is the same on both sides of a change of nodes, and of k, which goes
+ * with the solver's sub-step (a jump at each would shake the tissue): F = k (tool + o + shift - y), and shift fades in
  * PAL_LIVE_SHIFT_S, after which the force is that of the new patch and k.
  * Memory: the caller's, but for `known`, which is heap. Thread: [sim]. */
 #ifndef PAL_SIM_SHELL_GRIP_H
@@ -20,8 +21,7 @@ typedef struct pal_live_grip {
     double y[3], shift[3], k_N_m, dt_s; /* patch and spring in the sub-step before */
     double moved[3];                    /* o since then, in the tool's axes        */
     bool renewed;                       /* other nodes since then                  */
-    /* shares on levels that a body before had and this one has not, and all coarser ones, so that they come back with
-     * their levels [n_known] */
+    /* of all vertices of a finer surface before, until its levels are back [n_known] */
     uint16_t *known;
     int n_known; /* 0: none */
 } pal_live_grip;

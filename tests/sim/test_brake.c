@@ -147,11 +147,37 @@ static void it_is_critical_for_the_motion_of_the_work(void)
     CHECK_NEAR(body.brake_1_s, 0, 0);
 }
 
+/* what grows bit by bit is braked by what is stored now, for 0.1 s; one that was begun is neither cut nor weakened */
+static void what_grows_is_braked_as_it_grows(void)
+{
+    double x[6] = {0, 0, 0, 1.5, 0, 0}, rest[6] = {0, 0, 0, 1, 0, 0}, mass[2] = {7, 4};
+    uint8_t held[2] = {1, 0};
+    pal_body body = {.n_dof = 2, .n_active = 2, .n_node = 2, .x = x, .x_rest = rest, .mass_kg = mass, .held = held};
+    body.size_m = 1;
+    pal_brake_hold(&body, 50); /* w^2 = 100 / (4 * 0.25) */
+    CHECK_NEAR(body.brake_1_s, 20, 1e-12);
+    CHECK_NEAR(body.brake_s, 0.1, 1e-12);
+    pal_brake_pass(&body, 0.05);
+    pal_brake_hold(&body, 0.5);
+    CHECK_NEAR(body.brake_1_s, 2, 1e-12);
+    CHECK_NEAR(body.brake_s, 0.1, 1e-12);
+    pal_brake_pass(&body, 0.11);
+    CHECK_NEAR(body.brake_1_s, 0, 0);
+    pal_brake_begin(&body, 1, 50);
+    pal_brake_hold(&body, 0.5);
+    CHECK_NEAR(body.brake_1_s, 20, 1e-12);
+    CHECK_NEAR(body.brake_s, 0.8, 1e-12);
+    pal_brake_hold(&body, 200);
+    CHECK_NEAR(body.brake_1_s, 40, 1e-12);
+    CHECK_NEAR(body.brake_s, 0.8, 1e-12);
+}
+
 int main(void)
 {
     RUN(the_work_of_a_thousandfold_change_is_taken_away);
     RUN(little_work_is_left_alone);
     RUN(a_reset_lets_go_of_the_brake);
     RUN(it_is_critical_for_the_motion_of_the_work);
+    RUN(what_grows_is_braked_as_it_grows);
     return check_report();
 }
