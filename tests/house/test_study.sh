@@ -235,6 +235,7 @@ check "exit code $code" code_is 0
 check "plan does not say which" has out "picked of the .* settings of near/study.json (within"
 run plan near --json
 check "no setting in JSON" has out '"picked":{"body":'
+: >out # or what plan said is taken for the server's words, which is then killed before it is there
 timeout 60 "$palpate" serve near --port 0 --json >out 2>err </dev/null &
 child=$!
 for _ in $(seq 300); do
@@ -244,7 +245,7 @@ done
 kill "$child"
 wait "$child"
 check "serve does not say which" has err "picked of the .* settings of near/study.json"
-check "serve did not start" has out '"ok":true'
+check "serve did not start" has out '"port":'
 end
 refuse 1 "lies beside what is read" study near --quick --within 1mm -o near
 refuse 1 "lies beside what is read" study near/scene.json --quick --within 1mm -o ./near/../near/other.json
