@@ -425,6 +425,8 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
     t->cycle_seen = false;
     t->asked = false; /* an order that was under way is given again */
     t->patched = -1;
+    t->frame_cycle = 0; /* the connection of before may have ended between a frame and its cycle */
+    t->decode_s = 0;
     t->result.n_cycle_of_it = 0;
     t->echo_seq = 0;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {

@@ -63,8 +63,24 @@ check "a reader that stalls for 2 s passes every check" $code == 0
 # at most the credit of 12 cycles was on its way, and one may come again with another accuracy
 check "and is current again within the credit" "$(json old_cycles_after_stall "$work/stall")" '<=' 13
 
+# the connection ends between a frame and what closes its cycle; another server, whose cycles begin anew, takes it up
+old_port=$port old_job=$server_job
+start_server --port 0
+: >"$work/cut"
+node "$(dirname "$0")/cut.mjs" "$old_port" "$port" >"$work/cut" &
+pids="$pids $!"
+await 20 test -s "$work/cut"
+url="ws://127.0.0.1:$(head -1 "$work/cut")/ws"
+run cut_off --script press --seconds 60 --until joins=2,cycles_of_it=20
+check "one that is cut off within a cycle goes on elsewhere" $code == 0
+check "it was cut off at a cycle that the other has not reached" "$(sed -n 2p "$work/cut")" '>=' 50
+check "and has joined again" "$(json reconnects "$work/cut_off")" '>=' 1
+kill "$server_job"
+wait "$server_job" 2>/dev/null
+port=$old_port server_job=$old_job url="ws://127.0.0.1:$old_port/ws"
+
 # the server goes away and comes back on the same port
-timeout 100 "$bin/palpate-trainee" "$url" --json --seconds 60 --until joins=2,cycles_of_it=20 >"$work/again" 2>/dev/null &
+timeout 100 "$bin/palpate-trainee" "$url" --json --seconds 60 --until joins=2,cycles_of_it=20 >"$work/again" 2>"$work/again.err" &
 again=$!
 members 1
 kill "$server_job"
