@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_CASE = 6, WARM = 12, ROUNDS = 6, LOOKS = 5, MOST = 1024, MOST_NODE = 30000 };
+enum { N_CASE = 6, WARM = 12, ROUNDS = 6, MOST = 1024, MOST_NODE = 30000 };
 static const double most_off = 1.3, round_s = 0.1;
 /* of E S^2, on all nodes together: bends it by some per cent */
 static const double pull = 0.001;
@@ -65,47 +65,51 @@ static pal_err swing(pal_world *world, const pal_scene *scene)
 }
 
 /* a round of steps, each on the clock */
-static pal_err timed(pal_world *world, double step_s, double *ms, int *n)
+static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, int *n)
 {
     for (double time = 0; time < round_s - 1e-9 && *n < MOST; time += step_s) {
         pal_world_wake(world);
         uint64_t began = pal_clock_thread_ns();
         PAL_TRY(pal_world_step(world, step_s));
-        ms[(*n)++] = 1e-6 * (double)(pal_clock_thread_ns() - began);
+        cost[(*n)++] = pal_estimate_cost_of(world, 0, 1e-6 * (double)(pal_clock_thread_ns() - began));
     }
     return PAL_ERR_OK;
 }
 
-/* ms: of the steps so far; with them the state is come back to and looked at again, as a session does */
-static pal_err estimate(const pal_scene *scene, pal_world *world, const double *ms, int n_ms, pal_estimate *out,
-                        pal_note *note)
+/* cost: of the last steps so far */
+static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_estimate_cost *cost, int n_cost,
+                        pal_estimate *out, pal_note *note)
 {
     pal_estimate_work *work = NULL;
     PAL_TRY(pal_estimate_work_open(scene, 0, NULL, note, &work));
     pal_estimate_state *state = pal_estimate_work_state(work);
     bool good = pal_estimate_copy(state, world, 0);
-    for (int k = 0; k < LOOKS && n_ms > 0 && good; k++)
-        good = !swing(world, scene) && pal_estimate_copy(state, world, 0);
-    state->n_ms = 0;
-    for (int i = 0; i < n_ms && i < PAL_ESTIMATE_STEPS; i++) state->ms[state->n_ms++] = (float)ms[i];
+    for (int i = 0; i < n_cost && i < PAL_ESTIMATE_STEPS; i++) state->cost[state->n_cost++] = cost[i];
     good = good && pal_estimate_work_run(work, out);
     pal_estimate_work_close(work);
     return good ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_NUMERIC, "nothing is known of the state");
 }
 
+static double median_ms(const pal_estimate_cost *cost, int n)
+{
+    double ms[MOST];
+    for (int i = 0; i < n; i++) ms[i] = (double)cost[i].ms;
+    return pal_median(ms, n);
+}
+
 /* both step in turn from the state that is handed over */
 static pal_err in_turn(pal_world *was, double was_s, pal_world *now, double now_s, row *r)
 {
-    double *ms = malloc(2 * MOST * sizeof *ms);
+    pal_estimate_cost *cost = malloc(2 * MOST * sizeof *cost);
     int n[2] = {0, 0};
-    pal_err err = ms ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = cost ? PAL_ERR_OK : PAL_ERR_MEMORY;
     for (int k = 0; k < ROUNDS && !err; k++) {
-        err = timed(was, was_s, ms, &n[0]);
-        if (!err) err = timed(now, now_s, ms + MOST, &n[1]);
+        err = timed(was, was_s, cost, &n[0]);
+        if (!err) err = timed(now, now_s, cost + MOST, &n[1]);
     }
     r->n_substep = pal_world_substeps(now);
-    if (!err) r->was_ms = pal_median(ms, n[0]), r->ms = pal_median(ms + MOST, n[1]) * was_s / now_s;
-    free(ms);
+    if (!err) r->was_ms = median_ms(cost, n[0]), r->ms = median_ms(cost + MOST, n[1]) * was_s / now_s;
+    free(cost);
     return err;
 }
 
@@ -139,15 +143,15 @@ static pal_err measure(const subject *s, result *out, pal_note *note)
 {
     pal_loaded_scene *loaded = NULL;
     pal_world *world = NULL;
-    double ms[PAL_ESTIMATE_STEPS];
+    pal_estimate_cost cost[MOST];
     int n = 0;
     PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, note));
     const pal_scene *scene = &loaded->scene;
     pal_err err = pal_world_create(scene, note, &world);
     if (!err) err = swing(world, scene);
-    for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, ms, &n);
+    for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, cost, &n);
     if (!err) err = swing(world, scene);
-    if (!err) err = estimate(scene, world, ms, n, &out->estimate, note);
+    if (!err) err = estimate(scene, world, cost, n, &out->estimate, note);
     if (!err) {
         out->n_node = pal_world_look(world, 0)->n_node, out->n_substep = pal_world_substeps(world);
         out->n_row = out->estimate.n_neighbour;

@@ -50,8 +50,8 @@ struct pal_estimator {
     _Atomic uint64_t n_awake; /* steps in which the body was awake: these make an estimate old */
     /* the simulation's own */
     uint64_t looked_ns, looked_tick;
-    float ms[PAL_ESTIMATE_STEPS];
-    uint64_t n_ms;
+    pal_estimate_cost cost[PAL_ESTIMATE_STEPS];
+    uint64_t n_cost;
     double step_s;
     bool slept; /* it has been looked at since it fell asleep */
 };
@@ -182,13 +182,13 @@ static uint64_t n_awake(const pal_estimator *e)
     return atomic_load_explicit(&e->n_awake, memory_order_relaxed);
 }
 
-/* the times of the last second's steps */
-static void copy_times(const pal_estimator *e, pal_estimate_state *to)
+/* what the last second's steps took */
+static void copy_costs(const pal_estimator *e, pal_estimate_state *to)
 {
-    uint64_t n = e->n_ms < PAL_ESTIMATE_STEPS ? e->n_ms : PAL_ESTIMATE_STEPS;
+    uint64_t n = e->n_cost < PAL_ESTIMATE_STEPS ? e->n_cost : PAL_ESTIMATE_STEPS;
     double second = e->step_s > 0 ? ceil(1 / e->step_s) : 1;
-    to->n_ms = second < (double)n ? (int)second : (int)n;
-    for (int i = 0; i < to->n_ms; i++) to->ms[i] = e->ms[(e->n_ms - 1 - (uint64_t)i) % PAL_ESTIMATE_STEPS];
+    to->n_cost = second < (double)n ? (int)second : (int)n;
+    for (int i = 0; i < to->n_cost; i++) to->cost[i] = e->cost[(e->n_cost - 1 - (uint64_t)i) % PAL_ESTIMATE_STEPS];
 }
 
 /* what was known of a body is over when it freezes; it is another one when it comes back */
@@ -204,8 +204,10 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
 {
     const pal_body *body = pal_world_look(world, e->body);
     note_frozen(e, world, body->frozen);
-    if (!isnan(step_ms) && !body->asleep) e->ms[e->n_ms++ % PAL_ESTIMATE_STEPS] = (float)step_ms;
-    if (!isnan(step_ms) && !body->asleep) atomic_fetch_add_explicit(&e->n_awake, 1, memory_order_relaxed);
+    if (!isnan(step_ms) && !body->asleep) {
+        e->cost[e->n_cost++ % PAL_ESTIMATE_STEPS] = pal_estimate_cost_of(world, e->body, step_ms);
+        atomic_fetch_add_explicit(&e->n_awake, 1, memory_order_relaxed);
+    }
     if (!body->asleep) e->slept = false;
     if (e->slept || atomic_load_explicit(&held, memory_order_relaxed)) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
@@ -218,7 +220,7 @@ void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms
     e->slept = body->asleep;
     e->looked_life = atomic_load_explicit(&e->life, memory_order_relaxed);
     e->looked_awake = n_awake(e);
-    copy_times(e, e->state);
+    copy_costs(e, e->state);
     atomic_store_explicit(&e->place, BUSY, memory_order_release);
     sem_post(&e->wake);
 }

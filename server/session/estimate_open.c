@@ -306,8 +306,7 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
     return PAL_ERR_OK;
 }
 
-/* what is shown, contact and guards took in the last step */
-static double fixed_ms(const pal_world *world, int body)
+pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
 {
     const char *of = pal_world_look(world, body)->name;
     double sum_ns = 0;
@@ -319,7 +318,7 @@ static double fixed_ms(const pal_world *world, int body)
         if (row->effect->stage != PAL_STAGE_FORCE && row->effect->stage != PAL_STAGE_SOLVE)
             sum_ns += (double)row->spent_ns;
     }
-    return 1e-6 * sum_ns;
+    return (pal_estimate_cost){.ms = (float)step_ms, .fixed_ms = (float)(1e-6 * sum_ns)};
 }
 
 /* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
@@ -352,8 +351,6 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
     state->asleep = from->asleep;
-    double fixed = from->asleep ? 0 : fixed_ms(world, body);
-    if (fixed > 0) state->fixed_ms = state->fixed_ms > 0 ? fmin(state->fixed_ms, fixed) : fixed;
     pal_world_material_now(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;

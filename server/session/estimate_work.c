@@ -23,11 +23,20 @@ static int rising(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double median_ms(pal_estimate_state *s)
+static float share_of(const pal_estimate_cost *c)
 {
-    if (s->n_ms == 0) return NAN;
-    qsort(s->ms, (size_t)s->n_ms, sizeof *s->ms, rising);
-    return (double)s->ms[s->n_ms / 2];
+    return c->ms > 0 ? fminf(c->fixed_ms / c->ms, 1) : 0;
+}
+
+/* in the middle of the steps, as one that was interrupted says too much: ms of one, or the share of it that is fixed */
+static double middle(const pal_estimate_state *s, bool share)
+{
+    float value[PAL_ESTIMATE_STEPS];
+    if (s->n_cost == 0) return NAN;
+    for (int i = 0; i < s->n_cost; i++)
+        value[i] = share ? share_of(&s->cost[i]) : s->cost[i].ms;
+    qsort(value, (size_t)s->n_cost, sizeof *value, rising);
+    return (double)value[s->n_cost / 2];
 }
 
 /* the state into a world of the same mesh, under its loads */
@@ -296,7 +305,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
                           .time_m = NAN,
                           .model_m = NAN,
                           .zz_percent = NAN,
-                          .ms = median_ms(&w->state)};
+                          .ms = middle(&w->state, false)};
     memcpy(out->note, w->note, sizeof out->note);
     price_sleep(w, out);
     look_ahead(w, out);
@@ -305,7 +314,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
     sum_up(w, out);
     if (!pal_estimate_stopped(w)) price_size(w);
     w->foresight.n_substep = w->state.n_substep;
-    w->foresight.fixed = out->ms > 0 ? fmin(w->state.fixed_ms / out->ms, 1) : 0;
+    w->foresight.fixed = w->state.n_cost ? middle(&w->state, true) : 0;
     pal_estimate_foresee(&w->foresight, out);
     return !pal_estimate_stopped(w);
 }

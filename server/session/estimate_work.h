@@ -10,6 +10,12 @@
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
+/* what a step took that the body was awake in: all of it, and of that the body's rows that are neither forces nor solver
+ * (what is shown, contact, guards); ms */
+typedef struct pal_estimate_cost {
+    float ms, fixed_ms;
+} pal_estimate_cost;
+
 /* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */
 typedef struct pal_estimate_state {
     uint64_t tick;
@@ -20,17 +26,15 @@ typedef struct pal_estimate_state {
     double *outer; /* of load: what lasts, N [n_node][3] */
     double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
     bool asleep;
-    bool touched;    /* a tool presses or pulls */
-    int n_substep;   /* of the step */
-    double fixed_ms; /* of one awake, in rows that are neither forces nor solver: what is shown, contact, guards; the
-                        least of the states so far, as a step that was interrupted says too much */
+    bool touched;  /* a tool presses or pulls */
+    int n_substep; /* of the step */
     pal_material material;
     /* FORCE rows of the body: names from open on, and which of them are not switched off */
     const char *row[PAL_ESTIMATE_ROWS];
     bool row_on[PAL_ESTIMATE_ROWS];
     int n_row;
-    float ms[PAL_ESTIMATE_STEPS]; /* of the last steps awake, any order */
-    int n_ms;
+    pal_estimate_cost cost[PAL_ESTIMATE_STEPS]; /* of the last steps awake, any order */
+    int n_cost;
 } pal_estimate_state;
 
 typedef struct pal_estimate_work pal_estimate_work;
@@ -43,6 +47,8 @@ pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work);
 /* the state of `body` of a world made from the scene; false: that is no state to look at (not finite, frozen, another
  * number of points). Copies, no memory. [sim] */
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body);
+/* of the world's last step, which took step_ms. No memory. [sim] */
+pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms);
 /* the rows of a world of the same body, made from `scene`, as those of the state; recipe: rows of the model too, which
  * is the state's. What pal_world_switch_row gives. Heap memory */
 pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe);

@@ -116,7 +116,7 @@ static bool estimate(const body *at, double pull, pal_estimate *out)
         pal_estimate_state *s = pal_estimate_work_state(work);
         good = pal_estimate_copy(s, world, 0);
         memcpy(s->x, pal_world_look(at->world, 0)->x, 3 * sizeof *s->x * (size_t)s->n_dof);
-        s->n_substep = 1, s->n_ms = 1, s->ms[0] = 1;
+        s->n_substep = 1, s->n_cost = 1, s->cost[0].ms = 1;
         good = good && pal_estimate_work_run(work, out);
     }
     pal_estimate_work_close(work);
