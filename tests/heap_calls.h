@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-static volatile bool counting;   /* compilers know that malloc looks at no variable of ours */
-static _Atomic long n_heap_call; /* while counting */
+static volatile _Atomic bool counting; /* compilers know that malloc looks at no variable of ours */
+static _Atomic long n_heap_call;       /* while counting */
 
 void *__real_malloc(size_t n_byte);
 void *__real_calloc(size_t n, size_t n_byte);

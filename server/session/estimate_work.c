@@ -33,8 +33,7 @@ static double middle(const pal_estimate_state *s, bool share)
 {
     float value[PAL_ESTIMATE_STEPS];
     if (s->n_cost == 0) return NAN;
-    for (int i = 0; i < s->n_cost; i++)
-        value[i] = share ? share_of(&s->cost[i]) : s->cost[i].ms;
+    for (int i = 0; i < s->n_cost; i++) value[i] = share ? share_of(&s->cost[i]) : s->cost[i].ms;
     qsort(value, (size_t)s->n_cost, sizeof *value, rising);
     return (double)value[s->n_cost / 2];
 }

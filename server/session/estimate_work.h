@@ -10,8 +10,8 @@
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
-/* what a step took that the body was awake in: all of it, and of that the body's rows that are neither forces nor solver
- * (what is shown, contact, guards); ms */
+/* what a step took that the body was awake in: all of it, and of that the body's rows that are neither forces nor
+ * solver (what is shown, contact, guards); ms */
 typedef struct pal_estimate_cost {
     float ms, fixed_ms;
 } pal_estimate_cost;
