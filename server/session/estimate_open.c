@@ -309,16 +309,17 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
 pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
 {
     const char *of = pal_world_look(world, body)->name;
-    double sum_ns = 0;
+    double all_ns = 0, goes_ns = 0;
     for (int i = 0; i < pal_world_rows(world); i++) {
         const pal_row *row = pal_world_effect(world, i);
+        const bool inner = row->effect->stage == PAL_STAGE_FORCE || row->effect->stage == PAL_STAGE_SOLVE;
         pal_row_info info;
         pal_world_row(world, i, &info);
-        if (info.body != of) continue;
-        if (row->effect->stage != PAL_STAGE_FORCE && row->effect->stage != PAL_STAGE_SOLVE)
-            sum_ns += (double)row->spent_ns;
+        all_ns += (double)row->spent_ns;
+        if (inner && info.body == of) goes_ns += (double)row->spent_ns;
     }
-    return (pal_estimate_cost){.ms = (float)step_ms, .fixed_ms = (float)(1e-6 * sum_ns)};
+    /* of the rows alone: they are on another clock than the step */
+    return (pal_estimate_cost){.ms = (float)step_ms, .fixed = all_ns > 0 ? (float)(1 - goes_ns / all_ns) : 0};
 }
 
 /* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */

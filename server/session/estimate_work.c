@@ -23,17 +23,12 @@ static int rising(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static float share_of(const pal_estimate_cost *c)
-{
-    return c->ms > 0 ? fminf(c->fixed_ms / c->ms, 1) : 0;
-}
-
 /* in the middle of the steps, as one that was interrupted says too much: ms of one, or the share of it that is fixed */
 static double middle(const pal_estimate_state *s, bool share)
 {
     float value[PAL_ESTIMATE_STEPS];
     if (s->n_cost == 0) return NAN;
-    for (int i = 0; i < s->n_cost; i++) value[i] = share ? share_of(&s->cost[i]) : s->cost[i].ms;
+    for (int i = 0; i < s->n_cost; i++) value[i] = share ? s->cost[i].fixed : s->cost[i].ms;
     qsort(value, (size_t)s->n_cost, sizeof *value, rising);
     return (double)value[s->n_cost / 2];
 }

@@ -10,10 +10,11 @@
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
-/* what a step took that the body was awake in: all of it, and of that the body's rows that are neither forces nor
- * solver (what is shown, contact, guards); ms */
+/* of a step that the body was awake in */
 typedef struct pal_estimate_cost {
-    float ms, fixed_ms;
+    float ms;    /* of all bodies */
+    float fixed; /* share of all rows' time that does not go with the body's mesh: other bodies, and of its own rows
+                    what is neither force nor solver (what is shown, contact, guards) */
 } pal_estimate_cost;
 
 /* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */

@@ -34,7 +34,7 @@ static bool estimate_of(const pal_scene *at, const pal_world *w, pal_estimate *o
         pal_estimate_state *state = pal_estimate_work_state(work);
         /* a quarter stays; a step was interrupted while a frame was made */
         for (float ms = 1; ms <= 5; ms++)
-            state->cost[state->n_cost++] = (pal_estimate_cost){.ms = ms, .fixed_ms = ms < 5 ? ms / 4 : 4.99f};
+            state->cost[state->n_cost++] = (pal_estimate_cost){.ms = ms, .fixed = ms < 5 ? 0.25F : 0.99F};
         good = pal_estimate_copy(state, w, 0) && pal_estimate_work_run(work, out);
     }
     pal_estimate_work_close(work);
@@ -312,6 +312,33 @@ static void elements_that_lock_say_so(void)
     }
 }
 
+/* what does not go with a body's mesh: all of the other's, and what is shown and guarded of its own */
+static void other_bodies_are_fixed(void)
+{
+    pal_scene *two = fem_scene();
+    pal_world *w = NULL;
+    pal_estimate_cost cost[2];
+    two->body[1] = two->body[0], two->n_body = 2;
+    snprintf(two->body[1].name, sizeof two->body[1].name, "other");
+    REQUIRE(!pal_world_create(two, NULL, &w));
+    CHECK_NEAR(pal_estimate_cost_of(w, 0, 2).fixed, 0, 0);
+    for (int i = 0; i < 3; i++) CHECK(!pal_world_step(w, two->step_s));
+    for (int b = 0; b < 2; b++) {
+        cost[b] = pal_estimate_cost_of(w, b, 2);
+        CHECK_NEAR(cost[b].ms, 2, 0);
+        CHECK(cost[b].fixed > 0 && cost[b].fixed < 1);
+    }
+    /* both bodies' own shares, without what is shown */
+    CHECK(1 - cost[0].fixed + 1 - cost[1].fixed < 1);
+    /* a body that sleeps has none */
+    pal_world_body(w, 0)->asleep = true;
+    CHECK(!pal_world_step(w, two->step_s));
+    CHECK_NEAR(pal_estimate_cost_of(w, 0, 2).fixed, 1, 0);
+    CHECK(pal_estimate_cost_of(w, 1, 2).fixed < 0.9F);
+    pal_world_destroy(w);
+    free(two);
+}
+
 static bool estimate_again(pal_estimate_work *work, const pal_world *w, pal_estimate *out)
 {
     return pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, out);
@@ -532,6 +559,7 @@ int main(void)
     RUN_LONG(a_looser_solver_leaves_more);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);
+    RUN(other_bodies_are_fixed);
     RUN(neighbours_are_what_a_switch_makes);
     RUN(calibrated_springs_have_no_neighbour_in_size);
     RUN(fitted_springs_are_compared_with_converged_elements);
