@@ -28,10 +28,19 @@ static bool taken(const pal_foresight *from, const pal_setting *to, double more)
     return fits && !pal_switch_check(from->scene, from->body, to, NULL);
 }
 
+/* sub-steps of all bodies over what they are now */
+static double substeps(const pal_foresight *from, int side)
+{
+    double own = from->rest_substeps, beside = from->beside_substeps;
+    if (!(beside > 0)) return from->substeps[side];
+    return fmax(own * from->substeps[side], beside) / fmax(own, beside);
+}
+
 /* a step's time over what it is now */
 static double times(const pal_foresight *from, int side)
 {
-    return from->fixed + (1 - from->fixed) * from->substeps[side] * from->work[side];
+    double own = fmax(1 - from->once - from->beside, 0);
+    return from->once + substeps(from, side) * (from->beside + own * from->work[side]);
 }
 
 static void sizes(const pal_foresight *from, pal_estimate *out)

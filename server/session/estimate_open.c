@@ -309,17 +309,23 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
 pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
 {
     const char *of = pal_world_look(world, body)->name;
-    double all_ns = 0, goes_ns = 0;
+    double once_ns = 0, beside_ns = 0, own_ns = 0;
     for (int i = 0; i < pal_world_rows(world); i++) {
         const pal_row *row = pal_world_effect(world, i);
-        const bool inner = row->effect->stage == PAL_STAGE_FORCE || row->effect->stage == PAL_STAGE_SOLVE;
+        const pal_stage stage = row->effect->stage;
+        const bool inner = stage == PAL_STAGE_FORCE || stage == PAL_STAGE_SOLVE;
         pal_row_info info;
         pal_world_row(world, i, &info);
-        all_ns += (double)row->spent_ns;
-        if (inner && info.body == of) goes_ns += (double)row->spent_ns;
+        double *sum_ns = inner && info.body == of              ? &own_ns
+                         : inner || stage == PAL_STAGE_CONTACT ? &beside_ns
+                                                               : &once_ns;
+        *sum_ns += (double)row->spent_ns;
     }
     /* of the rows alone: they are on another clock than the step */
-    return (pal_estimate_cost){.ms = (float)step_ms, .fixed = all_ns > 0 ? (float)(1 - goes_ns / all_ns) : 0};
+    double all_ns = once_ns + beside_ns + own_ns;
+    pal_estimate_cost cost = {.ms = (float)step_ms};
+    if (all_ns > 0) cost.once = (float)(once_ns / all_ns), cost.beside = (float)(beside_ns / all_ns);
+    return cost;
 }
 
 /* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
@@ -332,6 +338,16 @@ static bool is_touched(const pal_world *world, const pal_body *body)
     for (int i = 0; i < 3 * body->n_node && any && !borne; i++)
         borne = body->load[i] != (body->outer ? body->outer[i] : 0);
     return borne;
+}
+
+static double beside_limit_s(const pal_world *world, int body)
+{
+    double least = INFINITY;
+    for (int b = 0; b < pal_world_bodies(world); b++) {
+        const pal_body *other = pal_world_look(world, b);
+        if (b != body && !other->asleep && !other->frozen) least = fmin(least, other->dt_limit_s);
+    }
+    return least;
 }
 
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
@@ -351,6 +367,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->tick = pal_world_tick(world);
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
+    state->beside_limit_s = beside_limit_s(world, body);
     state->asleep = from->asleep;
     pal_world_material_now(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);

@@ -23,12 +23,27 @@ static int rising(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* in the middle of the steps, as one that was interrupted says too much: ms of one, or the share of it that is fixed */
-static double middle(const pal_estimate_state *s, bool share)
+static float ms_of(const pal_estimate_cost *c)
+{
+    return c->ms;
+}
+
+static float once_of(const pal_estimate_cost *c)
+{
+    return c->once;
+}
+
+static float beside_of(const pal_estimate_cost *c)
+{
+    return c->beside;
+}
+
+/* in the middle of the steps, as one that was interrupted says too much */
+static double middle(const pal_estimate_state *s, float (*of)(const pal_estimate_cost *))
 {
     float value[PAL_ESTIMATE_STEPS];
     if (s->n_cost == 0) return NAN;
-    for (int i = 0; i < s->n_cost; i++) value[i] = share ? s->cost[i].fixed : s->cost[i].ms;
+    for (int i = 0; i < s->n_cost; i++) value[i] = of(&s->cost[i]);
     qsort(value, (size_t)s->n_cost, sizeof *value, rising);
     return (double)value[s->n_cost / 2];
 }
@@ -299,7 +314,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
                           .time_m = NAN,
                           .model_m = NAN,
                           .zz_percent = NAN,
-                          .ms = middle(&w->state, false)};
+                          .ms = middle(&w->state, ms_of)};
     memcpy(out->note, w->note, sizeof out->note);
     price_sleep(w, out);
     look_ahead(w, out);
@@ -308,7 +323,9 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
     sum_up(w, out);
     if (!pal_estimate_stopped(w)) price_size(w);
     w->foresight.n_substep = w->state.n_substep;
-    w->foresight.fixed = w->state.n_cost ? middle(&w->state, true) : 0;
+    w->foresight.beside_substeps = ceil(w->scene->step_s / w->state.beside_limit_s * (1 - 1e-12));
+    w->foresight.once = w->state.n_cost ? middle(&w->state, once_of) : 0;
+    w->foresight.beside = w->state.n_cost ? middle(&w->state, beside_of) : 0;
     pal_estimate_foresee(&w->foresight, out);
     return !pal_estimate_stopped(w);
 }

@@ -10,11 +10,12 @@
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
 
-/* of a step that the body was awake in */
+/* of a step that the body was awake in. Shares are of the time of all bodies' rows; what is left of 1 is the body's own
+ * forces and solver, which go with its mesh */
 typedef struct pal_estimate_cost {
-    float ms;    /* of all bodies */
-    float fixed; /* share of all rows' time that does not go with the body's mesh: other bodies, and of its own rows
-                    what is neither force nor solver (what is shown, contact, guards) */
+    float ms;     /* of all bodies */
+    float once;   /* share of what is done once a step: refinement, guards, what is shown */
+    float beside; /* share of what is done in each sub-step beside them: contact, other bodies */
 } pal_estimate_cost;
 
 /* a body as it is after a step; arrays are the work's, filled by pal_estimate_copy */
@@ -27,8 +28,9 @@ typedef struct pal_estimate_state {
     double *outer; /* of load: what lasts, N [n_node][3] */
     double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
     bool asleep;
-    bool touched;  /* a tool presses or pulls */
-    int n_substep; /* of the step */
+    bool touched;          /* a tool presses or pulls */
+    int n_substep;         /* of the step */
+    double beside_limit_s; /* longest sub-step that all other bodies allow */
     pal_material material;
     /* FORCE rows of the body: names from open on, and which of them are not switched off */
     const char *row[PAL_ESTIMATE_ROWS];

@@ -33,8 +33,8 @@ static bool estimate_of(const pal_scene *at, const pal_world *w, pal_estimate *o
     if (good) {
         pal_estimate_state *state = pal_estimate_work_state(work);
         /* a quarter stays; a step was interrupted while a frame was made */
-        for (float ms = 1; ms <= 5; ms++)
-            state->cost[state->n_cost++] = (pal_estimate_cost){.ms = ms, .fixed = ms < 5 ? 0.25F : 0.99F};
+        for (int i = 1; i <= 5; i++)
+            state->cost[state->n_cost++] = (pal_estimate_cost){.ms = (float)i, .once = i < 5 ? 0.25F : 0.99F};
         good = pal_estimate_copy(state, w, 0) && pal_estimate_work_run(work, out);
     }
     pal_estimate_work_close(work);
@@ -142,7 +142,8 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
     pal_foresight from = {.setting = {.model = "fem", .size = 20, .step_s = 0.01},
                           .n_node = 1000,
                           .rest_substeps = 3,
-                          .fixed = 0.25,
+                          .once = 0.25,
+                          .beside = 0.15,
                           .nodes = {0.2, 6},
                           .substeps = {2.0 / 3, 2},
                           .work = {0.1, 9},
@@ -153,7 +154,7 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
                           .decade = 1.25};
     pal_estimate e = {
         .ms = 2, .discretisation_m = 0.8, .time_m = 0.4, .algebraic_m = 0.1, .model_m = NAN, .error_m = 1.3};
-    const double ms[6] = {2 * (0.25 + 0.75 * 0.2 / 3), 2 * (0.25 + 0.75 * 18), 1, 4, 1.6, 2.5},
+    const double ms[6] = {2 * (0.25 + 0.15 * 2 / 3 + 0.6 * 0.2 / 3), 2 * (0.25 + 0.15 * 2 + 0.6 * 18), 1, 4, 1.6, 2.5},
                  error[6] = {1.3 + 2.4, 1.3 - 0.6, 1.7, 1.1, 2.2, 1.21};
     pal_estimate_foresee(&from, &e);
     CHECK_INT(e.n_neighbour, 6);
@@ -169,6 +170,11 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
     CHECK_INT(e.neighbour[0].setting.size, 10);
     CHECK_NEAR(e.neighbour[3].setting.step_s, 0.005, 1e-15);
     CHECK_NEAR(e.neighbour[4].setting.tolerance, 0.1, 1e-15);
+    /* another body needs four sub-steps anyway, so that they are four, four and six */
+    from.beside_substeps = 4;
+    pal_estimate_foresee(&from, &e);
+    CHECK_NEAR(e.neighbour[0].ms, 2 * (0.25 + 0.15 + 0.6 * 0.1), 1e-12);
+    CHECK_NEAR(e.neighbour[1].ms, 2 * (0.25 + 1.5 * (0.15 + 0.6 * 9)), 1e-12);
     /* what is not known is not foreseen */
     e.discretisation_m = NAN, from.work[0] = from.work[1] = NAN, from.decade = NAN;
     pal_estimate_foresee(&from, &e);
@@ -312,8 +318,13 @@ static void elements_that_lock_say_so(void)
     }
 }
 
-/* what does not go with a body's mesh: all of the other's, and what is shown and guarded of its own */
-static void other_bodies_are_fixed(void)
+static double own(const pal_estimate_cost *c)
+{
+    return 1 - (double)c->once - (double)c->beside;
+}
+
+/* what is shown and guarded is done once; another body in each sub-step, but does not go with this one's mesh */
+static void a_steps_time_is_told_apart(void)
 {
     pal_scene *two = fem_scene();
     pal_world *w = NULL;
@@ -321,20 +332,22 @@ static void other_bodies_are_fixed(void)
     two->body[1] = two->body[0], two->n_body = 2;
     snprintf(two->body[1].name, sizeof two->body[1].name, "other");
     REQUIRE(!pal_world_create(two, NULL, &w));
-    CHECK_NEAR(pal_estimate_cost_of(w, 0, 2).fixed, 0, 0);
+    cost[0] = pal_estimate_cost_of(w, 0, 2);
+    CHECK(cost[0].ms == 2 && cost[0].once == 0 && cost[0].beside == 0);
     for (int i = 0; i < 3; i++) CHECK(!pal_world_step(w, two->step_s));
     for (int b = 0; b < 2; b++) {
         cost[b] = pal_estimate_cost_of(w, b, 2);
-        CHECK_NEAR(cost[b].ms, 2, 0);
-        CHECK(cost[b].fixed > 0 && cost[b].fixed < 1);
+        CHECK(cost[b].once > 0 && cost[b].beside > 0 && own(&cost[b]) > 0);
     }
-    /* both bodies' own shares, without what is shown */
-    CHECK(1 - cost[0].fixed + 1 - cost[1].fixed < 1);
-    /* a body that sleeps has none */
+    /* the same step: what is one body's own is beside the other's */
+    CHECK_NEAR(cost[0].once, cost[1].once, 1e-6);
+    CHECK_NEAR(own(&cost[0]) + own(&cost[1]) + cost[0].once, 1, 1e-6);
+    /* a body that sleeps has nothing of its own */
     pal_world_body(w, 0)->asleep = true;
     CHECK(!pal_world_step(w, two->step_s));
-    CHECK_NEAR(pal_estimate_cost_of(w, 0, 2).fixed, 1, 0);
-    CHECK(pal_estimate_cost_of(w, 1, 2).fixed < 0.9F);
+    cost[0] = pal_estimate_cost_of(w, 0, 2), cost[1] = pal_estimate_cost_of(w, 1, 2);
+    CHECK_NEAR(own(&cost[0]), 0, 1e-6);
+    CHECK_NEAR(own(&cost[1]), cost[0].beside, 1e-6);
     pal_world_destroy(w);
     free(two);
 }
@@ -559,7 +572,7 @@ int main(void)
     RUN_LONG(a_looser_solver_leaves_more);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);
-    RUN(other_bodies_are_fixed);
+    RUN(a_steps_time_is_told_apart);
     RUN(neighbours_are_what_a_switch_makes);
     RUN(calibrated_springs_have_no_neighbour_in_size);
     RUN(fitted_springs_are_compared_with_converged_elements);
