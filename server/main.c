@@ -1,5 +1,6 @@
 /* `palpate COMMAND ...`: finds the command and runs it. Nothing else happens here: signals belong to serve, which is
  * the one command that waits. */
+#include "server/bench/bench.h"
 #include "server/commands/commands.h"
 
 #include <stdio.h>

@@ -5,9 +5,9 @@
  * journal and is taken from there. */
 #include "server/base/clock.h"
 #include "server/base/team.h"
-#include "server/commands/calibrate_cases.h"
-#include "server/commands/calibrate_journal.h"
-#include "server/commands/report.h"
+#include "server/calibrate/calibrate_cases.h"
+#include "server/calibrate/calibrate_journal.h"
+#include "server/cli/report.h"
 #include "server/num/anneal.h"
 #include "server/scene/scene_file.h"
 

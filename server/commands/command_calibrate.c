@@ -1,7 +1,7 @@
 /* `palpate calibrate`: springs that come to rest where finite elements do -> a scene that serve runs, with its error
  * stated (paper B 3). */
 #include "server/base/clock.h"
-#include "server/commands/calibrate_run.h"
+#include "server/calibrate/calibrate_run.h"
 #include "server/commands/commands.h"
 
 #include <errno.h>
@@ -100,33 +100,6 @@ static bool take_step(void *user, const pal_fit_step *step)
     }
     show_fit(run, step);
     return !stop_asked;
-}
-
-/* ---- words ---- */
-
-const char *pal_calibrate_method(const pal_calibrate_run *run)
-{
-    return run->annealing ? "annealing" : "adjoint";
-}
-
-const char *pal_calibrate_key(const pal_calibrate_run *run, int k, bool brief)
-{
-    static const char *const name[PAL_SPRING_KINDS][2] = {
-        {"k_distance_J", "k_d"}, {"k_area_J", "k_a"}, {"k_volume_J", "k_v"}};
-    return name[run->info.kind[k]][brief];
-}
-
-double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_value *value, bool fit)
-{
-    double sum = 0;
-    int n = 0;
-    for (int k = 0; k < run->set.n; k++) {
-        if (run->set.list[k].fit != fit) continue;
-        if (!(value->case_percent[k] < DBL_MAX)) return DBL_MAX;
-        sum += value->case_percent[k];
-        n++;
-    }
-    return n > 0 ? sum / n : NAN;
 }
 
 /* "5x3x5"; false: it is none */

@@ -1,13 +1,13 @@
 /* `palpate cells`: control cells of a primitive, of a named solid or of a file, subdivided and written as cells or as
  * their boundary, with the figures of Table 1 of paper A. */
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
-#include "server/mesh/cell_elements.h"
-#include "server/mesh/cell_file.h"
-#include "server/mesh/cell_models.h"
-#include "server/mesh/cell_shapes.h"
-#include "server/mesh/maccracken_joy.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/cells/cell_elements.h"
+#include "server/mesh/cells/cell_file.h"
+#include "server/mesh/cells/cell_models.h"
+#include "server/mesh/cells/cell_shapes.h"
+#include "server/mesh/cells/maccracken_joy.h"
+#include "server/mesh/files/mesh_file.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,17 +3,17 @@
  * there, with the words that would call for it. Of a body that adapts all its levels, and what of them is active now;
  * of a subdivided solid its elements as in Table 1 of paper A. */
 #include "server/base/clock.h"
+#include "server/cli/median.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/median.h"
 #include "server/commands/plan_reasons.h"
 #include "server/commands/preflight_report.h"
-#include "server/commands/report.h"
-#include "server/commands/scene_arg.h"
-#include "server/commands/studied_scene.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/shell.h"
-#include "server/sim/solid.h"
-#include "server/sim/world.h"
+#include "server/scene/scene_arg.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/subdivision/solid.h"
+#include "server/sim/surface/shell.h"
+#include "server/sim/world/world.h"
+#include "server/study/studied_scene.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,12 +3,12 @@
  * holds half a scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
-#include "server/mesh/label_volume.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/scan/label_volume.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 
 #include <dirent.h>
 #include <errno.h>

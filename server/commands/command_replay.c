@@ -1,10 +1,10 @@
 /* `palpate replay`: runs an input log against its scene and compares the hashes. */
 #include "server/base/clock.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
-#include "server/commands/scene_arg.h"
-#include "server/commands/studied_scene.h"
+#include "server/scene/scene_arg.h"
 #include "server/session/replay.h"
+#include "server/study/studied_scene.h"
 
 #include <stdio.h>
 

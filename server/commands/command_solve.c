@@ -1,12 +1,12 @@
 /* `palpate solve`: a load-case problem -> displacements, the error against a reference, files for other tools. */
 #include "server/base/clock.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
 #include "server/commands/solve_study.h"
-#include "server/lab/solve.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/scene/scene_file.h"
+#include "server/solve/solve.h"
 
 #include <math.h>
 #include <stdio.h>

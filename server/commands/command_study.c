@@ -3,13 +3,13 @@
  * accurate in a time, is named and written as a scene. */
 #include "server/base/clock.h"
 #include "server/base/machine.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
-#include "server/commands/studied_scene.h"
-#include "server/commands/study_input.h"
-#include "server/commands/study_journal.h"
-#include "server/commands/study_page.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/study/studied_scene.h"
+#include "server/study/study_input.h"
+#include "server/study/study_journal.h"
+#include "server/study/study_page.h"
 
 #include <limits.h>
 #include <math.h>

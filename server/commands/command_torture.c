@@ -1,10 +1,10 @@
 /* `palpate torture SCENE`: the insults of lab/torture.h on a user's own scene, what happened and whether that is within
  * the criterion. Exit code 1 when something failed or could not be judged. */
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/report.h"
-#include "server/commands/scene_arg.h"
-#include "server/commands/studied_scene.h"
 #include "server/commands/torture_picture.h"
+#include "server/scene/scene_arg.h"
+#include "server/study/studied_scene.h"
 
 #include <math.h>
 #include <stdio.h>

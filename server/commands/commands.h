@@ -18,22 +18,9 @@ int command_prepare(int argc, char **argv);
 int command_cells(int argc, char **argv);
 int command_plan(int argc, char **argv);
 int command_replay(int argc, char **argv);
-int command_bench(int argc, char **argv);
 int command_solve(int argc, char **argv);
 int command_calibrate(int argc, char **argv);
 int command_study(int argc, char **argv);
 int command_torture(int argc, char **argv);
 
-/* the benches behind `palpate bench NAME`: print a table, or with json one object; the result is the exit code */
-int bench_mesh(const char *ply_path_or_null, bool json);
-int bench_springs(bool json);
-int bench_protocol(bool json);
-int bench_latency(bool json);
-int bench_sleep(bool json);
-int bench_estimate(bool json);
-int bench_fem(bool json);
-int bench_solids(bool json);
-int bench_guards(bool json);
-int bench_adaptive(bool json, const char *picture); /* picture: SVG of the ways over time, or NULL */
-int bench_calibrate(const char *folder_or_null, bool json);
 #endif

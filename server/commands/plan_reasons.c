@@ -2,7 +2,7 @@
  * so that a new effect needs no line here. */
 #include "server/commands/plan_reasons.h"
 
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* Why a row is in a plan, and what is not there: for `palpate plan`. */
 #ifndef PAL_COMMANDS_PLAN_REASONS_H
 #define PAL_COMMANDS_PLAN_REASONS_H
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 
 /* the words in a scene that call for an effect: "an entry \"gravity\" in effects"; returns text */
 const char *pal_effect_words(const char *name, char text[128]);

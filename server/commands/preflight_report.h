@@ -1,7 +1,7 @@
 /* What `palpate plan` and `palpate serve` say of a preflight (lab/preflight.h). Thread: [load]. */
 #ifndef PAL_COMMANDS_PREFLIGHT_REPORT_H
 #define PAL_COMMANDS_PREFLIGHT_REPORT_H
-#include "server/lab/preflight.h"
+#include "server/solve/preflight.h"
 
 #include <cjson/cJSON.h>
 

@@ -3,13 +3,13 @@
  * again (it speaks LCM in a process of its own because two forged datagrams can crash any LCM subscriber). */
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
-#include "server/commands/report.h"
-#include "server/commands/scene_arg.h"
-#include "server/commands/studied_scene.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/net/server.h"
+#include "server/scene/scene_arg.h"
+#include "server/study/studied_scene.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -2,7 +2,7 @@
  * over seconds; the error is that against the reference, or Richardson's estimate where there is none. */
 #include "server/commands/solve_study.h"
 
-#include "server/lab/plot.h"
+#include "server/figure/plot.h"
 
 #include <math.h>
 #include <stdio.h>

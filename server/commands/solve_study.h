@@ -2,8 +2,8 @@
  * [load]. */
 #ifndef PAL_COMMANDS_SOLVE_STUDY_H
 #define PAL_COMMANDS_SOLVE_STUDY_H
-#include "server/commands/report.h"
-#include "server/lab/convergence.h"
+#include "server/cli/report.h"
+#include "server/solve/convergence.h"
 
 enum { PAL_STUDY_ELEMENTS = 4 };
 

@@ -1,7 +1,7 @@
 /* Small multiples: simulated seconds to the right, energy above rest as a share of its largest value upwards. */
 #include "server/commands/torture_picture.h"
 
-#include "server/lab/svg.h"
+#include "server/figure/svg.h"
 
 #include <math.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 #include "server/net/site.h"
 #include "server/net/stream.h"
 #include "server/net/transport.h"
-#include "server/sim/setting.h"
+#include "server/sim/core/setting.h"
 
 typedef struct pal_hub pal_hub;
 

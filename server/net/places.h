@@ -8,7 +8,7 @@
 #define PAL_NET_PLACES_H
 #include "server/base/err.h"
 #include "server/net/packet.h"
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 
 enum { PAL_PLACES_KEPT = 4 }; /* patches to the newest change that are kept for the next client */
 

@@ -3,7 +3,7 @@
 #ifndef PAL_NET_SERVER_H
 #define PAL_NET_SERVER_H
 #include "server/session/session.h"
-#include "server/sim/setting.h"
+#include "server/sim/core/setting.h"
 
 typedef struct pal_server pal_server;
 

@@ -44,7 +44,7 @@
  * Every refusal names file, entry and number. Thread: [load]. */
 #ifndef PAL_SCENE_PROBLEM_FILE_H
 #define PAL_SCENE_PROBLEM_FILE_H
-#include "server/sim/problem.h"
+#include "server/sim/core/problem.h"
 
 /* at most 1 MiB of JSON. *out: heap, free(). IO, REFUSED, MEMORY */
 pal_err pal_problem_read(const char *path, pal_problem **out, pal_note *note);

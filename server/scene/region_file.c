@@ -6,8 +6,8 @@
 #include "server/scene/region_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/label_volume.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/scan/label_volume.h"
 
 #include <math.h>
 #include <stdio.h>

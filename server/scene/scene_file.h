@@ -56,8 +56,8 @@
  * pal_body_default. */
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
-#include "server/mesh/levels.h"
-#include "server/sim/def.h"
+#include "server/mesh/geometry/levels.h"
+#include "server/sim/core/def.h"
 
 /* what a region borrows */
 typedef struct pal_loaded_region {

@@ -12,9 +12,9 @@
 #include "server/base/clock.h"
 #include "server/base/utf8.h"
 #include "server/base/vec3.h"
-#include "server/mesh/label_volume.h"
-#include "server/mesh/mesh_file.h"
-#include "server/mesh/organ.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/geometry/organ.h"
+#include "server/mesh/scan/label_volume.h"
 #include "server/scene/solid_file.h"
 
 #include <ctype.h>

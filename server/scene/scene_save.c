@@ -2,8 +2,8 @@
  * that a folder with a scene.json is whole; what was written is removed again when something fails. */
 #include "server/scene/scene_file.h"
 
-#include "server/mesh/cell_file.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/cells/cell_file.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
 #include "server/scene/solid_file.h"

@@ -1,8 +1,8 @@
 /* Bodies of model adaptive_springs: a surface as it is, its levels told and checked once, and the procedural shapes of
  * paper C (Table I, Figs. 8-13) with what holds them. */
 #include "server/base/vec3.h"
-#include "server/mesh/decimate.h"
-#include "server/mesh/stomach.h"
+#include "server/mesh/geometry/decimate.h"
+#include "server/mesh/geometry/stomach.h"
 #include "server/scene/scene_make.h"
 
 #include <math.h>

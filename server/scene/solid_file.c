@@ -4,8 +4,8 @@
 #include "server/scene/solid_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/cell_file.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/cells/cell_file.h"
+#include "server/mesh/files/mesh_file.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -20,8 +20,8 @@
  * writes it out. What does not fit is dropped and counted, and the log says that it is not whole. */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
-#include "server/sim/brush.h"
-#include "server/sim/def.h"
+#include "server/sim/core/brush.h"
+#include "server/sim/core/def.h"
 
 enum {
     PAL_INPUT_HEADER = 40,

@@ -3,7 +3,7 @@
  * Thread: [net]. */
 #ifndef PAL_SESSION_MEMBERS_H
 #define PAL_SESSION_MEMBERS_H
-#include "server/sim/tools.h"
+#include "server/sim/core/tools.h"
 
 enum { PAL_MEMBER_LIST_MAX = 64, PAL_MEMBER_NAME = 48 };
 

@@ -2,7 +2,7 @@
  * one another, those whose methods have no such row as well. Thread: of who opens, follows and closes sessions. */
 #ifndef PAL_SESSION_ROWS_OFF_H
 #define PAL_SESSION_ROWS_OFF_H
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 
 enum { PAL_ROWS_OFF = 64 };
 

@@ -8,8 +8,8 @@
  * Thread: one at a time. */
 #ifndef PAL_SESSION_SCULPT_H
 #define PAL_SESSION_SCULPT_H
-#include "server/mesh/cell_edits.h"
-#include "server/sim/world.h"
+#include "server/mesh/cells/cell_edits.h"
+#include "server/sim/world/world.h"
 
 enum { PAL_SCULPT_PAST = 64 }; /* commands that can be undone, older ones are forgotten */
 

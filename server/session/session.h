@@ -13,9 +13,9 @@
  * hash. Brushes are. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
-#include "server/session/estimate.h"
-#include "server/sim/effect.h"
-#include "server/sim/world.h"
+#include "server/estimate/estimate.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/world/world.h"
 
 typedef struct pal_session pal_session;
 

@@ -3,10 +3,10 @@
 #define PAL_SESSION_SESSION_PARTS_H
 #include "server/base/ring.h"
 #include "server/base/trio.h"
+#include "server/estimate/watch.h"
 #include "server/session/input_log.h"
 #include "server/session/rows_off.h"
 #include "server/session/session.h"
-#include "server/session/watch.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

@@ -12,15 +12,6 @@ struct pal_switch {
     pal_transfer_report report;
 };
 
-pal_err pal_switch_check(const pal_scene *scene, int body, const pal_setting *to, pal_note *note)
-{
-    PAL_TRY(pal_setting_check(scene, body, to, note));
-    double n_node = pal_setting_nodes(scene, body, to);
-    if (n_node <= PAL_SWITCH_NODES) return PAL_ERR_OK;
-    return pal_note_set(note, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
-                        to->size, n_node, PAL_SWITCH_NODES);
-}
-
 static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
                        pal_note *note, pal_switch *s)
 {
@@ -33,7 +24,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
         s->from.body[body] = *base;
         s->from.body[body].material = scene->body[body].material;
     }
-    PAL_TRY(pal_switch_check(&s->from, body, to, note));
+    PAL_TRY(pal_setting_check_live(&s->from, body, to, note));
     PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
     s->set->scene.accuracy[0] = 0; /* was said of the setting before */
     pal_setting_of(scene, body, &now);

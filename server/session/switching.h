@@ -8,12 +8,9 @@
  * time. */
 #ifndef PAL_SESSION_SWITCHING_H
 #define PAL_SESSION_SWITCHING_H
-#include "server/sim/setting.h"
-#include "server/sim/transfer.h"
-#include "server/sim/world.h"
-
-/* most nodes of a mesh that is made while sessions run, for the sake of their memory */
-enum { PAL_SWITCH_NODES = 100000 };
+#include "server/sim/core/setting.h"
+#include "server/sim/transfer/transfer.h"
+#include "server/sim/world/world.h"
 
 typedef struct pal_switch pal_switch;
 /* what the carry saw, for people and tests */
@@ -25,14 +22,11 @@ typedef struct pal_switch_report {
                    * 1 over it: at its bound, the energy is off by more */
 } pal_switch_report;
 
-/* What pal_switch_prepare refuses before it makes anything: pal_setting_check, and a mesh of more than PAL_SWITCH_NODES
- * nodes (pal_setting_nodes). Who offers a setting asks this first. [any] */
-pal_err pal_switch_check(const pal_scene *scene, int body, const pal_setting *to, pal_note *note);
 /* The scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body). It is made
  * from `scene`, whose world runs, with the body as `base` has it: as it was before its first switch, with the cells and
  * voxels that it came with, so that every setting can be come back to; NULL: as scene has it. Materials and step are
- * those of scene. Borrows scene's and base's meshes, copies both. REFUSED as of pal_switch_check, which comes first,
- * and pal_setting_make and, besides, what it is already; BUDGET, MEMORY. [any] */
+ * those of scene. Borrows scene's and base's meshes, copies both. REFUSED as of pal_setting_check_live, which comes
+ * first, and pal_setting_make and, besides, what it is already; BUDGET, MEMORY. [any] */
 pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
                            pal_note *note, pal_switch **out);
 const pal_scene *pal_switch_scene(const pal_switch *change); /* lives as long as the switch */

@@ -1,7 +1,7 @@
 /* The reference beam as a subdivided solid: a crisp block, so that it stays a box of bricks at every level. */
 #ifndef TESTS_ACCURACY_SOLID_BEAM_H
 #define TESTS_ACCURACY_SOLID_BEAM_H
-#include "tests/sim/solid_scene.h"
+#include "tests/fixtures/solid_scene.h"
 
 typedef struct solid_beam {
     solid_scene s;

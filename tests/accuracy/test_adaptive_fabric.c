@@ -2,7 +2,7 @@
  * second. With the membrane law both move alike; with the paper's law (erratum C4) the refined one is too soft. And the
  * two halves of that statement on their own: how far a sheet is stretched by a force on its border, how deep it is
  * pressed. */
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 
 enum { STEPS_A_SECOND = 60, STEPS = 2 * STEPS_A_SECOND };
 

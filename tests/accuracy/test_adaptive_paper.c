@@ -2,7 +2,7 @@
  * Figs. 11 and 12 (coarse, wholly refined and adaptive bodies under the same press). The paper's constants and forces
  * are not given; ours stand below. The sphere and the stomach are ours (114 and 188 vertices, the paper's counts); the
  * stomach of ../shared/data runs as well where it is there. */
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 
 enum { STEPS_A_SECOND = 120, QUICK = 2 }; /* where curves are compared, QUICK times as many */
 

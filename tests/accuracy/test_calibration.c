@@ -5,8 +5,8 @@
  *
  * PALPATE_LONG=1: on the finer gear, against CalculiX as well, all fits until they converge. Else fewer voxels and
  * evaluations, which hold the same bounds. */
-#include "server/lab/calibrate.h"
-#include "server/mesh/mesh_file.h"
+#include "server/calibrate/calibrate.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "tests/check.h"
 #include "tests/stability/hard_case.h"

@@ -7,12 +7,12 @@
  * many voxels are cut (the gear) it is within a factor of 2 as well, from meshes of other sizes
  * (session/estimate_family.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer cube and a
  * finer gear too. */
-#include "server/lab/load_case.h"
-#include "server/lab/sample_points.h"
-#include "server/mesh/mesh_file.h"
+#include "server/estimate/estimate_work.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/num/shape.h"
 #include "server/scene/problem_file.h"
-#include "server/session/estimate_work.h"
+#include "server/solve/load_case.h"
+#include "server/solve/sample_points.h"
 #include "tests/check.h"
 
 typedef struct row {

@@ -5,9 +5,9 @@
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape.h"
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/sim/fem_beam.h"
+#include "tests/fixtures/fem_beam.h"
 #include "tests/stability/hard_case.h"
 
 static const char *const elements[4] = {"hex8_bbar", "hex8", "tet4", "tet10"};

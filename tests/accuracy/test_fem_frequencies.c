@@ -3,9 +3,9 @@
  * beam), Saint-Venant's torsion, stretching of a bar. */
 #include "server/base/vec3.h"
 #include "server/num/cholesky.h"
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/sim/fem_beam.h"
+#include "tests/fixtures/fem_beam.h"
 
 static const double young_Pa = 1e5;
 

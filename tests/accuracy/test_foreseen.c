@@ -4,12 +4,12 @@
  * Both are asked for within a factor of 2, of organs too, whose voxels are cut (session/estimate_family.h). With
  * PALPATE_LONG=1 in more and finer sizes (about a minute). */
 #include "server/base/vec3.h"
-#include "server/lab/load_case.h"
-#include "server/lab/study.h"
-#include "server/mesh/mesh_file.h"
+#include "server/estimate/estimate_work.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/scene/scene_file.h"
-#include "server/session/estimate_work.h"
+#include "server/solve/load_case.h"
+#include "server/study/study.h"
 #include "tests/check.h"
 
 enum { PROBES = 800 };

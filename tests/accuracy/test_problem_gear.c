@@ -1,8 +1,8 @@
 /* deploy/problems/gear.json is the gear of ../shared/reference/gear, drawn with triangles of its own: solved alike,
  * both surfaces move alike where the reference has its samples, and as far from the reference. */
-#include "server/lab/solve.h"
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
+#include "server/solve/solve.h"
 #include "tests/check.h"
 
 enum { RESOLUTION = 20 };

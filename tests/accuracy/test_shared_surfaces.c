@@ -1,6 +1,6 @@
 /* Every surface of ../shared/data becomes a sound tetrahedral mesh of the right volume at 30 and 60 voxels. */
-#include "server/mesh/mesh_file.h"
-#include "server/mesh/voxels.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/voxel/voxels.h"
 #include "tests/check.h"
 
 /* volumes of ../shared/data/README.md in cubic file units; 0: none stated, the surface is open or in pieces */

@@ -4,7 +4,7 @@
  * turn is within 1.5 % of CalculiX's quadratic elements under refinement: the end's mean deflection is 13.208 mm under
  * 100 Pa and 87.668 mm, 44 % of the length, under 800 Pa at nu 0.3; 12.979 mm and 86.527 mm at nu 0.45. */
 #include "tests/accuracy/solid_beam.h"
-#include "tests/sim/fem_beam.h"
+#include "tests/fixtures/fem_beam.h"
 
 enum { SMALL, LARGE, POLAR = 0, EDGES };
 static const double load_Pa[2] = {100, 800}, poisson[2] = {0.3, 0.45},

@@ -1,8 +1,8 @@
 /* What paper B's springs with constants derived from E and nu (spring_law.h) give against analytic bars and the
  * CalculiX cantilever of ../shared/reference/beam. Static answers are the rest states of damped motion. */
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/sim/boxes.h"
+#include "tests/fixtures/boxes.h"
 
 static bool without_area; /* tests run with and without the row face_area */
 

@@ -1,7 +1,7 @@
 /* Paper B, Table 1: tetrahedra from the bunny, the happy Buddha and the dragon at 75, 135 and 165 voxels on the longest
  * axis. Counted as ../shared/data/README.md does: the largest face-connected set of inside voxels and its border. */
-#include "server/mesh/mesh_file.h"
-#include "server/mesh/voxels.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/voxel/voxels.h"
 #include "tests/check.h"
 
 static const int RESOLUTION[4] = {30, 75, 135, 165};

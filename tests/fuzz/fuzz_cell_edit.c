@@ -1,8 +1,8 @@
 /* Sculpting edits from any bytes: the first chooses a solid, then 8 bytes a command. What is taken must be whole, be
  * placed by its rows, and leave the old complex as it was; what is refused must leave nothing. */
-#include "server/mesh/cell_edits.h"
-#include "server/mesh/cell_shapes.h"
-#include "server/mesh/maccracken_joy.h"
+#include "server/mesh/cells/cell_edits.h"
+#include "server/mesh/cells/cell_shapes.h"
+#include "server/mesh/cells/maccracken_joy.h"
 
 #include <math.h>
 #include <stdint.h>

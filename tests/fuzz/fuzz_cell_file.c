@@ -1,5 +1,5 @@
 /* Cell files from any bytes, ours and VTK. What is taken must be whole, and come back from its own text to the bit. */
-#include "server/mesh/cell_file.h"
+#include "server/mesh/cells/cell_file.h"
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* The label volume readers on any bytes, and the surface of the largest label of small volumes. */
-#include "server/mesh/label_volume.h"
+#include "server/mesh/scan/label_volume.h"
 
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 /* The surface readers on any bytes: the first byte of the input chooses the name, and with it the reader of last
  * resort; the rest is the file. */
-#include "server/mesh/mesh_file.h"
+#include "server/mesh/files/mesh_file.h"
 
 #include <stdint.h>
 

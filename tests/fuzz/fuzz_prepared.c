@@ -1,7 +1,7 @@
 /* Prepared meshes from any bytes. The checksum is set right first, so that the checks behind it are reached. What is
  * taken is used: the skin on its tetrahedra, the surface to make levels of. */
-#include "server/mesh/levels.h"
-#include "server/mesh/prepared.h"
+#include "server/mesh/geometry/levels.h"
+#include "server/mesh/volume/prepared.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Sample files from untrusted bytes: what is taken is finite and all of it is there. */
-#include "server/lab/sample_points.h"
+#include "server/solve/sample_points.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Kept studies from untrusted bytes: what is taken has its numbers in their ranges and can be listed and kept again. */
-#include "server/commands/study_store.h"
+#include "server/study/study_store.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -1,6 +1,6 @@
 /* The journal of a calibration: what is put in is found again, to the bit and by the next process; torn ends are cut,
  * damage is named. */
-#include "server/commands/calibrate_journal.h"
+#include "server/calibrate/calibrate_journal.h"
 
 #include "server/num/random.h"
 #include "tests/check.h"

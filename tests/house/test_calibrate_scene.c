@@ -1,8 +1,8 @@
 /* The scene that palpate calibrate writes, read again as serve reads it, comes to rest where the search said: file,
  * mesh, supports, weights and constants are those that were fitted. */
-#include "server/commands/calibrate_cases.h"
+#include "server/calibrate/calibrate_cases.h"
+#include "server/calibrate/settle.h"
 #include "server/commands/commands.h"
-#include "server/lab/settle.h"
 #include "server/scene/scene_file.h"
 #include "tests/check.h"
 

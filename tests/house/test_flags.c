@@ -1,6 +1,6 @@
 /* Flags and configuration: what each source may say, which one wins, and what is refused with which words. */
-#include "server/commands/flags.h"
-#include "server/config.h"
+#include "server/cli/config.h"
+#include "server/cli/flags.h"
 #include "tests/check.h"
 
 #include <fcntl.h>

@@ -12,25 +12,29 @@ verdict() { # NAME WANTED GOT
         echo "FAIL $1 (exit $3, wanted $2)"
     fi
 }
-plant() { # NAME FILE TEXT: a clean little tree with one planted file must be refused
+plant() { # NAME FILE TEXT [EXIT [FILE TEXT]]: a clean little tree with what is planted must be refused
     tree=$(mktemp -d)
-    mkdir -p "$tree/server/base" "$tree/server/sim/effects" "$tree/server/mesh" "$tree/protocol" "$tree/clients/trainee"
-    echo '#include "server/base/err.h"' >"$tree/server/mesh/clean.c"
+    mkdir -p "$tree/server/base" "$tree/server/sim/core" "$tree/server/sim/effects" "$tree/server/mesh/geometry" "$tree/protocol" "$tree/clients/trainee"
+    echo '#include "server/base/err.h"' >"$tree/server/mesh/geometry/clean.c"
     if [ -n "$2" ]; then printf '%s\n' "$3" >"$tree/$2"; fi
-    sh "$here/check_floors.sh" "$tree" >/dev/null 2>&1
+    if [ -n "${5-}" ]; then printf '%s\n' "$6" >"$tree/$5"; fi
+    node "$here/check_floors.mjs" --rings "$tree" >/dev/null 2>&1
     code=$?
     rm -rf "$tree"
     verdict "$1" "${4:-1}" "$code"
 }
-sh "$here/check_floors.sh" >/dev/null
+node "$here/check_floors.mjs" >/dev/null
 verdict "the tree keeps its floors" 0 $?
 plant "a clean tree passes" "" "" 0
-plant "finds an upward include" server/base/up.c '#include "server/mesh/surface.h"'
+plant "finds an upward include" server/base/up.c '#include "server/mesh/geometry/surface.h"'
 plant "finds a sideways include" protocol/side.c '#include "server/base/err.h"'
-plant "finds a client that sees the server" clients/trainee/peek.c '#include "server/sim/world.h"'
-plant "finds an effect that sees the world" server/sim/effects/big.c '#include "server/sim/world.h"'
-plant "finds threads in sim" server/sim/threads.c '#include <pthread.h>'
+plant "finds a client that sees the server" clients/trainee/peek.c '#include "server/sim/world/world.h"'
+plant "finds an effect that sees the world" server/sim/effects/big.c '#include "server/sim/world/world.h"'
+plant "finds threads in sim" server/sim/core/threads.c '#include <pthread.h>'
+plant "finds a room without a floor" server/sim/loose.c '#include "server/base/err.h"'
+plant "finds a ring" server/sim/core/a.h '#include "server/sim/core/b.h"' 1 server/sim/core/b.h '#include "server/sim/core/a.h"'
+plant "finds a header of parts" server/sim/core/a_parts.h '#include "server/base/err.h"'
 plant "finds a foreign top-level entry" notes.txt 'notes'
-plant "finds a name that stands twice" server/sim/clean.c '#include "server/base/err.h"'
+plant "finds a name that stands twice" server/sim/core/clean.c '#include "server/base/err.h"'
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]

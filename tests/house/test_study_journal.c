@@ -1,6 +1,6 @@
 /* The journal of a study's reference: what was kept comes back with its bits, a file that ends anywhere or was touched
  * anywhere gives what stands whole before that place and goes on there, one of something else is begun anew. */
-#include "server/commands/study_journal.h"
+#include "server/study/study_journal.h"
 #include "tests/check.h"
 
 #include <unistd.h>

@@ -1,8 +1,8 @@
 /* Studies kept in files: every number comes back with its bits, what is not one is refused by its place, and what a
  * study is of changes with the body and not with its setting. */
-#include "server/commands/studied_scene.h"
-#include "server/commands/study_store.h"
-#include "server/mesh/prepared.h"
+#include "server/mesh/volume/prepared.h"
+#include "server/study/studied_scene.h"
+#include "server/study/study_store.h"
 #include "tests/check.h"
 
 #include <stdint.h>

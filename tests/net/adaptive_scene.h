@@ -3,8 +3,8 @@
  * so that its triangles change all the time. Without weight it begins fine and is joined where it stands. */
 #ifndef TESTS_NET_ADAPTIVE_SCENE_H
 #define TESTS_NET_ADAPTIVE_SCENE_H
-#include "server/mesh/stomach.h"
-#include "server/sim/def.h"
+#include "server/mesh/geometry/stomach.h"
+#include "server/sim/core/def.h"
 #include "tests/check.h"
 
 enum {

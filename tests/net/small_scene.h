@@ -1,8 +1,8 @@
 /* A small organ of our own as a scene, built in the test: no files needed. */
 #ifndef TESTS_NET_SMALL_SCENE_H
 #define TESTS_NET_SMALL_SCENE_H
-#include "server/mesh/organ.h"
-#include "server/sim/def.h"
+#include "server/mesh/geometry/organ.h"
+#include "server/sim/core/def.h"
 #include "tests/check.h"
 
 typedef struct small_scene {

@@ -1,5 +1,5 @@
 /* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
-#include "server/session/estimate.h"
+#include "server/estimate/estimate.h"
 #include "tests/net/served.h"
 #include "tests/net/small_scene.h"
 

@@ -1,5 +1,5 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
-#include "server/session/estimate.h"
+#include "server/estimate/estimate.h"
 #include "tests/net/served.h"
 #include "tests/net/small_scene.h"
 

@@ -2,7 +2,7 @@
  * study and along its knobs, the energy within 2 %, no shown vertex farther in all than the errors that were shown of
  * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
  * made beside the loop, not by it. */
-#include "server/session/estimate_work.h"
+#include "server/estimate/estimate_work.h"
 #include "server/session/switching.h"
 #include "tests/net/order_room.h"
 #include "tests/session/small_scene.h"

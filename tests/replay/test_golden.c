@@ -1,9 +1,9 @@
 /* Golden hashes of four scenes: the same bits from every compiler, optimization level and thread count on IEEE
  * doubles. A change of a hash means that the answer of a step has changed: say why in the commit that changes it. */
-#include "server/sim/world.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/sim/boxes.h"
-#include "tests/sim/shells.h"
+#include "tests/fixtures/boxes.h"
+#include "tests/fixtures/shells.h"
 
 static pal_note note;
 

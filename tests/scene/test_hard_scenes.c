@@ -3,8 +3,8 @@
  */
 #include "server/base/vec3.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/shell.h"
-#include "server/sim/world.h"
+#include "server/sim/surface/shell.h"
+#include "server/sim/world/world.h"
 #include "tests/stability/hard_case.h"
 
 typedef struct hard_scene {

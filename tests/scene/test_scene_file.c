@@ -1,7 +1,7 @@
 /* Scene files: every fault has its one sentence that names file and entry; what is saved loads to the same world. */
 #include "server/scene/scene_file.h"
-#include "server/sim/effect.h"
-#include "server/sim/world.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/session/small_scene.h"
 

@@ -1,9 +1,9 @@
 /* Scenes of model adaptive_springs: surfaces as they are, shapes, supports on open edges, what is refused; what is
  * saved loads to the same. */
-#include "server/mesh/stomach.h"
+#include "server/mesh/geometry/stomach.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/shell.h"
-#include "server/sim/world.h"
+#include "server/sim/surface/shell.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
 
 #include <sys/stat.h>

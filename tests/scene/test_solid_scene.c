@@ -1,11 +1,11 @@
 /* Scenes of control cells: where they stand, what is painted on them, what is refused; what is saved loads to the same
  * bits. */
-#include "server/mesh/cell_file.h"
-#include "server/mesh/cell_models.h"
+#include "server/mesh/cells/cell_file.h"
+#include "server/mesh/cells/cell_models.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/solid.h"
-#include "server/sim/world.h"
-#include "tests/mesh/solids.h"
+#include "server/sim/subdivision/solid.h"
+#include "server/sim/world/world.h"
+#include "tests/fixtures/solids.h"
 
 #include <sys/stat.h>
 

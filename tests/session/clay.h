@@ -1,8 +1,8 @@
 /* A solid of control cells as a scene, for the tests of sculpting. */
 #ifndef TESTS_SESSION_CLAY_H
 #define TESTS_SESSION_CLAY_H
-#include "server/mesh/cell_shapes.h"
-#include "server/sim/def.h"
+#include "server/mesh/cells/cell_shapes.h"
+#include "server/sim/core/def.h"
 #include "tests/check.h"
 
 typedef struct clay_scene {

@@ -1,7 +1,7 @@
 /* A small ball of tissue for the tests of this room and of scene: built in the test, no files. */
 #ifndef TESTS_SESSION_SMALL_SCENE_H
 #define TESTS_SESSION_SMALL_SCENE_H
-#include "server/sim/def.h"
+#include "server/sim/core/def.h"
 
 #include <math.h>
 #include <stdio.h>

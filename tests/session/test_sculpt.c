@@ -2,7 +2,7 @@
  * every bit; and thousands of commands one after the other leave a solid that can be simulated. */
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
-#include "server/sim/solid.h"
+#include "server/sim/subdivision/solid.h"
 #include "tests/session/clay.h"
 
 static clay_scene clay;

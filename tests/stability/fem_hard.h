@@ -3,8 +3,8 @@
 #ifndef TESTS_STABILITY_FEM_HARD_H
 #define TESTS_STABILITY_FEM_HARD_H
 #include "server/base/vec3.h"
-#include "server/sim/elastic_hex.h"
-#include "tests/sim/fem_beam.h"
+#include "server/sim/elements/elastic_hex.h"
+#include "tests/fixtures/fem_beam.h"
 
 typedef struct hard_kind {
     const char *element, *law, *shown;

@@ -4,11 +4,11 @@
 #ifndef TESTS_STABILITY_FOUR_MODELS_H
 #define TESTS_STABILITY_FOUR_MODELS_H
 #include "server/base/vec3.h"
-#include "server/mesh/cell_shapes.h"
-#include "server/mesh/stomach.h"
-#include "server/sim/shell.h"
-#include "server/sim/world.h"
-#include "tests/sim/boxes.h"
+#include "server/mesh/cells/cell_shapes.h"
+#include "server/mesh/geometry/stomach.h"
+#include "server/sim/surface/shell.h"
+#include "server/sim/world/world.h"
+#include "tests/fixtures/boxes.h"
 #include "tests/stability/hard_case.h"
 
 enum { FOUR_SPRINGS, FOUR_ADAPTIVE, FOUR_FEM, FOUR_SOLID, FOUR_MODELS };

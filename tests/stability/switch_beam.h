@@ -2,11 +2,11 @@
 #ifndef TESTS_STABILITY_SWITCH_BEAM_H
 #define TESTS_STABILITY_SWITCH_BEAM_H
 #include "server/base/vec3.h"
-#include "server/mesh/cell_shapes.h"
-#include "server/sim/setting.h"
-#include "server/sim/transfer.h"
+#include "server/mesh/cells/cell_shapes.h"
+#include "server/sim/core/setting.h"
+#include "server/sim/transfer/transfer.h"
 #include "tests/check.h"
-#include "tests/sim/boxes.h"
+#include "tests/fixtures/boxes.h"
 
 #include <math.h>
 

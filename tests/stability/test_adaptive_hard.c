@@ -1,7 +1,7 @@
 /* Hard cases of numerics.md part 3 for adaptive surface springs and their refinement: whatever is done to a surface,
  * its state stays finite, its energy does not grow, its mass stays, and with anchors it comes back. Bodies run coarse,
  * refined and adapting: refinement must not make any of it worse. */
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 #include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60 };

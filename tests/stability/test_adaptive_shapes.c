@@ -1,6 +1,6 @@
 /* Odd surfaces as adaptive springs: whatever can be split bears being pressed, pulled, blown about, reset and run again
  * on changing levels, on both laws of stiffness and of mass; two such bodies do not see each other. */
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 #include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60, MOST = 64 };

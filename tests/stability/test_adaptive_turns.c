@@ -1,6 +1,6 @@
 /* Hard cases of numerics.md part 3 for adaptive surface springs that last: rigid turns up to ten thousand of them, an
  * hour at rest under a load, supports put on and taken off while the body is bent. */
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 #include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60 };

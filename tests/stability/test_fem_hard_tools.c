@@ -1,6 +1,6 @@
 /* Hard cases of numerics.md part 3 for model fem: tools that jump, appear inside, press against one another, and poses
  * and loads that are no numbers. */
-#include "tests/sim/fem_tools.h"
+#include "tests/fixtures/fem_tools.h"
 #include "tests/stability/fem_hard.h"
 #include "tests/stability/hard_case.h"
 

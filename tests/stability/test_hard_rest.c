@@ -1,7 +1,7 @@
 /* Hard cases of numerics.md part 3 that are missing from the tests of single models: inner forces of all four, springs
  * that turn, fly and lose their edges, surfaces in syrup, pieces of which one is held, and why some cases cannot be put
  * to some models. */
-#include "server/mesh/cell_edits.h"
+#include "server/mesh/cells/cell_edits.h"
 #include "server/num/polar.h"
 #include "tests/stability/four_models.h"
 #include "tests/stability/hard_case.h"

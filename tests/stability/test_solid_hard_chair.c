@@ -1,7 +1,7 @@
 /* Hard cases of numerics.md part 3 for model subdivision_fem: the demo chair, thin cells of which none is cubic, three
  * in ten elements pyramids, 16 sub-steps in a step of central_cg. On one point, mirrored, shuffled, drawn out
  * eightfold: elements with one rotation each rested folded there (cell_tangle.h). */
-#include "server/mesh/cell_models.h"
+#include "server/mesh/cells/cell_models.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/solid_hard.h"
 

@@ -1,7 +1,7 @@
 /* Hard cases of numerics.md part 3 for model subdivision_fem: insults from outside. A meganewton, resting for long,
  * tools that jump and appear inside, numbers that are none, elements deleted; and Fig. 10 of paper A, where the same
  * force moves what is painted heavy otherwise. */
-#include "server/mesh/cell_edits.h"
+#include "server/mesh/cells/cell_edits.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/solid_hard.h"
 

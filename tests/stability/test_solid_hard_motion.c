@@ -47,7 +47,7 @@ static double ripple(int n_level, int n_step)
         /* U where the body is, v before it; v after it comes with the next step */
         const double rest = pal_world_energy_J(s.world) - pal_body_kinetic_J(s.body);
         double kinetic = 0;
-        pal_solid_mass_multiply(s.body->solid_mass, s.body->v, momentum);
+        pal_mass_operator_multiply(s.body->mass_operator, s.body->v, momentum);
         CHECK(solid_scene_step(&s, 1, dt_s) && pal_world_substeps(s.world) == 1);
         for (int k = 0; k < n3; k++) kinetic += 0.5 * momentum[k] * s.body->v[k];
         /* the first step is half of one, from standing still: it has no v before */

@@ -1,6 +1,6 @@
 /* Hard cases of numerics.md part 3 for model subdivision_fem: numbers. Poisson's ratio close to a half, stiffness of
  * very different sizes side by side, steps that are too long, lengths and moduli of any size, one element, all held. */
-#include "tests/sim/fem_beam.h"
+#include "tests/fixtures/fem_beam.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/solid_hard.h"
 

@@ -1,10 +1,10 @@
 /* Hard cases of numerics.md part 3 for the explicit springs: whatever happens to a body or is asked of it, its state
  * stays finite, its energy does not rise, and it comes back where the springs determine the way. */
 #include "server/base/vec3.h"
-#include "server/sim/best_turn.h"
-#include "server/sim/world.h"
+#include "server/sim/core/best_turn.h"
+#include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/sim/boxes.h"
+#include "tests/fixtures/boxes.h"
 #include "tests/stability/hard_case.h"
 
 static pal_note note;

@@ -2,7 +2,7 @@
  * it: nothing of it is left, and the mesh is the coarse one again before the body sleeps. Tools pull with 15 N at most
  * and go on where tissue does not follow. */
 #include "server/num/random.h"
-#include "tests/sim/shells.h"
+#include "tests/fixtures/shells.h"
 
 enum { PULLS = 16 };
 /* pulls after which all stands still before the last faces may be joined */

@@ -5,7 +5,7 @@
  * times its area at rest at most: what grows with what it blows up would have no rest from about E/3 on. A pressure
  * that follows normals has no energy, and its stiffness, which is not symmetric, is left out of the tangent. CURVE: f_i
  * = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
-#include "server/sim/brush.h"
+#include "server/sim/core/brush.h"
 
 #include "server/base/vec3.h"
 

@@ -10,10 +10,10 @@
  * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
  * of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
-#include "server/sim/brake.h"
-#include "server/sim/cell_kernel.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/elastic_law.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/elements/elastic_law.h"
+#include "server/sim/recovery/brake.h"
+#include "server/sim/subdivision/cell_kernel.h"
 
 #include <math.h>
 #include <string.h>

@@ -4,8 +4,8 @@
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
  * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
  * are turned over its edges keep vectors (spring_tangle.h), whose forces and energy are this row's. */
-#include "server/sim/effect_list.h"
-#include "server/sim/spring_tangle.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/springs/spring_tangle.h"
 
 #include <stdlib.h>
 

@@ -11,9 +11,9 @@
  * The springs in use are taken from the shell whenever its revision is a new one. Their ends stand in body->pack, in
  * the order of shell->node: place and velocity of an end are one load, and a force is one load and one store. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/pack.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/pack.h"
+#include "server/sim/surface/shell.h"
 
 #include <math.h>
 

@@ -3,8 +3,8 @@
  *
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
  * momentum). Below 1e-12 of its rest area a triangle has no normal and its force fades to nothing. */
-#include "server/sim/effect_list.h"
-#include "server/sim/spring_tangle.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/springs/spring_tangle.h"
 
 #include <stdlib.h>
 

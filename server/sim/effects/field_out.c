@@ -12,7 +12,7 @@
  *
  * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10): so often
  * in simulated time it is taken anew. */
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 #include <math.h>
 #include <string.h>

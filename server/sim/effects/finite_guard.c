@@ -9,9 +9,9 @@
  * Of a body that adapts (sim/shell.h) the active points are looked at and copied. Which are active is not taken back:
  * one that came into use since the last good state is put between the ends of its edge. */
 #include "server/base/vec3.h"
-#include "server/sim/effect.h"
-#include "server/sim/shell.h"
-#include "server/sim/sums.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/core/sums.h"
+#include "server/sim/surface/shell.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* Row gravity: f = -m g up, energy m g (up . x). Key: acceleration_m_s2 (the scene's gravity_m_s2). */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 typedef struct gravity {
     double g[3]; /* m/s^2 */

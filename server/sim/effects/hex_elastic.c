@@ -8,8 +8,8 @@
  * The tangent is taken at linearise, and with it the decision on untangling; without an implicit solver the decision is
  * taken whenever forces are. */
 #include "server/base/clock.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/elastic_hex.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/elements/elastic_hex.h"
 
 #include <string.h>
 

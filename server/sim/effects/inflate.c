@@ -16,8 +16,8 @@
  * Pieces that do not hang together share one volume. A surface whose faces look inwards is turned.
  * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/shell.h"
 
 #include <string.h>
 

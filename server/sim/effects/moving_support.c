@@ -9,7 +9,7 @@
  * Keys: low_m and high_m (a box, body frame) or lowest (0.05: share of the body's height along `up`), shift_m (0 0 0),
  * turn_axis (0 0 1), turn_deg (0), rise_s (0), period_s (0: goes and stays). */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 typedef struct moving_support {
     int n_node;

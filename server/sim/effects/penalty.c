@@ -10,7 +10,7 @@
  * Keys: low_m and high_m (a box, body frame) or lowest (0.05: share of the body's height along `up`), k_N_m (100 E S, S
  * the body's size). What is not given follows a live material edit. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 typedef struct penalty {
     int n_node;

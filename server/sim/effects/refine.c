@@ -27,8 +27,8 @@
  * (1/120), most_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/refine_measure.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/refine_measure.h"
 
 #include <limits.h>
 #include <string.h>

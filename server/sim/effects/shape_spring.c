@@ -15,9 +15,9 @@
  * Keys: k_N_m (0.3 k_0, k_0 the model's constant of springs), c_Ns_m (0.6 sqrt(k' m_0): damping ratio 0.3), frame
  * (as the model has it). What is not given follows a live material edit. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/pack.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/pack.h"
+#include "server/sim/surface/shell.h"
 
 #include <string.h>
 

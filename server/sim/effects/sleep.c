@@ -18,8 +18,8 @@
  *
  * Keys: still_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
-#include "server/sim/effect.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/surface/shell.h"
 
 #include <math.h>
 #include <string.h>

@@ -4,8 +4,8 @@
  * A body that adapts (sim/shell.h) shows all its points, those out of use where they are at rest, and the triangles of
  * its present leaves; a step costs what its active points do. Of a solid (sim/solid.h) the model has said what is its
  * boundary and which node each vertex is. */
-#include "server/sim/effect.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/surface/shell.h"
 
 #include <string.h>
 

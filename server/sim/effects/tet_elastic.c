@@ -16,9 +16,9 @@
  * (elastic_tet.h). */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/elastic_tet.h"
-#include "server/sim/kept.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/core/kept.h"
+#include "server/sim/elements/elastic_tet.h"
 
 #include <string.h>
 

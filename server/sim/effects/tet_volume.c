@@ -5,8 +5,8 @@
  * the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is left out, and so is a sliver, of less than 0.01 of
  * the volume that a regular one has with its edges: it would set the sub-step of the whole body for a volume that is
  * none, and turn over at any touch. Their edges stay; a preflight counts and names them. */
-#include "server/sim/effect_list.h"
-#include "server/sim/spring_tangle.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/springs/spring_tangle.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -33,11 +33,11 @@
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
-#include "server/sim/effect.h"
-#include "server/sim/handed.h"
-#include "server/sim/patch.h"
-#include "server/sim/shell_grip.h"
-#include "server/sim/touch.h"
+#include "server/sim/contact/handed.h"
+#include "server/sim/contact/patch.h"
+#include "server/sim/contact/touch.h"
+#include "server/sim/core/effect.h"
+#include "server/sim/surface/shell_grip.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -34,7 +34,7 @@
  * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
-#include "server/sim/holder.h"
+#include "server/sim/contact/holder.h"
 
 #include <math.h>
 #include <string.h>

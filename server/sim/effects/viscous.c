@@ -2,7 +2,7 @@
  *
  * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead, which
  * no rate can upset (numerics.md 1 B). */
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 typedef struct viscous {
     double rate_1_s;

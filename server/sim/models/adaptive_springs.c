@@ -14,8 +14,8 @@
  * Departure: the paper gives spring constants as numbers. A triangular lattice of springs k has Young's modulus 2 k /
  * sqrt(3) in its plane (per length, Poisson ratio 1/3), so that a sheet of that thickness stretches as its material. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/shell.h"
 
 #include <string.h>
 

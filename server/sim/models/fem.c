@@ -12,7 +12,7 @@
  * that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
 #include "server/base/vec3.h"
 #include "server/num/shape.h"
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 #include <stdlib.h>
 #include <string.h>

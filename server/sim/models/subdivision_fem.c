@@ -12,9 +12,9 @@
  * row cell_elastic), memory_MB (512; of the solid).
  * Rows: cell_elastic, viscous where the material has damping, solver central_cg. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/solid.h"
-#include "server/sim/solid_mass.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/subdivision/solid.h"
+#include "server/sim/subdivision/solid_mass.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -176,9 +176,9 @@ static pal_err make_body(const pal_item *item, pal_build *build)
     const pal_solid *solid = body->solid;
     PAL_TRY(pal_body_allocate_embedded(body, build->arena, &solid->rows));
     body->node_ease_1_kg = PAL_NEW(build->arena, double, body->n_node);
-    body->solid_mass = PAL_NEW(build->arena, pal_solid_mass, 1);
-    if (!body->node_ease_1_kg || !body->solid_mass) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_solid_mass_make(solid, build->arena, body->solid_mass));
+    body->mass_operator = PAL_NEW(build->arena, pal_mass_operator, 1);
+    if (!body->node_ease_1_kg || !body->mass_operator) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_solid_mass_make(solid, build->arena, body->mass_operator));
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     memcpy(body->x_rest, build->def->cells->x, n_byte);
     memcpy(body->x, body->x_rest, n_byte);

@@ -16,8 +16,8 @@
  * edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous` exists when the
  * material's damping rate is given. */
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/spring_tangle.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/springs/spring_tangle.h"
 
 #include <math.h>
 #include <string.h>

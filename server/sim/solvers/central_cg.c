@@ -31,14 +31,14 @@
 #include "server/num/conjugate.h"
 #include "server/num/envelope.h"
 #include "server/num/lanczos.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/solid_mass.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/subdivision/solid_mass.h"
 
 #include <string.h>
 
 typedef struct central {
     const pal_solid *solid;
-    const pal_solid_mass *mass;
+    const pal_mass_operator *mass;
     double safety, tolerance;
     double dt_s; /* of the sub-step before; 0: none, v is that at p */
     pal_conjugate cg;
@@ -130,12 +130,12 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!factor && strcmp(preconditioner, "diagonal"))
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
                             item->path, preconditioner);
-    if (!body->solid || !body->solid_mass)
+    if (!body->solid || !body->mass_operator)
         return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
                             item->path, item->name);
     central *row = PAL_NEW(build->arena, central, 1);
     if (!row) return PAL_ERR_MEMORY;
-    row->solid = body->solid, row->mass = body->solid_mass;
+    row->solid = body->solid, row->mass = body->mass_operator;
     row->n_unseen = UNSEEN;
     row->safety = safety, row->tolerance = tolerance, row->wild = 1;
     row->cell_m = cbrt(pal_solid_volume_m3(body->solid) / build->def->cells->n_cell);
@@ -154,7 +154,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 static void multiply(void *user, const double *p, double *out)
 {
     const central *row = user;
-    const pal_solid_mass *m = row->mass;
+    const pal_mass_operator *m = row->mass;
     for (int i = 0; i < m->n_point; i++) {
         double x = 0, y = 0, z = 0, *to = out + 3 * (size_t)i;
         for (int32_t k = m->start[i]; k < m->start[i + 1] && !row->fixed[i]; k++) {
@@ -180,7 +180,7 @@ static void precondition(void *user, const double *r, double *out)
 /* the preconditioner again when masses or supports are others. True: it was */
 static bool renew(central *row, const pal_body *body)
 {
-    const pal_solid_mass *m = row->mass;
+    const pal_mass_operator *m = row->mass;
     if (row->sampled == row->solid->sampled && !memcmp(row->fixed, body->held, (size_t)body->n_dof)) return false;
     row->sampled = row->solid->sampled;
     memcpy(row->fixed, body->held, (size_t)body->n_dof);

@@ -3,8 +3,8 @@
  *
  * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
  * refresh (true), warp (true), watch (true); see implicit.h. */
-#include "server/sim/effect_list.h"
-#include "server/sim/implicit.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/implicit/implicit.h"
 
 #include <string.h>
 

@@ -19,9 +19,9 @@
  * taken, rows look for what is turned over, and in every step while something is. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/pack.h"
-#include "server/sim/shell.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/surface/pack.h"
+#include "server/sim/surface/shell.h"
 
 #include <string.h>
 

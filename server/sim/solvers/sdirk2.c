@@ -11,8 +11,8 @@
  * gained energy in spite of all iterations the body goes on by backward Euler until half a second of peace.
  *
  * Keys: as implicit_euler. */
-#include "server/sim/effect_list.h"
-#include "server/sim/implicit.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/implicit/implicit.h"
 
 #include <string.h>
 

@@ -38,10 +38,10 @@
 #include "server/base/vec3.h"
 #include "server/num/conjugate.h"
 #include "server/num/incomplete.h"
-#include "server/sim/compliance.h"
-#include "server/sim/effect_list.h"
-#include "server/sim/relief.h"
-#include "server/sim/solid.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/implicit/compliance.h"
+#include "server/sim/implicit/relief.h"
+#include "server/sim/subdivision/solid.h"
 
 #include <limits.h>
 #include <string.h>

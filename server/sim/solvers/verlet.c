@@ -11,7 +11,7 @@
  * every step while something is. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/effect_list.h"
+#include "server/sim/core/effect_list.h"
 
 #include <string.h>
 

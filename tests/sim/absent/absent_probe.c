@@ -1,5 +1,5 @@
 /* Is the code of one effect in this program? A weak reference takes nothing out of a library. ABSENT: its name. */
-#include "server/sim/effect.h"
+#include "server/sim/core/effect.h"
 
 #define JOIN(a, b) a##b
 #define EFFECT(x)  JOIN(pal_effect_, x)

@@ -4,10 +4,10 @@
  * well not exist. With `--time N` it says instead what a step of each takes, the least of N medians of 40 steps, in
  * microseconds of processor time (tests/bench/absent.sh compares those). */
 #include "server/base/clock.h"
-#include "server/mesh/prepared.h"
-#include "server/sim/effect_list.h"
+#include "server/mesh/volume/prepared.h"
+#include "server/sim/core/effect_list.h"
+#include "tests/fixtures/model_scenes.h"
 #include "tests/heap_calls.h"
-#include "tests/sim/model_scenes.h"
 
 /* of the table that this program is linked with (absent_probe.c): is the effect's own code there? */
 const char *absent_effect(bool *linked);

@@ -1,0 +1,190 @@
+/* Calibration by gradient: L-BFGS in a box (Nocedal 1980; Luksan's code in NLopt) on theta, with the adjoint's slope.
+ *
+ * A point that comes to no stable rest has no value and no slope. The line search is given a wall instead: the last
+ * good objective plus a parabola around the last good point, whose slope leads back there; it then shortens its step.
+ */
+#include "server/calibrate/calibrate_parts.h"
+
+#include "server/base/clock.h"
+
+#include <float.h>
+#include <math.h>
+#include <nlopt.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_EVALUATION = 1000, MEMORY_PAIRS = 30, MOST_ROUND = 4, FEW_PARAMETERS = 16 };
+
+typedef struct fit {
+    const pal_calibration *c;
+    const pal_fit_options *o;
+    pal_calibration_seat *seat;
+    pal_fit_result *out;
+    double begin_s;
+    double *best, *good, *slope; /* [n_parameter]: best so far; last point with a value, its slope    */
+    double best_objective, good_objective;
+    double best_percent;
+    int64_t most;
+    const char *ended; /* NULL: goes on */
+    pal_err err;
+    pal_note *note;
+    nlopt_opt opt;
+} fit;
+
+static void stop(fit *f, const char *why)
+{
+    if (!f->ended) f->ended = why;
+    if (f->opt) nlopt_force_stop(f->opt);
+}
+
+static void tell(fit *f, const double *theta, double error_percent, bool improved)
+{
+    const pal_fit_options *o = f->o;
+    pal_fit_step step = {.evaluation = f->out->n_evaluation - 1,
+                         .error_percent = error_percent,
+                         .best_percent = f->best_percent,
+                         .seconds = pal_clock_s() - f->begin_s,
+                         .theta = theta,
+                         .improved = improved};
+    if (o->step && !o->step(o->user, &step)) stop(f, "stopped");
+    if (o->budget_s > 0 && step.seconds >= o->budget_s) stop(f, "budget");
+    if (f->out->n_evaluation >= f->most) stop(f, "evaluations");
+    if (o->enough_percent > 0 && f->best_percent <= o->enough_percent) stop(f, "enough");
+}
+
+/* objective and slope at a point; DBL_MAX: none */
+static double evaluate(fit *f, const double *theta, double *slope)
+{
+    size_t n = sizeof(double) * (size_t)f->c->n_parameter;
+    pal_calibration_value v;
+    pal_err err = pal_calibration_evaluate(f->c, f->seat, theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_CONTINUE, &v,
+                                           slope, f->note);
+    f->out->n_evaluation++;
+    if (err == PAL_ERR_MEMORY) {
+        f->err = err;
+        stop(f, "stopped");
+        return DBL_MAX;
+    }
+    bool rests = !err && v.objective < DBL_MAX, improved = rests && v.objective < f->best_objective;
+    f->out->n_rejected += !rests;
+    if (improved) {
+        memcpy(f->best, theta, n);
+        f->best_objective = v.objective;
+        f->best_percent = v.error_percent;
+    }
+    tell(f, theta, rests ? v.error_percent : DBL_MAX, improved);
+    return rests ? v.objective : DBL_MAX;
+}
+
+/* what NLopt sees */
+static double see(unsigned n, const double *theta, double *slope, void *user)
+{
+    fit *f = user;
+    size_t n_byte = sizeof(double) * (size_t)n;
+    double *to = slope ? slope : f->slope;
+    if (f->ended) {
+        memset(to, 0, n_byte);
+        return f->good_objective;
+    }
+    double value = evaluate(f, theta, to);
+    if (value < DBL_MAX) {
+        memcpy(f->good, theta, n_byte);
+        f->good_objective = value;
+        return value;
+    }
+    double far = 0, steep = 10;
+    for (unsigned i = 0; i < n; i++) {
+        double d = theta[i] - f->good[i];
+        far += d * d;
+        to[i] = 2 * steep * d;
+    }
+    return f->good_objective + steep * (1 + far);
+}
+
+static pal_err search(fit *f, double *theta)
+{
+    const pal_calibration *c = f->c;
+    f->opt = nlopt_create(NLOPT_LD_LBFGS, (unsigned)c->n_parameter);
+    if (!f->opt) return PAL_ERR_MEMORY;
+    nlopt_set_min_objective(f->opt, see, f);
+    nlopt_set_lower_bounds(f->opt, c->low);
+    nlopt_set_upper_bounds(f->opt, c->high);
+    nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
+    /* of the logarithm: a few constants are followed to the end of their valley, many are not worth it */
+    nlopt_set_ftol_abs(f->opt, c->n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
+    double least;
+    nlopt_optimize(f->opt, theta, &least);
+    nlopt_destroy(f->opt);
+    f->opt = NULL;
+    return f->err;
+}
+
+static pal_err run(fit *f, double *theta)
+{
+    const pal_calibration *c = f->c;
+    size_t n = sizeof(double) * (size_t)c->n_parameter;
+    double start = evaluate(f, theta, f->slope);
+    f->out->start_percent = f->best_percent;
+    if (f->err) return f->err;
+    if (!(start < DBL_MAX))
+        return pal_note_set(f->note, PAL_ERR_NUMERIC,
+                            "the start has no stable rest under its loads, so there is no gradient to follow");
+    memcpy(f->good, theta, n);
+    f->good_objective = start;
+    /* a search may end early behind a wall: begun again at the best it forgets its curvatures */
+    for (int round = 0; round < MOST_ROUND && !f->ended; round++) {
+        double before = f->best_objective;
+        memcpy(theta, f->best, n);
+        memcpy(f->good, f->best, n);
+        f->good_objective = f->best_objective;
+        PAL_TRY(search(f, theta));
+        if (!(f->best_objective < before - 1e-2)) break;
+    }
+    return PAL_ERR_OK;
+}
+
+/* the value of the best, found anew; a mean of squares may fall where the mean of errors does not: never worse */
+static pal_err close_up(fit *f, const double *start, double *theta)
+{
+    const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
+    pal_fit_result *out = f->out;
+    if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
+    PAL_TRY(pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note));
+    if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
+    /* none, or another, worse one: the rest is only reached from its neighbours, a live body may not find it either */
+    memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
+    return pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note);
+}
+
+pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
+                        pal_fit_result *out, pal_note *note)
+{
+    const pal_calibration *c = calibration;
+    size_t n = (size_t)c->n_parameter;
+    *out = (pal_fit_result){.start_percent = DBL_MAX};
+    fit f = {.c = c,
+             .o = options,
+             .out = out,
+             .begin_s = pal_clock_s(),
+             .best_objective = DBL_MAX,
+             .best_percent = DBL_MAX,
+             .most = options->most_evaluation > 0 ? options->most_evaluation : MOST_EVALUATION,
+             .note = note};
+    f.best = calloc(4 * n, sizeof(double));
+    pal_err err = f.best ? pal_calibration_seat_create(c, &f.seat) : PAL_ERR_MEMORY;
+    if (err) {
+        free(f.best);
+        return pal_note_set(note, err, "no memory to calibrate %d constants", c->n_parameter);
+    }
+    f.good = f.best + n, f.slope = f.good + n;
+    double *start = f.slope + n;
+    for (size_t i = 0; i < n; i++) start[i] = theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
+    err = run(&f, theta);
+    if (f.best_objective < DBL_MAX) memcpy(theta, f.best, n * sizeof(double));
+    if (!err) err = close_up(&f, start, theta);
+    out->ended = f.ended ? f.ended : "converged";
+    out->seconds = pal_clock_s() - f.begin_s;
+    pal_calibration_seat_destroy(f.seat);
+    free(f.best);
+    return err;
+}

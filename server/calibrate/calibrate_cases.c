@@ -1,0 +1,290 @@
+/* Names of load cases and references -> cases with their truths. */
+#include "server/calibrate/calibrate_cases.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/scene/problem_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* points farther outside the surface's box, as a share of its diagonal, are of another body */
+static const double most_outside = 0.05;
+
+enum { ENOUGH_NODES = 700, FINEST = 64 };
+
+/* what every function of one reading shares */
+typedef struct job {
+    const pal_calibrate_wish *wish;
+    pal_calibrate_set *set;
+    const pal_problem_reference *reference[PAL_CALIBRATE_CASES]; /* of each case; NULL: none   */
+    bool named[PAL_CALIBRATE_CASES];                             /* it was named itself        */
+    pal_note *note;
+} job;
+
+static bool is(const char *word, const char *what)
+{
+    return word && !strcmp(word, what);
+}
+
+static pal_err no_case(const job *j, const char *flag, const char *id)
+{
+    char list[320] = "";
+    size_t n = 0;
+    const pal_problem *p = j->set->problem;
+    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
+        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
+                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
+    return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: %s: there is no load case or reference \"%.40s\"; known are %s",
+                        p->path, flag, id, list);
+}
+
+/* ---- which cases ---- */
+
+static pal_err add_case(job *j, const char *id, bool fit)
+{
+    pal_calibrate_set *s = j->set;
+    const pal_problem *p = s->problem;
+    const char *flag = fit ? "--case" : "--verify";
+    for (int k = 0; k < s->n; k++)
+        if (!strcmp(s->id[k], id))
+            return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: \"%s\" %s", flag, id,
+                                fit == s->list[k].fit ? "stands there twice"
+                                                      : "is fitted, so it can not verify what the fit did not see");
+    if (s->n == PAL_CALIBRATE_CASES)
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: \"%.40s\" is one too many, at most %d cases are taken", flag,
+                            id, PAL_CALIBRATE_CASES);
+    const pal_problem_reference *named = pal_problem_reference_find(p, id);
+    const pal_problem_case *load_case = pal_problem_case_find(p, named ? named->load_case : id);
+    if (!load_case || strlen(id) >= PAL_NAME) return no_case(j, flag, id);
+    if (named && j->wish->kinematics && named->finite != is(j->wish->kinematics, "finite"))
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag, id,
+                            named->finite ? "finite" : "linear", j->wish->kinematics);
+    snprintf(s->id[s->n], PAL_NAME, "%s", id);
+    j->reference[s->n] = named;
+    j->named[s->n] = named != NULL;
+    s->list[s->n++] = (pal_calibrate_case){
+        .load_case = load_case, .fit = fit, .linear = named ? !named->finite : is(j->wish->kinematics, "linear")};
+    return PAL_ERR_OK;
+}
+
+static pal_err add_list(job *j, const char *list, bool fit)
+{
+    char word[256];
+    while (list) {
+        const char *comma = strchr(list, ',');
+        int n = comma ? (int)(comma - list) : (int)strlen(list);
+        snprintf(word, sizeof word, "%.*s", n, list);
+        PAL_TRY(add_case(j, word, fit));
+        list = comma ? comma + 1 : NULL;
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- material ---- */
+
+static bool same(double a, double b)
+{
+    return fabs(a - b) <= 1e-9 * fabs(b);
+}
+
+/* E and nu that a case is of */
+static void material_of(const job *j, int index, double *young_Pa, double *poisson)
+{
+    const pal_problem_material *m = &j->set->problem->material[0];
+    const pal_problem_reference *r = j->named[index] ? j->reference[index] : NULL;
+    *young_Pa = r && !isnan(r->young_Pa) ? r->young_Pa : m->young_Pa;
+    *poisson = r && !isnan(r->poisson) ? r->poisson : m->poisson;
+}
+
+/* a reference may be of another material than the problem's: then that is the body's, in all of its cases */
+static pal_err settle_material(job *j)
+{
+    pal_calibrate_set *s = j->set;
+    double young, poisson, other_young, other_poisson;
+    material_of(j, 0, &young, &poisson);
+    for (int k = 1; k < s->n; k++) {
+        material_of(j, k, &other_young, &other_poisson);
+        if (same(other_young, young) && same(other_poisson, poisson)) continue;
+        return pal_note_set(j->note, PAL_ERR_REFUSED,
+                            "%s: \"%s\" is of E %g, nu %g and \"%s\" of E %g, nu %g: one body has one material",
+                            s->problem->path, s->id[0], young, poisson, s->id[k], other_young, other_poisson);
+    }
+    s->problem->material[0].young_Pa = young;
+    s->problem->material[0].poisson = poisson;
+    return PAL_ERR_OK;
+}
+
+/* ---- truths ---- */
+
+static bool answers(const job *j, int index, const pal_problem_reference *r)
+{
+    const pal_problem_material *m = &j->set->problem->material[0];
+    const pal_calibrate_case *c = &j->set->list[index];
+    if (strcmp(r->load_case, c->load_case->id) != 0) return false;
+    if (j->wish->kinematics && r->finite == c->linear) return false;
+    return (isnan(r->young_Pa) || same(r->young_Pa, m->young_Pa)) &&
+           (isnan(r->poisson) || same(r->poisson, m->poisson));
+}
+
+/* which reference, or finite elements, a case is compared with; finite ones before linear ones, neo-Hookean first */
+static pal_err choose_reference(job *j, int index)
+{
+    pal_calibrate_set *s = j->set;
+    pal_calibrate_case *c = &s->list[index];
+    const pal_problem *p = s->problem;
+    if (is(j->wish->truth, "fem")) j->reference[index] = NULL;
+    if (!is(j->wish->truth, "reference")) return PAL_ERR_OK;
+    for (int k = 0, best = 0; k < p->n_reference && !j->named[index]; k++) {
+        const pal_problem_reference *r = &p->reference[k];
+        int rank = !answers(j, index, r) ? 0 : !r->finite ? 1 : strcmp(r->law, "neo-hookean") ? 2 : 3;
+        if (rank > best) j->reference[index] = r;
+        best = rank > best ? rank : best;
+    }
+    const pal_problem_reference *r = j->reference[index];
+    if (!r)
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: --truth: no reference answers load case \"%s\"%s%s", p->path,
+                            s->id[index], j->wish->kinematics ? " with kinematics " : "",
+                            j->wish->kinematics ? j->wish->kinematics : "");
+    c->linear = !r->finite;
+    return PAL_ERR_OK;
+}
+
+static pal_err read_truth(job *j, int index, const char *path, const char *name)
+{
+    pal_calibrate_set *s = j->set;
+    PAL_TRY(pal_samples_read(path, &s->samples[index], j->note));
+    s->list[index].samples = &s->samples[index];
+    snprintf(s->truth_name[index], PAL_NAME, "%s", name);
+    s->list[index].truth_name = s->truth_name[index];
+    return PAL_ERR_OK;
+}
+
+static pal_err choose_truths(job *j)
+{
+    pal_calibrate_set *s = j->set;
+    const char *truth = j->wish->truth;
+    bool file = truth && !is(truth, "fem") && !is(truth, "reference");
+    int n_fit = 0;
+    for (int k = 0; k < s->n; k++) n_fit += s->list[k].fit;
+    if (file && n_fit != 1)
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "--truth: %.200s is one file, --case names %d cases", truth,
+                            n_fit);
+    for (int k = 0; k < s->n; k++) {
+        PAL_TRY(choose_reference(j, k));
+        const char *slash = file ? strrchr(truth, '/') : NULL;
+        if (file && s->list[k].fit)
+            PAL_TRY(read_truth(j, k, truth, slash ? slash + 1 : truth));
+        else if (j->reference[k])
+            PAL_TRY(read_truth(j, k, j->reference[k]->file, j->reference[k]->id));
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- the body ---- */
+
+/* points in the file's frame that are far outside of the surface's box */
+static pal_err check_box(const job *j, int index)
+{
+    const pal_calibrate_set *s = j->set;
+    const pal_samples *samples = &s->samples[index];
+    double low[3], high[3];
+    pal_surface_box(&s->surface, low, high);
+    double slack = most_outside * pal_dist3(low, high);
+    for (int i = 0; i < samples->n; i++) {
+        double x[3], out = 0;
+        pal_sub3(x, samples->x + 3 * i, s->surface.origin_m);
+        for (int c = 0; c < 3; c++) out = fmax(out, fmax(low[c] - x[c], x[c] - high[c]));
+        if (out <= slack) continue;
+        const double *at = samples->x + 3 * i;
+        return pal_note_set(
+            j->note, PAL_ERR_REFUSED,
+            "truth \"%s\": point %d (%g, %g, %g) m is %.3g m outside of the body: is it of another one?",
+            s->truth_name[index], i + 1, at[0], at[1], at[2], out);
+    }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
+                                       pal_note *note)
+{
+    pal_voxel_wish wish = *voxel;
+    for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
+        pal_prepared mesh = {0};
+        pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, note);
+        if (err && (err != PAL_ERR_REFUSED || wish.resolution + 2 >= FINEST)) return err;
+        int n_node = err ? 0 : mesh.tets.n_node; /* refused: thinner than such voxels */
+        pal_prepared_free(&mesh);
+        if (n_node > ENOUGH_NODES) break;
+    }
+    *out = wish.resolution;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared *mesh, pal_note *note)
+{
+    pal_locate *locate = NULL;
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < s->n && !err; k++) {
+        const pal_samples *samples = &s->samples[k];
+        int n_far = 0;
+        double most = 0, out, local[4], x[3];
+        if (!s->list[k].samples) continue;
+        if (!locate && pal_locate_create(&mesh->tets, NULL, &locate))
+            return pal_note_set(note, PAL_ERR_MEMORY, "no memory for points in the mesh");
+        for (int i = 0; i < samples->n; i++) {
+            pal_sub3(x, samples->x + 3 * i, mesh->tets.origin_m);
+            pal_locate_point(locate, x, local, &out);
+            n_far += out > mesh->tets.h_m;
+            most = fmax(most, out);
+        }
+        if (n_far > 0.01 * samples->n)
+            err = pal_note_set(note, PAL_ERR_REFUSED,
+                               "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
+                               "%.3g m): is it of another one?",
+                               s->truth_name[k], n_far, samples->n, most);
+    }
+    pal_locate_destroy(locate);
+    return err;
+}
+
+static pal_err check_supports(const job *j)
+{
+    const pal_problem *p = j->set->problem;
+    for (int k = 0; k < p->n_support; k++) {
+        const double *move = p->support[k].move_m;
+        if (p->support[k].moved && (move[0] != 0 || move[1] != 0 || move[2] != 0))
+            return pal_note_set(j->note, PAL_ERR_REFUSED,
+                                "%s: supports[%d]: moves, springs are calibrated on supports that hold still", p->path,
+                                k);
+    }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_note *note)
+{
+    *out = (pal_calibrate_set){0};
+    job j = {.wish = wish, .set = out, .note = note};
+    PAL_TRY(pal_problem_read(wish->problem, &out->problem, note));
+    PAL_TRY(check_supports(&j));
+    PAL_TRY(add_list(&j, wish->fit, true));
+    PAL_TRY(add_list(&j, wish->verify, false));
+    PAL_TRY(settle_material(&j));
+    PAL_TRY(choose_truths(&j));
+    pal_mesh_file_options file = {.unit_m = out->problem->unit_m, .weld = PAL_MESH_WELD};
+    pal_surface_report report = {0};
+    PAL_TRY(pal_mesh_file_read(out->problem->surface, &file, &out->surface, &report, NULL, NULL, note));
+    for (int k = 0; k < out->n; k++)
+        if (out->list[k].samples) PAL_TRY(check_box(&j, k));
+    return PAL_ERR_OK;
+}
+
+void pal_calibrate_cases_free(pal_calibrate_set *set)
+{
+    for (int k = 0; k < PAL_CALIBRATE_CASES; k++) pal_samples_free(&set->samples[k]);
+    pal_surface_free(&set->surface);
+    free(set->problem);
+    *set = (pal_calibrate_set){0};
+}

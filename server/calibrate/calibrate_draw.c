@@ -1,0 +1,353 @@
+/* What `palpate calibrate` draws: the search, the body, and the mesh for other tools. Pictures show the problem's own
+ * surface, skinned to the nodes as it is live. */
+#include "server/calibrate/calibrate_run.h"
+
+#include "server/base/vec3.h"
+#include "server/figure/body_picture.h"
+#include "server/figure/plot.h"
+#include "server/mesh/files/vtk_file.h"
+#include "server/mesh/geometry/near.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { TITLE = 120, TITLE_SHOWN = 48, MOST_DRAWN = 4000 };
+
+/* ---- trajectory ---- */
+
+/* of a long search every so many evaluations are drawn, each as the worst of those it stands for (error), or the best
+ */
+static int thin_out(const pal_calibrate_run *run, double *x, double *error, double *best)
+{
+    int step = (run->n_trail + MOST_DRAWN - 1) / MOST_DRAWN, n = 0;
+    for (int from = 0; from < run->n_trail; from += step, n++) {
+        int to = from + step < run->n_trail ? from + step : run->n_trail;
+        x[n] = to;
+        error[n] = NAN;
+        for (int i = from; i < to; i++)
+            if (run->error[i] < DBL_MAX) error[n] = fmax(error[n], run->error[i]);
+        best[n] = run->best[to - 1] < DBL_MAX ? run->best[to - 1] : NAN;
+    }
+    return n;
+}
+
+pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_note *note)
+{
+    char title[TITLE], label[80] = "evaluations";
+    double *x = malloc(3 * ((size_t)MOST_DRAWN + 1) * sizeof *x), *error = x + MOST_DRAWN + 1,
+           *best = error + MOST_DRAWN + 1;
+    if (!x) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    int n = thin_out(run, x, error, best);
+    const char *name = run->set.problem->name;
+    int room = TITLE_SHOWN;
+    /* not within a letter of several bytes */
+    while (strlen(name) > TITLE_SHOWN && room > 0 && ((unsigned char)name[room] & 0xc0) == 0x80) room--;
+    snprintf(title, sizeof title, "%.*s%s: %s", room, name, strlen(name) > TITLE_SHOWN ? "..." : "",
+             pal_calibrate_method(run));
+    if (run->result.n_rejected > 0)
+        snprintf(label, sizeof label, "evaluations (%lld without a rest are left out)",
+                 (long long)run->result.n_rejected);
+    const double hand = pal_calibrate_mean(run, &run->hand, true), edge[2] = {n > 0 ? x[0] : 0, n > 0 ? x[n - 1] : 1},
+                 level[2] = {hand, hand};
+    pal_plot plot = {.title = title,
+                     .x_label = label,
+                     .y_label = "RMS error, % of the largest displacement",
+                     .log_y = true,
+                     .n_curve = hand < DBL_MAX ? 3 : 2,
+                     .curve = {{.name = "every evaluation", .n = n, .x = x, .y = error, .bare = true, .thin = true},
+                               {.name = "best so far", .n = n, .x = x, .y = best, .bare = true},
+                               {.name = "set by hand", .n = 2, .x = edge, .y = level, .bare = true, .dashed = true}}};
+    pal_err err = pal_plot_write(&plot, path, note);
+    free(x);
+    return err;
+}
+
+/* ---- displacements ---- */
+
+/* the truth at the nodes [n_node][3]; of samples the mean of the four nearest, by inverse squared distance: good
+ * enough to be looked at */
+static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u, pal_note *note)
+{
+    const pal_samples *s = &run->set.samples[index];
+    const pal_tets *t = &run->info.mesh->tets;
+    pal_near *tree;
+    if (pal_calibration_truth(run->calibration, index, u)) return PAL_ERR_OK;
+    if (pal_near_create(s->x, s->n, &tree)) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a picture");
+    for (int i = 0; i < t->n_node; i++) {
+        int32_t near[4];
+        double x[3], distance2[4], sum = 0;
+        pal_add3(x, t->x + 3 * i, t->origin_m);
+        int n = pal_near_find(tree, x, 4, near, distance2);
+        for (int c = 0; c < 3; c++) u[3 * i + c] = 0;
+        for (int k = 0; k < n; k++) {
+            double w = 1 / (distance2[k] + 1e-12 * t->h_m * t->h_m);
+            pal_axpy3(u + 3 * i, w, s->u + 3 * near[k]);
+            sum += w;
+        }
+        pal_scale3(u + 3 * i, 1 / sum, u + 3 * i);
+    }
+    pal_near_destroy(tree);
+    return PAL_ERR_OK;
+}
+
+/* springs at rest with theta; zero and false: they find none */
+static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, int index, double *u)
+{
+    enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
+    pal_calibration_value value;
+    bool good = !pal_calibration_evaluate(run->calibration, run->seat, theta, ALL, &value, NULL, NULL) &&
+                pal_calibration_moved(run->calibration, run->seat, index, u);
+    if (!good) memset(u, 0, 3 * sizeof *u * (size_t)run->info.n_node);
+    return good;
+}
+
+/* ---- the body as it is shown ---- */
+
+/* one state of the surface [n_vertex] and what is drawn of it */
+typedef struct shape {
+    double *x, *value; /* [n_vertex][3], [n_vertex] */
+} shape;
+
+enum { REST, TRUTH, START, FOUND, N_SHAPE };
+
+typedef struct drawing {
+    const pal_calibrate_run *run;
+    const pal_prepared *mesh;
+    int n_vertex, n_node, index; /* index: of the case */
+    double *memory, *node_u[N_SHAPE], *node_x, *value;
+    shape shape[N_SHAPE];
+    double *k_d, *young;
+    uint8_t *held;
+    double *load_at, *load_N;
+    int n_load;
+    void *frames;
+    float *shown;
+} drawing;
+
+static pal_err take_memory(drawing *d, pal_note *note)
+{
+    size_t n = (size_t)d->n_node, m = (size_t)d->n_vertex;
+    double *at = d->memory = calloc(3 * n * (N_SHAPE + 1) + n + 4 * m * N_SHAPE + 2 * m + 6 * n, sizeof *at);
+    d->held = calloc(m, 1);
+    d->frames = calloc(1, pal_skin_frames_bytes(&d->mesh->skin) + 64);
+    d->shown = malloc(3 * m * sizeof *d->shown);
+    if (!at || !d->held || !d->frames || !d->shown)
+        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a picture");
+    for (int k = 0; k < N_SHAPE; k++, at += 3 * n) d->node_u[k] = at;
+    d->node_x = at, at += 3 * n;
+    d->value = at, at += n;
+    for (int k = 0; k < N_SHAPE; k++) {
+        d->shape[k].x = at, at += 3 * m;
+        d->shape[k].value = at, at += m;
+    }
+    d->k_d = at, at += m;
+    d->young = at, at += m;
+    d->load_at = at, at += 3 * n;
+    d->load_N = at;
+    return PAL_ERR_OK;
+}
+
+/* a value at nodes -> at shown vertices, by the weights of the skin */
+static void skin_value(const drawing *d, const double *value, double *out)
+{
+    const pal_skin *s = &d->mesh->skin;
+    for (int v = 0; v < d->n_vertex; v++) {
+        out[v] = 0;
+        for (int k = 0; k < PAL_SKIN_NEAR; k++) {
+            int at = PAL_SKIN_NEAR * v + k;
+            out[v] += (double)s->coef[4 * at + 3] * value[s->frame[s->near[at]]];
+        }
+    }
+}
+
+static void skin_shape(drawing *d, int which)
+{
+    const pal_tets *t = &d->mesh->tets;
+    for (int i = 0; i < 3 * d->n_node; i++) d->node_x[i] = t->x[i] + d->node_u[which][i];
+    pal_skin_frames(&d->mesh->skin, d->node_x, d->frames);
+    pal_skin_evaluate(&d->mesh->skin, d->node_x, d->frames, d->shown);
+    for (int i = 0; i < 3 * d->n_vertex; i++) d->shape[which].x[i] = (double)d->shown[i];
+    for (int i = 0; i < d->n_node; i++) d->value[i] = pal_dist3(d->node_u[which] + 3 * i, d->node_u[TRUTH] + 3 * i);
+    skin_value(d, d->value, d->shape[which].value);
+}
+
+static void take_loads(drawing *d)
+{
+    const double *f = pal_calibration_forces(d->run->calibration, d->index);
+    for (int i = 0; i < d->n_node; i++) {
+        if (!(pal_dot3(f + 3 * i, f + 3 * i) > 0)) continue;
+        pal_copy3(d->load_at + 3 * d->n_load, d->mesh->tets.x + 3 * i);
+        pal_copy3(d->load_N + 3 * d->n_load++, f + 3 * i);
+    }
+}
+
+static void take_vertices(drawing *d)
+{
+    const pal_problem *p = d->run->set.problem;
+    const pal_tets *t = &d->mesh->tets;
+    int n_support;
+    const pal_support *support = pal_calibration_supports(d->run->calibration, &n_support);
+    for (int v = 0; v < d->n_vertex; v++) {
+        const double *at = d->mesh->surface.x + 3 * v;
+        double x[3];
+        pal_add3(x, at, t->origin_m);
+        const pal_problem_material *m = &p->material[0];
+        for (int k = 0; k < p->n_material; k++)
+            if (pal_box_holds(&p->material[k].region, x, 0)) m = &p->material[k];
+        d->young[v] = m->young_Pa;
+        for (int k = 0; k < n_support; k++) {
+            bool in = true;
+            for (int c = 0; c < 3; c++) in = in && at[c] >= support[k].low_m[c] && at[c] <= support[k].high_m[c];
+            d->held[v] |= in;
+        }
+    }
+    if (!d->run->info.grid) return;
+    pal_calibration_constants(d->run->calibration, d->run->theta, 0, d->value);
+    skin_value(d, d->value, d->k_d);
+}
+
+/* lengths in a unit that suits the body */
+static double length_unit(const drawing *d, const char **name)
+{
+    double most = 0;
+    for (int v = 0; v < d->n_vertex; v++) most = fmax(most, fmax(d->shape[START].value[v], d->shape[FOUND].value[v]));
+    *name = most >= 0.5 ? "m" : most >= 5e-4 ? "mm" : "um";
+    return most >= 0.5 ? 1 : most >= 5e-4 ? 1e3 : 1e6;
+}
+
+/* ---- pictures ---- */
+
+static int add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
+{
+    const pal_calibrate_run *run = d->run;
+    const pal_surface *s = &d->mesh->surface;
+    const double percent[N_SHAPE] = {0, 0, run->start.case_percent[d->index], run->last.case_percent[d->index]};
+    const char *unit, *truth = run->set.list[d->index].truth_name, *id = run->set.id[d->index];
+    double scale = length_unit(d, &unit);
+    snprintf(title[REST], TITLE, "at rest, load %.40s", id);
+    snprintf(title[TRUTH], TITLE, "truth: %.40s", truth ? truth : "finite elements");
+    for (int k = START; k < N_SHAPE; k++) {
+        const char *what = k == START ? "springs, default start" : "springs, calibrated";
+        if (percent[k] < DBL_MAX)
+            snprintf(title[k], TITLE, "%s: %.2g %% RMS", what, percent[k]);
+        else
+            snprintf(title[k], TITLE, "%s: no rest", what);
+        for (int v = 0; v < d->n_vertex; v++) d->shape[k].value[v] *= scale;
+    }
+    for (int k = 0; k < N_SHAPE; k++) {
+        to[k] = (pal_body_picture){.title = title[k],
+                                   .n_vertex = d->n_vertex,
+                                   .n_tri = s->n_tri,
+                                   .x = d->shape[k].x,
+                                   .tri = s->tri,
+                                   .held = d->held};
+        if (k == REST) {
+            to[k].n_load = d->n_load, to[k].load_at = d->load_at, to[k].load_N = d->load_N;
+            continue;
+        }
+        to[k].rest = d->shape[REST].x;
+        if (k == TRUTH) continue;
+        to[k].value = d->shape[k].value;
+        to[k].value_title = "distance to the truth";
+        to[k].unit = unit;
+    }
+    return N_SHAPE;
+}
+
+/* the map of constants beside the material that it is to look like */
+static int add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
+{
+    const pal_surface *s = &d->mesh->surface;
+    const int *n = d->run->info.grid->n;
+    snprintf(title[0], TITLE, "found on a grid of %d x %d x %d", n[0], n[1], n[2]);
+    snprintf(title[1], TITLE, "stiffness of the material");
+    for (int k = 0; k < 2; k++) {
+        to[k] = (pal_body_picture){.title = title[k],
+                                   .n_vertex = d->n_vertex,
+                                   .n_tri = s->n_tri,
+                                   .x = d->shape[REST].x,
+                                   .tri = s->tri,
+                                   .held = d->held,
+                                   .value = k ? d->young : d->k_d,
+                                   .value_title = k ? "E" : "k_d of edges",
+                                   .unit = k ? "Pa" : "J",
+                                   .log = true};
+    }
+    return 2;
+}
+
+static pal_err draw(drawing *d, const char *path, pal_note *note)
+{
+    const pal_calibrate_run *run = d->run;
+    char title[N_SHAPE + 2][TITLE];
+    pal_body_picture picture[N_SHAPE + 2];
+    PAL_TRY(take_memory(d, note));
+    PAL_TRY(truth_at_nodes(run, d->index, d->node_u[TRUTH], note));
+    springs_at_nodes(run, run->info.start, d->index, d->node_u[START]);
+    springs_at_nodes(run, run->theta, d->index, d->node_u[FOUND]);
+    for (int k = 0; k < N_SHAPE; k++) skin_shape(d, k);
+    take_loads(d);
+    take_vertices(d);
+    int n = add_shapes(d, picture, title);
+    if (run->info.grid) n += add_maps(d, picture + n, title + n);
+    return pal_body_picture_write(picture, n, path, note);
+}
+
+pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_note *note)
+{
+    drawing d = {
+        .run = run, .mesh = run->info.mesh, .n_vertex = run->info.mesh->skin.n_vertex, .n_node = run->info.n_node};
+    while (!run->set.list[d.index].fit) d.index++;
+    pal_err err = draw(&d, path, note);
+    free(d.memory);
+    free(d.held);
+    free(d.frames);
+    free(d.shown);
+    return err;
+}
+
+/* ---- vtk ---- */
+
+pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_note *note)
+{
+    enum { MOST = PAL_SPRING_KINDS + 2 * PAL_CALIBRATE_CASES };
+    pal_vtk_field field[MOST];
+    char name[MOST][PAL_NAME + 16];
+    const pal_tets *t = &run->info.mesh->tets;
+    size_t n = (size_t)t->n_node;
+    int n_field = 0;
+    double *memory = calloc(n * (PAL_SPRING_KINDS + 6 * (size_t)run->set.n), sizeof *memory), *at = memory;
+    if (!memory) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    for (int k = 0; k < run->info.n_kind; k++, at += n) {
+        snprintf(name[n_field], sizeof name[0], "%s", pal_calibrate_key(run, k, false));
+        pal_calibration_constants(run->calibration, run->theta, k, at);
+        field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 1, .value = at};
+        n_field++;
+    }
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < run->set.n && !err; k++) {
+        err = truth_at_nodes(run, k, at, note);
+        snprintf(name[n_field], sizeof name[0], "truth_%s_m", run->set.id[k]);
+        field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 3, .value = at};
+        n_field++, at += 3 * n;
+        if (!springs_at_nodes(run, run->theta, k, at)) continue;
+        snprintf(name[n_field], sizeof name[0], "springs_%s_m", run->set.id[k]);
+        field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 3, .value = at};
+        n_field++, at += 3 * n;
+    }
+    const pal_vtk_grid grid = {.title = run->set.problem->name,
+                               .n_node = t->n_node,
+                               .n_element = t->n_tet,
+                               .n_corner = 4,
+                               .x = t->x,
+                               .origin_m = t->origin_m,
+                               .node = t->tet,
+                               .n_point = n_field,
+                               .point = field};
+    if (!err) err = pal_mesh_write_vtk(path, &grid, note);
+    free(memory);
+    return err;
+}

@@ -1,0 +1,201 @@
+/* Calibrated constants -> the scene that serve runs. */
+#include "server/calibrate/calibrate_run.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/world/world.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_SUBSTEP = 1000000, N_TOOL = 3 };
+
+/* "/a/Gear 2.json" -> "gear_2": what a scene and its mesh may be called */
+static void name_of(const char *path, char out[PAL_NAME])
+{
+    const char *slash = strrchr(path, '/'), *from = slash ? slash + 1 : path, *dot = strrchr(from, '.');
+    size_t n = 0, length = dot && dot > from ? (size_t)(dot - from) : strlen(from);
+    for (size_t k = 0; k < length && n < PAL_NAME - 1; k++) {
+        char c = from[k];
+        if (c >= 'A' && c <= 'Z') c = (char)(c - 'A' + 'a');
+        bool fine = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+        if (fine || c == ' ' || c == '.') out[n++] = fine ? c : '_';
+    }
+    out[n] = 0;
+    if (n == 0) snprintf(out, PAL_NAME, "calibrated");
+}
+
+/* for information, contact and mass: E its geometric mean, nu and density their means over the tetrahedra */
+static void take_material(const pal_calibrate_run *run, pal_material *out)
+{
+    const pal_problem *p = run->set.problem;
+    const pal_tets *t = &run->info.mesh->tets;
+    double poisson = p->material[0].poisson, density = p->material[0].density_kg_m3;
+    out->young_Pa = p->n_material > 1 ? run->info.mean_young_Pa : p->material[0].young_Pa;
+    out->poisson = fmin(p->material[0].poisson, 0.4999);
+    out->density_kg_m3 = p->material[0].density_kg_m3;
+    for (int e = 0; e < t->n_tet && p->n_material > 1; e++) {
+        const pal_problem_material *m = &p->material[0];
+        double x[3];
+        pal_copy3(x, t->origin_m);
+        for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * e + k]);
+        for (int k = 0; k < p->n_material; k++)
+            if (pal_box_holds(&p->material[k].region, x, 0)) m = &p->material[k];
+        /* what is the same in all materials stays what it is, to the bit */
+        poisson += (m->poisson - p->material[0].poisson) / t->n_tet;
+        density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;
+    }
+    if (p->n_material == 1) return;
+    out->poisson = fmin(poisson, 0.4999);
+    out->density_kg_m3 = density;
+}
+
+/* constants as keys of the model */
+static pal_err put_constants(const pal_calibrate_run *run, pal_item *model, pal_note *note)
+{
+    for (int k = 0; k < run->info.n_kind; k++)
+        PAL_TRY(pal_item_put_number(model, pal_calibrate_key(run, k, false), exp(run->theta[k]), note));
+    return PAL_ERR_OK;
+}
+
+/* constants at all nodes of the grid; those that touch nothing of the body take the mean of the others */
+static pal_err put_grid(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+{
+    const pal_grid *from = run->info.grid;
+    const pal_weights *w = run->info.weights;
+    pal_spring_grid *to = &scene->scene.body[0].spring_grid;
+    size_t n = (size_t)from->n[0] * (size_t)from->n[1] * (size_t)from->n[2];
+    double *value = malloc(n * (size_t)run->info.n_kind * sizeof *value);
+    if (!value) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the grid");
+    scene->spring_grid[0] = value;
+    for (int c = 0; c < 3; c++) to->n[c] = from->n[c], to->low_m[c] = from->low[c], to->high_m[c] = from->high[c];
+    for (int k = 0; k < run->info.n_kind; k++, value += n) {
+        const double *theta = run->theta + (size_t)k * (size_t)w->n_used;
+        double mean = 0;
+        for (int i = 0; i < w->n_used; i++) mean += theta[i] / w->n_used;
+        for (size_t i = 0; i < n; i++) value[i] = exp(mean);
+        for (int i = 0; i < w->n_used; i++) value[w->used[i]] = exp(theta[i]);
+        to->k_J[run->info.kind[k]] = value;
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+{
+    pal_item *model = &scene->scene.body[0].model;
+    pal_item_init(model, "bodies[0].model", "tet_springs");
+    PAL_TRY(pal_item_put_text(model, "weights", run->options.equal ? "equal" : "volume", note));
+    PAL_TRY(run->info.grid ? put_grid(run, scene, note) : put_constants(run, model, note));
+    return run->options.without_area ? pal_item_put_number(model, "k_area_J", 0, note) : PAL_ERR_OK;
+}
+
+/* tools as strong as the loads that were fitted, so that a hand can do to the body what they did */
+static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
+{
+    double most = 0;
+    for (int k = 0; k < run->set.n; k++) {
+        const double *f = pal_calibration_forces(run->calibration, k);
+        double sum = 0;
+        for (int i = 0; i < run->info.n_node && run->set.list[k].fit; i++) sum += pal_norm3(f + 3 * i);
+        most = fmax(most, sum);
+    }
+    double unit = pow(10, floor(log10(most)) - 1), cap = unit * ceil(most / unit - 1e-9);
+    pal_tools_default(scene, N_TOOL);
+    for (int k = 0; k < N_TOOL; k++) scene->tool[k].force_cap_N = fmin(fmax(cap, 1e-3), 1000);
+}
+
+/* stiff constants may want more sub-steps than a scene usually has */
+static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_note *note)
+{
+    pal_world *world = NULL;
+    pal_err err = pal_world_create(scene, note, &world);
+    while (err == PAL_ERR_BUDGET && scene->most_substep < MOST_SUBSTEP) {
+        scene->most_substep = 2 * scene->most_substep < MOST_SUBSTEP ? 2 * scene->most_substep : MOST_SUBSTEP;
+        err = pal_world_create(scene, note, &world);
+    }
+    if (!err) *n_substep = pal_world_substeps(world);
+    pal_world_destroy(world);
+    return err;
+}
+
+static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_note *note)
+{
+    static const char *const effects[] = {"tool_push", "tool_grab", "finite_guard"};
+    pal_scene *scene = &loaded->scene;
+    pal_body_def *body = &scene->body[0];
+    char name[PAL_NAME], source[sizeof scene->source], list[160] = "";
+    size_t n = 0;
+    int n_support;
+    pal_scene_default(scene);
+    name_of(run->scene, name);
+    scene->n_body = 1;
+    pal_body_default(body, name, run->info.mesh);
+    take_material(run, &body->material);
+    const pal_support *support = pal_calibration_supports(run->calibration, &n_support);
+    body->n_support = n_support;
+    memcpy(body->support, support, (size_t)n_support * sizeof *support);
+    body->n_effect = (int)(sizeof effects / sizeof effects[0]);
+    for (int k = 0; k < body->n_effect; k++) {
+        char path[PAL_ITEM_TEXT];
+        snprintf(path, sizeof path, "effects[%d]", k);
+        pal_item_init(&body->effect[k], path, effects[k]);
+    }
+    for (int k = 0; k < run->set.n; k++)
+        if (run->set.list[k].fit && n < sizeof list)
+            n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", n ? ", " : "", run->set.id[k]);
+    snprintf(source, sizeof source, "springs calibrated on %s (%s)", list, pal_calibrate_method(run));
+    put_tools(run, scene);
+    PAL_TRY(pal_scene_rename(loaded, name, run->set.problem->name, source, note));
+    PAL_TRY(put_model(run, loaded, note));
+    return allow_substeps(scene, &run->n_substep, note);
+}
+
+pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note)
+{
+    pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
+    pal_note why = {""};
+    if (!loaded) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
+    pal_err err = fill(run, loaded, &why);
+    if (err) {
+        pal_scene_free(loaded);
+        return pal_note_set(note, err, "%s: %s", run->scene, why.text);
+    }
+    *out = loaded;
+    return PAL_ERR_OK;
+}
+
+/* ---- accuracy ---- */
+
+/* "0.52 % RMS of finite elements (twist)" behind what stands there already; false: no room */
+static bool add_accuracy(const pal_calibrate_run *run, int index, char *out, size_t n_byte)
+{
+    size_t at = strlen(out);
+    char of[PAL_NAME + 32];
+    const pal_calibrate_case *c = &run->set.list[index];
+    double e = run->last.case_percent[index];
+    snprintf(of, sizeof of, " RMS of %s", c->truth_name ? c->truth_name : "finite elements");
+    bool first = at == 0, named = c->truth_name != NULL;
+    int n = e < DBL_MAX ? snprintf(out + at, n_byte - at, "%s%.2g %%%s (%s%s)", first ? "" : ", ", e,
+                                   first || named ? of : "", run->set.id[index], c->fit ? "" : ", not fitted")
+                        : snprintf(out + at, n_byte - at, "%sno rest (%s)", first ? "" : ", ", run->set.id[index]);
+    return n >= 0 && at + (size_t)n < n_byte;
+}
+
+void pal_calibrate_accuracy(const pal_calibrate_run *run, char *out, size_t n_byte)
+{
+    bool room = true;
+    int n_fit = 0;
+    out[0] = 0;
+    /* fitted ones first */
+    for (int turn = 0; turn < 2; turn++)
+        for (int k = 0; k < run->set.n; k++)
+            if (run->set.list[k].fit == (turn == 0)) room = room && add_accuracy(run, k, out, n_byte);
+    if (room) return;
+    for (int k = 0; k < run->set.n; k++) n_fit += run->set.list[k].fit;
+    double fit = pal_calibrate_mean(run, &run->last, true), other = pal_calibrate_mean(run, &run->last, false);
+    int n = snprintf(out, n_byte, "%.2g %% RMS (mean of %d cases)", fit, n_fit);
+    if (other < DBL_MAX && n > 0 && (size_t)n < n_byte)
+        snprintf(out + n, n_byte - (size_t)n, ", %.2g %% (%d not fitted)", other, run->set.n - n_fit);
+}

@@ -1,0 +1,74 @@
+/* Where a lattice of springs (model tet_springs) comes to rest under dead loads, by Newton on its energy, and the
+ * derivative of any function of the rest displacement with respect to the constant of every spring, by the adjoint: one
+ * more factor and one solve, whatever the number of springs (numerics.md part 2, "Calibration").
+ *
+ *   W(x) = sum q k/2 C(x)^2 - f.x        grad W = 0 at the free nodes        H = sum q k (g g' + C H_C)
+ *   H lambda = dJ/du                     dJ/dk = -q C g.lambda
+ * Linearised at rest, where every C is 0: K = sum q k g g', K u = f, dJ/dk = -q (g.u)(g.lambda).
+ *
+ * The lattice is shared and read only; a seat is one thread's own work space. Heap. */
+#ifndef PAL_LAB_EQUILIBRIUM_H
+#define PAL_LAB_EQUILIBRIUM_H
+#include "server/num/blocks.h"
+#include "server/sim/springs/spring_law.h"
+#include "server/sim/world/world.h"
+
+enum { PAL_SPRING_KINDS = 3 };
+
+/* springs of one kind, as the live row has them */
+typedef struct pal_springs {
+    int n_item, n_corner; /* n_item 0: no such row                                    */
+    int32_t *item;        /* nodes                                 [n_item][n_corner] */
+    double *w, *q;        /* 1 / rest measure (spring_shape.h); weight      [n_item]  */
+    int32_t *place;       /* block of each pair of corners a >= b, negative: ~place, transposed [n_item][pairs] */
+} pal_springs;
+
+typedef struct pal_lattice {
+    int n_node, n_free;
+    double *x_rest; /* body frame, m [n_node][3] */
+    uint8_t *held;  /* [n_node]                  */
+    double h_m;
+    pal_springs kind[PAL_SPRING_KINDS]; /* by pal_spring_kind */
+    pal_arena *arena;
+    pal_blocks pattern;
+} pal_lattice;
+
+/* copies the springs of the rows edge_distance, face_area, tet_volume of a body. REFUSED: it has no edges; nothing
+ * holds it, or everything; MEMORY. [load] */
+pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_note *note);
+void pal_lattice_free(pal_lattice *lattice); /* a zeroed struct is fine */
+
+typedef struct pal_equilibrium_options {
+    bool linear;         /* linearised at rest                                                             */
+    int most_iteration;  /* 60                                                                             */
+    double tolerance;    /* 1e-9: of the residual's norm, relative to that of the loads                    */
+    double most_stretch; /* 4: a spring longer than this many rest lengths ends the search (NUMERIC)       */
+} pal_equilibrium_options;
+void pal_equilibrium_default(pal_equilibrium_options *options);
+
+typedef struct pal_equilibrium_report {
+    int n_newton, n_factor, n_shift; /* shift: iterations whose Hessian was not positive definite */
+    double residual;                 /* relative                                                  */
+    double energy_J;                 /* elastic                                                   */
+} pal_equilibrium_report;
+
+typedef struct pal_seat pal_seat;
+/* MEMORY */
+pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out); /* borrows the lattice */
+void pal_seat_destroy(pal_seat *seat);                               /* NULL is fine        */
+
+/* k_J[kind] [n_item]: constants, before the weights q; force_N [n_node][3]; x [n_node][3] in: where to begin (linear:
+ * not read), out: the rest under load, only on success. NUMERIC (note says why): not converged, a Hessian that is not
+ * positive definite at the end (no stable rest), a number that is not finite; MEMORY */
+pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *force_N,
+                        const pal_equilibrium_options *options, double *x, pal_equilibrium_report *report,
+                        pal_note *note);
+/* after pal_equilibrium on this seat, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read at
+ * held nodes). NUMERIC, MEMORY */
+pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x,
+                                const pal_equilibrium_options *options, const double *dJ_du,
+                                double *const slope[PAL_SPRING_KINDS], pal_note *note);
+/* -grad of the elastic energy [n_node][3] at x, held nodes too; returns the energy, J */
+double pal_lattice_force(const pal_lattice *lattice, const double *const k_J[PAL_SPRING_KINDS], const double *x,
+                         double *force_N);
+#endif

@@ -1,0 +1,234 @@
+/* Running a calibrated body until it is still. */
+#include "server/calibrate/settle.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* what "still" means, header */
+static const double most_v = 1e-4, mean_v = 3e-5, most_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
+
+const double pal_settle_ladder_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
+enum { USUAL = 3 };
+
+void pal_settle_default(pal_settle_options *options)
+{
+    *options = (pal_settle_options){.most_s = 60, .most_work = 1.5e9};
+}
+
+static bool say(const pal_settle_options *options, const char *what, double fraction)
+{
+    return !options->progress || options->progress(what, fraction, options->user);
+}
+
+/* A of the header */
+static double mean_gain(const pal_body *body, const double *force_N)
+{
+    double force = 0, mass = 0;
+    for (int i = 0; i < body->n_dof; i++) {
+        force += pal_norm3(force_N + 3 * i);
+        if (!body->held[i]) mass += body->mass_kg[i];
+    }
+    return force / mass;
+}
+
+/* is the body still at this moment? damping: rate of the row viscous, which the solver applies apart from f */
+static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
+{
+    double v_most = 0, v_sum = 0, a_most = 0, a_sum = 0, u_most = 0;
+    int n = 0;
+    for (int i = 0; i < body->n_dof; i++) {
+        if (body->held[i]) continue;
+        const double *v = body->v + 3 * i, *f = body->f + 3 * i;
+        double a[3], speed = pal_norm3(v);
+        for (int c = 0; c < 3; c++) a[c] = f[c] / body->mass_kg[i] - damping_1_s * v[c];
+        double size = pal_norm3(a);
+        v_most = fmax(v_most, speed), v_sum += speed;
+        a_most = fmax(a_most, size), a_sum += size;
+        u_most = fmax(u_most, pal_dist3(body->x + 3 * i, body->x_rest + 3 * i));
+        n++;
+    }
+    double speed = sqrt(u_most * gain_m_s2);
+    return u_most > 0 && v_most <= most_v * speed && v_sum <= mean_v * speed * n && a_most <= most_a * gain_m_s2 &&
+           a_sum <= mean_a * gain_m_s2 * n;
+}
+
+static void compare(const pal_body *body, const double *u, pal_settle_run *out)
+{
+    double sum = 0, most = 0;
+    out->most_m = 0;
+    out->difference_percent = NAN;
+    for (int i = 0; i < body->n_dof; i++) {
+        double d[3];
+        pal_sub3(d, body->x + 3 * i, body->x_rest + 3 * i);
+        out->most_m = fmax(out->most_m, pal_norm3(d));
+        if (!u) continue;
+        pal_sub3(d, d, u + 3 * i);
+        sum += pal_dot3(d, d);
+        most = fmax(most, pal_norm3(u + 3 * i));
+    }
+    if (u && most > 0) out->difference_percent = 100 * sqrt(sum / body->n_dof) / most;
+}
+
+/* the damping that the world's row viscous has now */
+static double damping_of(const pal_world *world)
+{
+    double rate = 0;
+    for (int k = 0; k < pal_world_rows(world); k++) {
+        const pal_row *row = pal_world_effect(world, k);
+        if (row->effect->drag) rate += row->effect->drag(row->self);
+    }
+    return rate;
+}
+
+pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load, const pal_settle_options *options,
+                   double *work, pal_settle_run *out, pal_note *note)
+{
+    pal_body *body = pal_world_body(world, 0);
+    double damping = damping_of(world), gain = mean_gain(body, load->force_N), since = 0, time = 0;
+    *out = (pal_settle_run){.difference_percent = NAN};
+    pal_world_reset(world);
+    body->load_cap_N = INFINITY;
+    for (int i = 0; i < body->n_node; i++)
+        if (pal_dot3(load->force_N + 3 * i, load->force_N + 3 * i) > 0) {
+            pal_err err = pal_world_load(world, 0, i, load->force_N + 3 * i);
+            if (err) return pal_note_set(note, err, "no memory for the loads of a live run");
+        }
+    while (!out->steady && time<options->most_s && * work> 0) {
+        if (!say(options, "live body comes to rest", time / options->most_s))
+            return pal_note_set(note, PAL_ERR_STATE, "stopped while the live body was coming to rest");
+        if (pal_world_step(world, step_s) || body->frozen) break;
+        time += step_s;
+        *work -= (double)pal_world_substeps(world) * body->tets->n_tet;
+        since = is_still(body, damping, gain) ? since + step_s : 0;
+        out->steady = since >= hold_s;
+    }
+    out->seconds = time;
+    compare(body, load->u, out);
+    return PAL_ERR_OK;
+}
+
+/* ---- ladder ---- */
+
+/* all loads at one rate; the mean is *mean, NaN when some is not steady within `most` seconds of all together */
+static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double most,
+                        pal_settle_options *options, double *work, pal_settle_run *run, double *mean, pal_note *note)
+{
+    double left = most, longest = options->most_s;
+    *mean = NAN;
+    for (int k = 0; k < n_load; k++) {
+        options->most_s = fmin(longest, left);
+        pal_err err = pal_settle(world, step_s, &load[k], options, work, &run[k], note);
+        options->most_s = longest;
+        if (err) return err;
+        left -= run[k].seconds;
+        if (!run[k].steady) return PAL_ERR_OK;
+    }
+    *mean = (most - left) / n_load;
+    return PAL_ERR_OK;
+}
+
+/* what a climb shares */
+typedef struct climb {
+    pal_world *world;
+    const pal_scene *scene;
+    const pal_settle_load *load;
+    int n_load, first;
+    pal_settle_options options;
+    double work;
+    pal_settle_report *out;
+    pal_note *note;
+} climb;
+
+/* one rung; *better: sooner than all before */
+static pal_err try_rung(climb *c, int rung, bool *better)
+{
+    pal_settle_report *out = c->out;
+    pal_settle_run run[PAL_SETTLE_LOADS] = {0};
+    pal_material material = c->scene->body[0].material;
+    double mean, most = c->n_load * (out->steady ? out->seconds : c->options.most_s);
+    material.damping_1_s = pal_settle_ladder_1_s[rung];
+    PAL_TRY(pal_world_material(c->world, 0, &material, c->note));
+    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, most, &c->options, &c->work, run, &mean, c->note));
+    out->ladder_s[rung] = mean;
+    *better = isfinite(mean) && (!out->steady || mean < out->seconds);
+    /* of a body that never rests the first run is there to tell */
+    for (int i = 0; i < c->n_load && (*better || (!out->steady && rung == c->first)); i++) out->load[i] = run[i];
+    if (!*better) return PAL_ERR_OK;
+    out->steady = true;
+    out->seconds = mean;
+    out->damping_1_s = material.damping_1_s;
+    return PAL_ERR_OK;
+}
+
+/* the rung nearest to 2/T, by the geometric mean of the loads */
+static int first_rung(const climb *c)
+{
+    const pal_body *body = pal_world_body(c->world, 0);
+    double sum = 0;
+    int best = USUAL;
+    for (int k = 0; k < c->n_load; k++) {
+        double most = 0, gain = mean_gain(body, c->load[k].force_N);
+        for (int i = 0; i < body->n_node && c->load[k].u; i++) most = fmax(most, pal_norm3(c->load[k].u + 3 * i));
+        if (!(most > 0 && gain > 0)) return USUAL;
+        sum += log(2 * sqrt(gain / most)) / c->n_load;
+    }
+    for (int k = 0; k < PAL_SETTLE_STEPS; k++)
+        if (fabs(log(pal_settle_ladder_1_s[k]) - sum) < fabs(log(pal_settle_ladder_1_s[best]) - sum)) best = k;
+    return best;
+}
+
+static pal_err run_climb(climb *c)
+{
+    bool better, up = false;
+    c->first = first_rung(c);
+    PAL_TRY(try_rung(c, c->first, &better));
+    for (int k = c->first + 1; k < PAL_SETTLE_STEPS && c->work > 0; k++) {
+        PAL_TRY(try_rung(c, k, &better));
+        if (!better && c->out->steady) break;
+        up |= better;
+    }
+    /* a body that swings faster than the ladder reaches is stillest soonest at its top */
+    up |= c->first == PAL_SETTLE_STEPS - 1 && c->out->steady;
+    for (int k = c->first - 1; k >= 0 && !up && c->work > 0; k--) {
+        PAL_TRY(try_rung(c, k, &better));
+        if (!better && c->out->steady) break;
+    }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, int n_load,
+                           const pal_settle_options *options, pal_settle_report *out, pal_note *note)
+{
+    if (n_load < 1 || n_load > PAL_SETTLE_LOADS)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
+    if (scene->n_body != 1)
+        return pal_note_set(note, PAL_ERR_REFUSED, "a scene of %d bodies, wanted one", scene->n_body);
+    *out = (pal_settle_report){.damping_1_s = scene->body[0].material.damping_1_s, .seconds = NAN};
+    for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->ladder_s[k] = NAN;
+    for (int k = 0; k < PAL_SETTLE_LOADS; k++) out->load[k].difference_percent = NAN;
+    pal_scene *own = malloc(sizeof *own);
+    pal_world *world = NULL;
+    if (!own) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a live body");
+    *own = *scene;
+    /* nobody looks and nobody touches; the row viscous is there when there is a rate */
+    own->body[0].output.name[0] = 0;
+    own->body[0].n_effect = 0;
+    own->body[0].material.damping_1_s = pal_settle_ladder_1_s[USUAL];
+    own->n_tool = 0;
+    climb c = {.scene = own,
+               .load = load,
+               .n_load = n_load,
+               .options = *options,
+               .work = options->most_work,
+               .out = out,
+               .note = note};
+    pal_err err = pal_world_create(own, note, &world);
+    c.world = world;
+    if (!err) err = run_climb(&c);
+    pal_world_destroy(world);
+    free(own);
+    return err;
+}

@@ -1,0 +1,57 @@
+/* Flags of a command: a table says what there is, the parser refuses the rest by name.
+ *
+ *     double young = 5000; bool grid = false; const char *in[1]; int n_in = 0;
+ *     const pal_flag flag[] = {
+ *         {"--young-Pa", "PA", PAL_FLAG_NUMBER, &young, 1, 1e9, "stiffness of the tissue (5000)"},
+ *         {"--grid", NULL, PAL_FLAG_SWITCH, &grid, 0, 0, "keep the grid"},
+ *     };
+ *     const pal_flag_table table = {.usage = "prepare IN -o DIR", .about = "...", .flag = flag, .n_flag = 2,
+ *                                   .least_operand = 1, .most_operand = 1};
+ *     int code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
+ *     if (code >= 0) return code;
+ *
+ * `--name value` and `--name=value` are the same; `-o DIR` is a name like any other; `--` ends the flags. A flag may
+ * stand anywhere and only once. Thread: [load]. */
+#ifndef PAL_COMMANDS_FLAGS_H
+#define PAL_COMMANDS_FLAGS_H
+#include "server/cli/config.h"
+
+#include <stdbool.h>
+
+typedef enum pal_flag_kind {
+    PAL_FLAG_SWITCH, /* out: bool *        */
+    PAL_FLAG_TEXT,   /* out: const char ** */
+    PAL_FLAG_NUMBER, /* out: double *      */
+    PAL_FLAG_COUNT   /* out: int *         */
+} pal_flag_kind;
+
+typedef struct pal_flag {
+    const char *name;  /* "--resolution" or "-o"                                  */
+    const char *value; /* word for the value in the manual; NULL for a switch    */
+    pal_flag_kind kind;
+    void *out;        /* untouched when the flag is absent: the default          */
+    double low, high; /* range of a number; the refusal names it                 */
+    const char *help; /* one or more lines (\n) of the manual                    */
+} pal_flag;
+
+typedef struct pal_flag_common {
+    bool json, quiet;
+    const char *command; /* for messages: argv[0] */
+} pal_flag_common;
+
+typedef struct pal_flag_table {
+    const char *usage, *about; /* "prepare IN -o DIR [flags]"; sentences of the manual, ended by \n */
+    const pal_flag *flag;
+    int n_flag;
+    int least_operand, most_operand;
+    /* not NULL: every key of the configuration is a flag as well (allow_remote: --allow-remote), and --config FILE;
+     * on success the struct holds defaults < file < environment < flags. A setting of PAL_CONFIG_KEY_BOOL is a switch.
+     */
+    pal_config *config;
+} pal_flag_table;
+
+/* -1: go on; else the exit code: 0 after --help, 2 after one line about wrong usage, 1 for a refused configuration.
+ * operand: most_operand places; both may be NULL when that is 0. */
+int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag_common *common, const char **operand,
+                    int *n_operand);
+#endif

@@ -1,0 +1,65 @@
+/* Refusals, progress, JSON. */
+#include "server/cli/report.h"
+
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+int pal_report_code(pal_err err)
+{
+    switch (err) {
+    case PAL_ERR_OK:
+        return 0;
+    case PAL_ERR_MEMORY:
+    case PAL_ERR_INTERNAL:
+        return 3;
+    default:
+        return 1;
+    }
+}
+
+int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_note *note)
+{
+    char text[sizeof note->text];
+    snprintf(text, sizeof text, "%s", note && note->text[0] ? note->text : pal_err_text(err));
+    for (char *c = text; *c; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
+    pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
+    fprintf(stderr, "palpate %s: %s\n", common->command, text);
+    if (common->json) {
+        cJSON *object = cJSON_CreateObject();
+        cJSON_AddBoolToObject(object, "ok", false);
+        cJSON *error = cJSON_AddObjectToObject(object, "error");
+        cJSON_AddStringToObject(error, "code", pal_err_name(err));
+        cJSON_AddStringToObject(error, "text", text);
+        pal_report_json(common, object);
+    }
+    return pal_report_code(err);
+}
+
+int pal_report_json(const pal_flag_common *common, cJSON *object)
+{
+    char *text = object ? cJSON_PrintUnformatted(object) : NULL;
+    bool good = text && printf("%s\n", text) >= 0 && fflush(stdout) == 0;
+    cJSON_free(text);
+    cJSON_Delete(object);
+    if (!good) fprintf(stderr, "palpate %s: the JSON object could not be written\n", common->command);
+    return good ? 0 : 3;
+}
+
+void pal_report_progress(const char *what, double fraction, void *user)
+{
+    static bool shown;
+    const pal_flag_common *common = user;
+    if (common->quiet || common->json || !isatty(STDERR_FILENO)) return;
+    if (!what && !shown) return;
+    if (!what)
+        fprintf(stderr, "\r\033[K");
+    else if (fraction > 0)
+        fprintf(stderr, "\r\033[K%s %.0f %%", what, 100 * fraction);
+    else
+        fprintf(stderr, "\r\033[K%s", what);
+    fflush(stderr);
+    shown = what != NULL;
+}

@@ -1,0 +1,20 @@
+/* What a command says: refusals, progress and the one JSON object. Thread: [load]. */
+#ifndef PAL_COMMANDS_REPORT_H
+#define PAL_COMMANDS_REPORT_H
+#include "server/base/err.h"
+#include "server/cli/flags.h"
+
+#include <cjson/cJSON.h>
+
+/* exit code of an error: 0 ok, 3 for INTERNAL and MEMORY, else 1 */
+int pal_report_code(pal_err err);
+/* one line on stderr, "palpate COMMAND: sentence" (line ends in the sentence become blanks), with --json also
+ * {"ok": false, "error": {"code": "REFUSED", "text": "..."}} on stdout; the result is the exit code */
+int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_note *note);
+/* prints the object on stdout (one line) and deletes it; the result is 0, or 3 when it could not be made or written */
+int pal_report_json(const pal_flag_common *common, cJSON *object);
+
+/* progress for people: "fill 42 %" on one line of stderr that is rewritten; only on a terminal and neither quiet nor
+ * json. user is the pal_flag_common, so that it fits the callbacks of the scene room; what NULL clears the line */
+void pal_report_progress(const char *what, double fraction, void *user);
+#endif

@@ -1,0 +1,78 @@
+/* Estimators that come and go with those who look. */
+#include "server/estimate/watch.h"
+
+#include <math.h>
+#include <string.h>
+
+void pal_watch_init(pal_watch *w, const pal_scene *scene)
+{
+    memset(w, 0, sizeof *w);
+    w->scene = scene;
+    pthread_mutex_init(&w->lock, NULL);
+}
+
+void pal_watch_ask(pal_watch *w, int body, bool wanted)
+{
+    uint32_t *n = &w->n_look[body];
+    if (wanted) ++*n, w->refused[body] = false;
+    if (!wanted && *n > 0) --*n;
+    w->busy = true;
+}
+
+/* opens and leaves what shall be there or shall not; true: something is there or wanted */
+static bool come_and_go(pal_watch *w, int b, pal_note *note, bool *failed)
+{
+    pal_estimator **e = &w->estimator[b];
+    if (*e && w->leaving[b] && pal_estimator_gone(*e)) {
+        pal_estimator_close(*e);
+        *e = NULL;
+        w->leaving[b] = false;
+    }
+    if (*e && !w->leaving[b] && w->n_look[b] == 0) {
+        pal_estimator_leave(*e);
+        w->leaving[b] = true;
+    }
+    if (!*e && w->n_look[b] > 0 && !w->refused[b] && pal_estimator_open(w->scene, b, note, e))
+        w->refused[b] = *failed = true;
+    return *e != NULL || w->n_look[b] > 0;
+}
+
+bool pal_watch_step(pal_watch *w, const pal_world *world, double step_ms, pal_note *note)
+{
+    bool busy = false, failed = false;
+    if (!w->busy || pthread_mutex_trylock(&w->lock)) return false;
+    for (int b = 0; b < w->scene->n_body; b++) {
+        busy = come_and_go(w, b, note, &failed) || busy;
+        if (w->estimator[b] && !w->leaving[b]) pal_estimator_look(w->estimator[b], world, step_ms);
+    }
+    w->busy = busy;
+    pthread_mutex_unlock(&w->lock);
+    return failed;
+}
+
+bool pal_watch_read(pal_watch *w, int body, pal_estimate *out)
+{
+    if (body < 0 || body >= w->scene->n_body) return false;
+    pthread_mutex_lock(&w->lock);
+    bool there = w->estimator[body] && !w->leaving[body] && pal_estimator_read(w->estimator[body], out);
+    pthread_mutex_unlock(&w->lock);
+    return there;
+}
+
+void pal_watch_hand_over(pal_watch *to, pal_watch *from)
+{
+    pthread_mutex_lock(&from->lock);
+    for (int b = 0; b < from->scene->n_body; b++) {
+        if (from->estimator[b] && !from->leaving[b]) pal_estimator_leave(from->estimator[b]);
+        from->leaving[b] = from->estimator[b] != NULL;
+        if (b < to->scene->n_body) to->n_look[b] = from->n_look[b];
+    }
+    pthread_mutex_unlock(&from->lock);
+    to->busy = true;
+}
+
+void pal_watch_close(pal_watch *w)
+{
+    for (int b = 0; b < w->scene->n_body; b++) pal_estimator_close(w->estimator[b]);
+    pthread_mutex_destroy(&w->lock);
+}

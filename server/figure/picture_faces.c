@@ -1,0 +1,380 @@
+/* From a surface to the pieces of its picture: edges with their triangles, what looks at the eye, pieces in order. */
+#include "server/figure/picture_faces.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIVIDE_MOST = 8, CLASSES_A_PIECE = 2 };
+static const double crease_cosine = 0.8; /* sharper than 37 degrees */
+
+/* an edge and the triangle it belongs to, corner `corner` and the next */
+typedef struct edge {
+    int32_t low, high, tri;
+    int8_t corner;
+    int8_t turned; /* runs from high to low */
+} edge;
+
+void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3], const double up[3])
+{
+    static const double default_eye[3] = {0.5, -0.8, 0.35}, other[3][3] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
+    double size = fmax(fabs(eye[0]), fmax(fabs(eye[1]), fabs(eye[2]))), scaled[3] = {0, 0, 0};
+    if (pal_finite3(eye) && size > 0) pal_scale3(scaled, 1 / size, eye);
+    if (!pal_unit3(axes->eye, scaled, 1e-9)) pal_unit3(axes->eye, default_eye, 0);
+    for (int k = -1; k < 3; k++) {
+        double side[3], try[3];
+        pal_copy3(try, k < 0 ? up : other[k]);
+        if (!pal_finite3(try) || !pal_unit3(try, try, 1e-150)) continue;
+        pal_cross3(side, try, axes->eye);
+        if (pal_unit3(axes->right, side, 1e-6)) break;
+    }
+    pal_cross3(axes->up, axes->eye, axes->right);
+}
+
+void pal_picture_mesh_free(pal_picture_mesh *mesh)
+{
+    free(mesh->x);
+    free(mesh->rest);
+    free(mesh->value);
+    free(mesh->tri);
+    *mesh = (pal_picture_mesh){0};
+}
+
+/* twice the area times the normal */
+static void face_normal(const double *x, const int32_t tri[3], double normal[3])
+{
+    double a[3], b[3];
+    pal_sub3(a, x + 3 * tri[1], x + 3 * tri[0]);
+    pal_sub3(b, x + 3 * tri[2], x + 3 * tri[0]);
+    pal_cross3(normal, a, b);
+}
+
+static double volume(const pal_picture_mesh *m)
+{
+    double sum = 0;
+    for (int t = 0; t < m->n_tri; t++) {
+        double normal[3], from[3];
+        face_normal(m->x, m->tri + 3 * t, normal);
+        pal_sub3(from, m->x + 3 * m->tri[3 * t], m->x);
+        sum += pal_dot3(from, normal) / 6;
+    }
+    return sum;
+}
+
+static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
+{
+    int n = 0;
+    for (int t = 0; t < m->n_tri; t++) {
+        double normal[3];
+        face_normal(m->x, m->tri + 3 * t, normal);
+        n += !m->closed || pal_dot3(normal, axes->eye) > 0;
+    }
+    return n;
+}
+
+/* ---- edges ---- */
+
+static int by_ends(const void *a, const void *b)
+{
+    const edge *p = a, *q = b;
+    if (p->low != q->low) return p->low < q->low ? -1 : 1;
+    if (p->high != q->high) return p->high < q->high ? -1 : 1;
+    return p->tri < q->tri ? -1 : p->tri > q->tri;
+}
+
+/* [3 n_tri], those of equal ends together; NULL: no memory */
+static edge *make_edges(const pal_picture_mesh *m)
+{
+    edge *e = malloc(3 * sizeof *e * (size_t)m->n_tri);
+    if (!e) return NULL;
+    for (int t = 0; t < m->n_tri; t++)
+        for (int k = 0; k < 3; k++) {
+            int32_t a = m->tri[3 * t + k], b = m->tri[3 * t + (k + 1) % 3];
+            e[3 * t + k] = (edge){a < b ? a : b, a < b ? b : a, t, (int8_t)k, a > b};
+        }
+    qsort(e, 3 * (size_t)m->n_tri, sizeof *e, by_ends);
+    return e;
+}
+
+static int same_edge(const edge *e, int at, int n)
+{
+    int k = 1;
+    while (at + k < n && e[at + k].low == e[at].low && e[at + k].high == e[at].high) k++;
+    return k;
+}
+
+static pal_err find_closed(pal_picture_mesh *m)
+{
+    edge *e = make_edges(m);
+    if (!e) return PAL_ERR_MEMORY;
+    m->closed = m->n_tri > 0;
+    for (int i = 0, k; i < 3 * m->n_tri && m->closed; i += k) {
+        k = same_edge(e, i, 3 * m->n_tri);
+        m->closed = k == 2 && e[i].turned != e[i + 1].turned;
+    }
+    free(e);
+    return PAL_ERR_OK;
+}
+
+/* ---- fewer triangles ---- */
+
+typedef struct cell {
+    uint64_t key;
+    int32_t vertex;
+} cell;
+
+static int by_key(const void *a, const void *b)
+{
+    const cell *p = a, *q = b;
+    if (p->key != q->key) return p->key < q->key ? -1 : 1;
+    return p->vertex < q->vertex ? -1 : p->vertex > q->vertex;
+}
+
+/* vertices of one cell become their mean; triangles that lose a corner go */
+static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
+{
+    size_t n = (size_t)m->n_vertex;
+    cell *c = malloc(sizeof *c * n);
+    int32_t *to = malloc(sizeof *to * n);
+    if (!c || !to) {
+        free(c);
+        free(to);
+        return PAL_ERR_MEMORY;
+    }
+    for (size_t i = 0; i < n; i++) {
+        c[i] = (cell){0, (int32_t)i};
+        for (int k = 0; k < 3; k++) c[i].key = c[i].key << 21 | (uint64_t)((m->x[3 * i + (size_t)k] - low[k]) / size);
+    }
+    qsort(c, n, sizeof *c, by_key);
+    int n_cell = 0;
+    /* sums go to the cell's own lowest vertex: no cell is written over before it is read */
+    for (size_t i = 0, j; i < n; i = j, n_cell++) {
+        int32_t first = c[i].vertex;
+        double some = isfinite(m->value[first]);
+        if (some == 0) m->value[first] = 0;
+        for (j = i + 1; j < n && c[j].key == c[i].key; j++) {
+            int32_t v = c[j].vertex;
+            to[v] = first;
+            pal_axpy3(m->x + 3 * first, 1, m->x + 3 * v);
+            if (m->rest) pal_axpy3(m->rest + 3 * first, 1, m->rest + 3 * v);
+            if (isfinite(m->value[v])) m->value[first] += m->value[v], some++;
+        }
+        to[first] = first;
+        pal_scale3(m->x + 3 * first, 1.0 / (double)(j - i), m->x + 3 * first);
+        if (m->rest) pal_scale3(m->rest + 3 * first, 1.0 / (double)(j - i), m->rest + 3 * first);
+        m->value[first] = some > 0 ? m->value[first] / some : NAN;
+    }
+    int kept = 0;
+    for (int t = 0; t < m->n_tri; t++) {
+        int32_t a = to[m->tri[3 * t]], b = to[m->tri[3 * t + 1]], d = to[m->tri[3 * t + 2]];
+        if (a == b || b == d || d == a) continue;
+        m->tri[3 * kept] = a, m->tri[3 * kept + 1] = b, m->tri[3 * kept + 2] = d, kept++;
+    }
+    m->n_tri = kept;
+    free(c);
+    free(to);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_picture_mesh_settle(pal_picture_mesh *m, const pal_picture_axes *axes, int most)
+{
+    PAL_TRY(find_closed(m));
+    bool closed = m->closed;
+    if (closed && volume(m) < 0)
+        for (int t = 0; t < m->n_tri; t++) {
+            int32_t other = m->tri[3 * t + 1];
+            m->tri[3 * t + 1] = m->tri[3 * t + 2], m->tri[3 * t + 2] = other;
+        }
+    int seen = count_seen(m, axes);
+    if (seen <= most) return PAL_ERR_OK;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, span[3], area = 0;
+    for (int i = 0; i < m->n_vertex; i++)
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], m->x[3 * i + k]);
+            high[k] = fmax(high[k], m->x[3 * i + k]);
+        }
+    pal_sub3(span, high, low);
+    for (int t = 0; t < m->n_tri; t++) {
+        double normal[3];
+        face_normal(m->x, m->tri + 3 * t, normal);
+        area += pal_norm3(normal) / 2;
+    }
+    /* a cell that a surface crosses gives about two triangles; half of them are seen */
+    double size = fmax(sqrt(area / most) * (closed ? 0.7 : 1), 1e-6 * pal_norm3(span));
+    for (; seen > most && size > 0; size *= 1.2) {
+        PAL_TRY(join_cells(m, low, size));
+        m->closed = closed; /* cells fold a closed surface but open none */
+        m->joined = true;
+        seen = count_seen(m, axes);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- pieces ---- */
+
+typedef struct face {
+    double p[3][3]; /* projected corners */
+    double value[3];
+    uint8_t outline, crease;
+    bool seen;
+    uint8_t shade;
+} face;
+
+static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, face *f)
+{
+    double light[3];
+    for (int k = 0; k < 3; k++) light[k] = axes->eye[k] + 0.40 * axes->up[k] - 0.28 * axes->right[k];
+    pal_unit3(light, light, 0);
+    for (int t = 0; t < m->n_tri; t++) {
+        double normal[3];
+        face_normal(m->x, m->tri + 3 * t, normal);
+        bool some = pal_unit3(normal, normal, 0);
+        double facing = some ? pal_dot3(normal, axes->eye) : 0, lit = some ? pal_dot3(normal, light) : 1;
+        if (!m->closed && facing < 0) facing = -facing, lit = -lit;
+        f[t].seen = facing > 0;
+        /* what looks straight at the eye has its colour to the bit */
+        double shade = (PAL_PICTURE_SHADES - 1) * fmin(1, fmax(0, lit) / 0.87);
+        f[t].shade = (uint8_t)lround(shade);
+        for (int k = 0; k < 3; k++) {
+            int32_t v = m->tri[3 * t + k];
+            pal_picture_project(axes, m->x + 3 * v, f[t].p[k]);
+            f[t].value[k] = m->value[v];
+        }
+        f[t].outline = f[t].crease = 0;
+    }
+}
+
+/* is the edge of these k triangles an outline of positions x seen from the eye: an end of the surface, or the border
+ * between what looks at the eye and what does not? Not where joining vertices has folded the surface */
+static bool is_outline(const pal_picture_mesh *m, const double *x, const double eye[3], const edge *e, int k)
+{
+    double normal[2][3];
+    if (k != 2) return !m->joined;
+    for (int i = 0; i < 2; i++) face_normal(x, m->tri + 3 * e[i].tri, normal[i]);
+    if (e[0].turned == e[1].turned) pal_scale3(normal[1], -1, normal[1]);
+    bool folded = pal_dot3(normal[0], normal[1]) < -0.3 * pal_norm3(normal[0]) * pal_norm3(normal[1]);
+    return (pal_dot3(normal[0], eye) > 0) != (pal_dot3(normal[1], eye) > 0) && !(m->joined && folded);
+}
+
+static bool is_crease(const pal_picture_mesh *m, const edge *e, int k)
+{
+    double normal[2][3];
+    if (k != 2 || m->joined) return false;
+    for (int i = 0; i < 2; i++) {
+        face_normal(m->x, m->tri + 3 * e[i].tri, normal[i]);
+        if (!pal_unit3(normal[i], normal[i], 0)) return false;
+    }
+    double cosine = pal_dot3(normal[0], normal[1]);
+    return (e[0].turned == e[1].turned ? -cosine : cosine) < crease_cosine;
+}
+
+static pal_err mark_edges(const pal_picture_mesh *m, const pal_picture_axes *axes, face *f, pal_picture_line **ghost,
+                          int *n_ghost)
+{
+    int n = 3 * m->n_tri;
+    edge *e = make_edges(m);
+    *ghost = m->rest ? malloc(sizeof **ghost * (size_t)n) : NULL;
+    if (!e || (m->rest && !*ghost)) {
+        free(e);
+        return PAL_ERR_MEMORY;
+    }
+    for (int i = 0, k; i < n; i += k) {
+        k = same_edge(e, i, n);
+        bool outline = is_outline(m, m->x, axes->eye, e + i, k), crease = !outline && is_crease(m, e + i, k);
+        for (int j = i; j < i + k; j++) {
+            if (outline) f[e[j].tri].outline |= (uint8_t)(1 << e[j].corner);
+            if (crease) f[e[j].tri].crease |= (uint8_t)(1 << e[j].corner);
+        }
+        if (!m->rest || !is_outline(m, m->rest, axes->eye, e + i, k)) continue;
+        double a[3], b[3];
+        pal_picture_project(axes, m->rest + 3 * e[i].low, a);
+        pal_picture_project(axes, m->rest + 3 * e[i].high, b);
+        (*ghost)[(*n_ghost)++] = (pal_picture_line){{a[0], a[1]}, {b[0], b[1]}};
+    }
+    free(e);
+    return PAL_ERR_OK;
+}
+
+/* parts of each edge, so that a part spans few colours */
+static int divisions(const face *f, int most)
+{
+    double low = fmin(f->value[0], fmin(f->value[1], f->value[2]));
+    double high = fmax(f->value[0], fmax(f->value[1], f->value[2]));
+    double apart = (high - low) * PAL_PICTURE_CLASSES;
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(f->value[k])) return 1;
+    return apart < most * CLASSES_A_PIECE ? (int)fmax(1, ceil(apart / CLASSES_A_PIECE)) : most;
+}
+
+/* corner (i, j) of a triangle divided into parts^2: towards corner 1 and corner 2 */
+static void put_corner(const face *f, int parts, int i, int j, pal_picture_piece *out, int corner, double *value)
+{
+    double b = (double)i / parts, c = (double)j / parts, a = 1 - b - c, at[3];
+    for (int k = 0; k < 3; k++) at[k] = a * f->p[0][k] + b * f->p[1][k] + c * f->p[2][k];
+    out->at[corner][0] = at[0], out->at[corner][1] = at[1];
+    out->depth += at[2] / 3;
+    *value += (a * f->value[0] + b * f->value[1] + c * f->value[2]) / 3;
+}
+
+static void put_piece(const face *f, int parts, const int ij[3][2], uint8_t edges, pal_picture_piece *out)
+{
+    double value = 0;
+    *out = (pal_picture_piece){.shade = f->shade, .outline = f->outline & edges, .crease = f->crease & edges};
+    for (int k = 0; k < 3; k++) put_corner(f, parts, ij[k][0], ij[k][1], out, k, &value);
+    value = fmin(1, fmax(0, value)) + 0 * value; /* NaN stays */
+    out->colour = isfinite(value) ? (int16_t)lround(value * (PAL_PICTURE_CLASSES - 1)) : PAL_PICTURE_GREY;
+}
+
+static int put_face(const face *f, int parts, pal_picture_piece *out)
+{
+    int n = 0;
+    for (int i = 0; i < parts; i++)
+        for (int j = 0; i + j < parts; j++) {
+            uint8_t edges = (uint8_t)((j == 0) | (i + j == parts - 1) << 1 | (i == 0) << 2);
+            put_piece(f, parts, (const int[3][2]){{i, j}, {i + 1, j}, {i, j + 1}}, edges, out + n++);
+            if (i + j + 1 < parts)
+                put_piece(f, parts, (const int[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}}, 0, out + n++);
+        }
+    return n;
+}
+
+static int by_depth(const void *a, const void *b)
+{
+    const pal_picture_piece *p = a, *q = b;
+    if (p->depth != q->depth) return p->depth < q->depth ? -1 : 1;
+    return memcmp(p->at, q->at, sizeof p->at);
+}
+
+pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *axes, int most, pal_picture_piece **piece,
+                           int *n_piece, pal_picture_line **ghost, int *n_ghost)
+{
+    *piece = NULL, *ghost = NULL;
+    *n_piece = *n_ghost = 0;
+    face *f = malloc(sizeof *f * (size_t)(m->n_tri > 0 ? m->n_tri : 1));
+    if (!f) return PAL_ERR_MEMORY;
+    make_faces(m, axes, f);
+    pal_err err = mark_edges(m, axes, f, ghost, n_ghost);
+    int parts = DIVIDE_MOST + 1;
+    long long n;
+    do {
+        n = 0, parts--;
+        for (int t = 0; t < m->n_tri; t++) {
+            int d = f[t].seen ? divisions(&f[t], parts) : 0;
+            n += d * d;
+        }
+    } while (n > most && parts > 1);
+    if (!err) *piece = malloc(sizeof **piece * (size_t)(n > 0 ? n : 1));
+    if (!err && !*piece) err = PAL_ERR_MEMORY;
+    for (int t = 0; t < m->n_tri && !err; t++)
+        if (f[t].seen) *n_piece += put_face(&f[t], divisions(&f[t], parts), *piece + *n_piece);
+    if (!err) qsort(*piece, (size_t)*n_piece, sizeof **piece, by_depth);
+    if (err) {
+        free(*ghost);
+        *ghost = NULL;
+        *n_ghost = 0;
+    }
+    free(f);
+    return err;
+}

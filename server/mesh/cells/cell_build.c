@@ -1,0 +1,668 @@
+/* Builds the radial-edge complex from loops (A 3.4.4; Weiler 1988): faces and edges are found by hashing, each in the
+ * order of its first use; then mates, radials, rows, boundary. Linear time.
+ *
+ * A cell is a ball when its surface is in one piece, closed, oriented and V - E + F = 2. Cells fill the neighbourhood
+ * of a vertex when its edges, faces and cells satisfy V - E + F = 2 (inside) or 1 (boundary) as points, arcs and
+ * patches of a small sphere about it; vertices where sheets of the boundary touch are only marked. */
+#include "server/mesh/cells/cells.h"
+
+#include "server/base/vec3.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MOST_ITEMS (INT32_MAX / 4)
+#define FARTHEST_M 1e9
+
+typedef struct builder {
+    const pal_cell_loops *in;
+    pal_cells *c;
+    int32_t *table; /* hash table of faces, then of edges: index + 1, 0 free [mask + 1] */
+    int32_t *stamp; /* per vertex: scratch                                             */
+    int32_t *last;  /* per edge, per edge use and per loop: scratch                    */
+    size_t mask;
+    pal_note *note;
+} builder;
+
+/* ---- messages ---- */
+
+/* cell of a loop; for messages only */
+static int32_t cell_of_loop(const pal_cell_loops *in, int32_t loop)
+{
+    int32_t low = 0, high = in->n_cell - 1;
+    while (low < high) {
+        int32_t mid = low + (high - low + 1) / 2;
+        if (in->cell[mid] <= loop)
+            low = mid;
+        else
+            high = mid - 1;
+    }
+    return low;
+}
+
+/* what messages call number n */
+static int shown(const builder *b, int32_t n)
+{
+    return n + b->in->count_from;
+}
+
+/* "line N", or "cells" when there are no lines */
+typedef struct place {
+    char text[32];
+} place;
+
+static place place_of(const int64_t *line, int32_t i)
+{
+    place at = {"cells"};
+    if (line) snprintf(at.text, sizeof at.text, "line %lld", (long long)line[i]);
+    return at;
+}
+
+static pal_err __attribute__((format(printf, 3, 4)))
+refuse_loop(const builder *b, int32_t loop, const char *format, ...)
+{
+    if (!b->note) return PAL_ERR_REFUSED;
+    char sentence[320];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(sentence, sizeof sentence, format, list);
+    va_end(list);
+    int32_t cell = cell_of_loop(b->in, loop);
+    return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: cell %d, face %d: %s", place_of(b->in->line, loop).text,
+                        shown(b, cell), shown(b, loop - b->in->cell[cell]), sentence);
+}
+
+static pal_err __attribute__((format(printf, 3, 4)))
+refuse_cell(const builder *b, int32_t cell, const char *format, ...)
+{
+    if (!b->note) return PAL_ERR_REFUSED;
+    char sentence[320];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(sentence, sizeof sentence, format, list);
+    va_end(list);
+    return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: cell %d %s", place_of(b->in->line, b->in->cell[cell]).text,
+                        shown(b, cell), sentence);
+}
+
+/* ---- what is given ---- */
+
+static pal_err check_counts(const builder *b)
+{
+    const pal_cell_loops *in = b->in;
+    pal_note *note = b->note;
+    if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > MOST_ITEMS || in->n_cell > MOST_ITEMS)
+        return pal_note_set(note, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
+                            in->n_vertex, in->n_cell, MOST_ITEMS);
+    for (int32_t c = 0; c < in->n_cell; c++)
+        if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > MOST_ITEMS)
+            return pal_note_set(note, PAL_ERR_REFUSED, "cells: cell %d has no faces", shown(b, c));
+    for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
+        int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
+        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MOST || in->loop[l + 1] > MOST_ITEMS)
+            return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MOST);
+    }
+    return PAL_ERR_OK;
+}
+
+static bool in_reach(const double x[3])
+{
+    return fabs(x[0]) <= FARTHEST_M && fabs(x[1]) <= FARTHEST_M && fabs(x[2]) <= FARTHEST_M;
+}
+
+/* corners in range and once in a loop, every vertex used, positions finite */
+static pal_err check_corners(const builder *b)
+{
+    const pal_cell_loops *in = b->in;
+    for (int32_t v = 0; v < in->n_vertex; v++) {
+        const double *x = in->x + 3 * (size_t)v;
+        if (!in_reach(x))
+            return pal_note_set(b->note, PAL_ERR_REFUSED,
+                                "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
+                                place_of(in->vertex_line, v).text, shown(b, v), x[0], x[1], x[2], FARTHEST_M);
+        b->stamp[v] = -1;
+    }
+    for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
+        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) {
+            int32_t v = in->corner[k];
+            if (v < 0 || v >= in->n_vertex)
+                return refuse_loop(b, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
+            if (b->stamp[v] == l) return refuse_loop(b, l, "has vertex %d twice", shown(b, v));
+            b->stamp[v] = l;
+        }
+    for (int32_t v = 0; v < in->n_vertex; v++)
+        if (b->stamp[v] < 0)
+            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
+                                place_of(in->vertex_line, v).text, shown(b, v));
+    return PAL_ERR_OK;
+}
+
+static bool sharp_fits(float s)
+{
+    return s >= 0 && s <= PAL_SHARP_EVER;
+}
+
+/* ---- memory ---- */
+
+static pal_err get_memory(builder *b)
+{
+    const pal_cell_loops *in = b->in;
+    pal_cells *c = b->c;
+    size_t n_loop = (size_t)c->n_face_use, n_corner = (size_t)c->n_edge_use, n_vertex = (size_t)c->n_vertex;
+    for (b->mask = 16; b->mask < 2 * n_corner; b->mask *= 2) {
+    }
+    b->table = malloc(b->mask * sizeof *b->table);
+    b->mask--;
+    b->last = malloc(n_corner * sizeof *b->last);
+    c->x = malloc(n_vertex * 3 * sizeof *c->x);
+    c->vertex_sharp = calloc(n_vertex, sizeof *c->vertex_sharp);
+    c->vertex_boundary = calloc(n_vertex, sizeof *c->vertex_boundary);
+    c->vertex_pinched = calloc(n_vertex, sizeof *c->vertex_pinched);
+    c->edge = malloc(n_corner * sizeof *c->edge);
+    c->face = malloc(n_loop * sizeof *c->face);
+    c->cell_use = malloc(((size_t)in->n_cell + 1) * sizeof *c->cell_use);
+    c->face_use = malloc((n_loop + 1) * sizeof *c->face_use);
+    c->edge_use = malloc(n_corner * sizeof *c->edge_use);
+    return b->table && b->last && c->x && c->vertex_sharp && c->vertex_boundary && c->vertex_pinched && c->edge &&
+                   c->face && c->cell_use && c->face_use && c->edge_use
+               ? PAL_ERR_OK
+               : PAL_ERR_MEMORY;
+}
+
+static void copy_loops(builder *b)
+{
+    const pal_cell_loops *in = b->in;
+    pal_cells *c = b->c;
+    memcpy(c->x, in->x, (size_t)c->n_vertex * 3 * sizeof *c->x);
+    memcpy(c->cell_use, in->cell, ((size_t)c->n_cell + 1) * sizeof *c->cell_use);
+    for (int32_t i = 0; i < c->n_cell; i++)
+        for (int32_t l = in->cell[i]; l < in->cell[i + 1]; l++) {
+            c->face_use[l] = (pal_face_use){.cell = i, .face = -1, .first_use = in->loop[l], .mate = -1};
+            for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++)
+                c->edge_use[k] =
+                    (pal_edge_use){.edge = -1, .vertex = in->corner[k], .face_use = l, .mate = -1, .radial = -1};
+        }
+    c->face_use[c->n_face_use] = (pal_face_use){.cell = -1, .face = -1, .first_use = c->n_edge_use, .mate = -1};
+}
+
+/* ---- faces and edges ---- */
+
+static uint64_t mixed(uint64_t z)
+{
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return z ^ (z >> 31);
+}
+
+typedef enum likeness { OTHER, OPPOSITE, EQUAL, SHUFFLED } likeness;
+
+/* how two loops of the same complex compare */
+static likeness compare_loops(const pal_cell_loops *in, int32_t a, int32_t b)
+{
+    const int32_t *p = in->corner + in->loop[a], *q = in->corner + in->loop[b];
+    int n = in->loop[a + 1] - in->loop[a], at = 0;
+    if (n != in->loop[b + 1] - in->loop[b]) return OTHER;
+    while (at < n && p[at] != q[0]) at++;
+    if (at == n) return OTHER;
+    bool equal = true, opposite = true;
+    for (int k = 0; k < n; k++) {
+        equal &= p[(at + k) % n] == q[k];
+        opposite &= p[(at + n - k) % n] == q[k];
+    }
+    if (opposite || equal) return opposite ? OPPOSITE : EQUAL;
+    for (int k = 0; k < n; k++) {
+        int j = 0;
+        while (j < n && p[j] != q[k]) j++;
+        if (j == n) return OTHER;
+    }
+    return SHUFFLED;
+}
+
+/* loop l has the corners of face f */
+static pal_err join_face(builder *b, int32_t l, int32_t f, likeness like)
+{
+    pal_cell_face *face = &b->c->face[f];
+    pal_face_use *use = b->c->face_use;
+    int32_t cell = use[face->use[0]].cell, vertex = b->in->corner[b->in->loop[l]];
+    if (like == SHUFFLED)
+        return refuse_loop(b, l, "has the corners of a face of cell %d in another order", shown(b, cell));
+    if (cell == use[l].cell || (face->use[1] >= 0 && use[face->use[1]].cell == use[l].cell))
+        return refuse_loop(b, l, "is a face of the same cell already, from vertex %d on", shown(b, vertex));
+    if (face->use[1] >= 0)
+        return refuse_loop(b, l, "is a face of cells %d and %d already, a face has two cells at most", shown(b, cell),
+                           shown(b, use[face->use[1]].cell));
+    if (like == EQUAL)
+        return refuse_loop(b, l, "runs the same way round in cell %d: one of the two is inside out", shown(b, cell));
+    face->use[1] = l;
+    use[l].face = f, use[l].sign = -1, use[l].mate = face->use[0];
+    use[face->use[0]].mate = l;
+    return PAL_ERR_OK;
+}
+
+static pal_err find_faces(builder *b)
+{
+    pal_cells *c = b->c;
+    const pal_cell_loops *in = b->in;
+    memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
+    for (int32_t l = 0; l < c->n_face_use; l++) {
+        uint64_t key = 0;
+        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) key += mixed((uint64_t)in->corner[k] + 1);
+        size_t at = mixed(key) & b->mask;
+        likeness like = OTHER;
+        for (; b->table[at]; at = (at + 1) & b->mask) {
+            like = compare_loops(in, c->face[b->table[at] - 1].use[0], l);
+            if (like != OTHER) break;
+        }
+        if (like != OTHER) {
+            PAL_TRY(join_face(b, l, b->table[at] - 1, like));
+            continue;
+        }
+        c->face[c->n_face] = (pal_cell_face){.use = {l, -1}};
+        c->face_use[l].face = c->n_face, c->face_use[l].sign = 1;
+        b->table[at] = ++c->n_face;
+    }
+    return PAL_ERR_OK;
+}
+
+/* place in the table of the edge between two vertices: taken by it, or free */
+static size_t edge_place(const builder *b, int32_t v, int32_t w)
+{
+    const pal_cell_edge *edge = b->c->edge;
+    uint32_t low = (uint32_t)(v < w ? v : w), high = (uint32_t)(v < w ? w : v);
+    size_t at = mixed(((uint64_t)high << 32 | low) + 1) & b->mask;
+    for (; b->table[at]; at = (at + 1) & b->mask) {
+        const pal_cell_edge *e = &edge[b->table[at] - 1];
+        if ((e->vertex[0] == v && e->vertex[1] == w) || (e->vertex[0] == w && e->vertex[1] == v)) break;
+    }
+    return at;
+}
+
+static void find_edges(builder *b)
+{
+    pal_cells *c = b->c;
+    memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
+    for (int32_t u = 0; u < c->n_edge_use; u++) {
+        int32_t v = c->edge_use[u].vertex, w = c->edge_use[pal_cells_next(c, u)].vertex;
+        size_t at = edge_place(b, v, w);
+        if (!b->table[at]) {
+            c->edge[c->n_edge] = (pal_cell_edge){.vertex = {v, w}};
+            b->table[at] = ++c->n_edge;
+        }
+        c->edge_use[u].edge = b->table[at] - 1;
+    }
+}
+
+/* the other side of each face runs backwards */
+static void join_mates(pal_cells *c)
+{
+    for (int32_t f = 0; f < c->n_face; f++) {
+        if (c->face[f].use[1] < 0) continue;
+        int32_t a, n = pal_cells_face_loop(c, f, &a), z = c->face_use[c->face[f].use[1]].first_use, at = 0;
+        int32_t far = c->edge_use[a + 1].vertex;
+        while (c->edge_use[z + at].vertex != far) at++;
+        for (int32_t k = 0; k < n; k++) {
+            int32_t other = z + (at + n - k) % n;
+            c->edge_use[a + k].mate = other, c->edge_use[other].mate = a + k;
+        }
+    }
+}
+
+/* ---- cells ---- */
+
+/* the two uses of every edge in a cell */
+static pal_err join_radials(builder *b, int32_t cell)
+{
+    pal_cells *c = b->c;
+    int32_t first = c->face_use[c->cell_use[cell]].first_use, end = c->face_use[c->cell_use[cell + 1]].first_use;
+    for (int32_t u = first; u < end; u++) {
+        pal_edge_use *use = &c->edge_use[u];
+        int32_t other = b->last[use->edge];
+        if (other < first) { /* the first in this cell */
+            b->last[use->edge] = u;
+            continue;
+        }
+        pal_edge_use *o = &c->edge_use[other];
+        int32_t v = shown(b, use->vertex), w = shown(b, pal_cells_far(c, u));
+        if (o->radial >= 0)
+            return refuse_loop(b, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
+        if (o->vertex == use->vertex)
+            return refuse_loop(b, use->face_use,
+                               "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v,
+                               w, shown(b, o->face_use - c->cell_use[cell]));
+        o->radial = u, use->radial = other;
+    }
+    for (int32_t u = first; u < end; u++)
+        if (c->edge_use[u].radial < 0)
+            return refuse_loop(b, c->edge_use[u].face_use,
+                               "no other face of the cell at the edge of vertices %d and %d: it is not closed",
+                               shown(b, c->edge_use[u].vertex), shown(b, pal_cells_far(c, u)));
+    return PAL_ERR_OK;
+}
+
+/* faces that are reached from a cell's first one over its edges */
+static int32_t count_reached(const builder *b, int32_t cell)
+{
+    const pal_cells *c = b->c;
+    int32_t *stack = b->last, n_stack = 0, first = c->cell_use[cell], n_reached = 0;
+    int32_t *seen = b->table;
+    memset(seen, 0, (size_t)(c->cell_use[cell + 1] - first) * sizeof *seen);
+    stack[n_stack++] = first, seen[0] = 1;
+    while (n_stack > 0) {
+        int32_t f = stack[--n_stack];
+        n_reached++;
+        for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++) {
+            int32_t g = c->edge_use[c->edge_use[u].radial].face_use;
+            if (seen[g - first]) continue;
+            seen[g - first] = 1, stack[n_stack++] = g;
+        }
+    }
+    return n_reached;
+}
+
+/* corners of all cells: counts them, or lists them when there is room */
+static int32_t list_corners(builder *b)
+{
+    pal_cells *c = b->c;
+    int32_t n = 0;
+    memset(b->stamp, -1, (size_t)c->n_vertex * sizeof *b->stamp);
+    for (int32_t i = 0; i < c->n_cell; i++) {
+        if (c->cell_vertex.start) c->cell_vertex.start[i] = n;
+        int32_t end = c->face_use[c->cell_use[i + 1]].first_use;
+        for (int32_t u = c->face_use[c->cell_use[i]].first_use; u < end; u++) {
+            int32_t v = c->edge_use[u].vertex;
+            if (b->stamp[v] == i) continue;
+            b->stamp[v] = i;
+            if (c->cell_vertex.start) c->cell_vertex.item[n] = v, c->corner_use[n] = u;
+            n++;
+        }
+    }
+    if (c->cell_vertex.start) c->cell_vertex.start[c->n_cell] = n;
+    return n;
+}
+
+static pal_err find_corners(builder *b)
+{
+    pal_cells *c = b->c;
+    size_t n = (size_t)list_corners(b);
+    int32_t *start = malloc(((size_t)c->n_cell + 1) * sizeof *start);
+    c->cell_vertex.item = malloc(n * sizeof *c->cell_vertex.item);
+    c->corner_use = malloc(n * sizeof *c->corner_use);
+    c->cell_vertex.start = start;
+    if (!start || !c->cell_vertex.item || !c->corner_use) return PAL_ERR_MEMORY;
+    list_corners(b);
+    return PAL_ERR_OK;
+}
+
+static pal_err find_cells(builder *b)
+{
+    pal_cells *c = b->c;
+    memset(b->last, -1, (size_t)c->n_edge_use * sizeof *b->last);
+    for (int32_t i = 0; i < c->n_cell; i++) PAL_TRY(join_radials(b, i));
+    PAL_TRY(find_corners(b));
+    for (int32_t i = 0; i < c->n_cell; i++) {
+        int32_t n_face = c->cell_use[i + 1] - c->cell_use[i];
+        int32_t n_edge = (c->face_use[c->cell_use[i + 1]].first_use - c->face_use[c->cell_use[i]].first_use) / 2;
+        int32_t n_vertex = c->cell_vertex.start[i + 1] - c->cell_vertex.start[i];
+        if (count_reached(b, i) != n_face) return refuse_cell(b, i, "is in pieces: its faces do not hang together");
+        if (n_vertex - n_edge + n_face != 2)
+            return refuse_cell(b, i, "is no ball: %d vertices - %d edges + %d faces make %d, not 2", n_vertex, n_edge,
+                               n_face, n_vertex - n_edge + n_face);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- rows ---- */
+
+/* turns rows over: to[b] lists the a with b in from[a], ascending */
+static pal_err turn_rows(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
+{
+    int32_t n = from->start[n_from];
+    to->start = calloc((size_t)n_to + 2, sizeof *to->start);
+    to->item = malloc((n > 0 ? (size_t)n : 1) * sizeof *to->item);
+    if (!to->start || !to->item) return PAL_ERR_MEMORY;
+    for (int32_t k = 0; k < n; k++) to->start[from->item[k] + 2]++;
+    for (int32_t i = 1; i <= n_to; i++) to->start[i + 1] += to->start[i];
+    for (int32_t a = 0; a < n_from; a++)
+        for (int32_t k = from->start[a]; k < from->start[a + 1]; k++) to->item[to->start[from->item[k] + 1]++] = a;
+    return PAL_ERR_OK;
+}
+
+/* rows to vertices and edges from what runs along them: vertices of edges, vertices and edges of faces, edges of cells
+ */
+static pal_err find_rows(builder *b)
+{
+    pal_cells *c = b->c;
+    int32_t most = c->n_edge > c->n_face ? c->n_edge : c->n_face;
+    if (c->n_cell > most) most = c->n_cell;
+    int32_t n_item = c->n_edge_use > 2 * c->n_edge ? c->n_edge_use : 2 * c->n_edge, n = 0;
+    pal_cell_rows rows = {malloc(((size_t)most + 1) * sizeof(int32_t)), malloc((size_t)n_item * sizeof(int32_t))};
+    pal_err err = rows.start && rows.item ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (!err) {
+        for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
+        for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
+        err = turn_rows(&rows, c->n_edge, c->n_vertex, &c->vertex_edge);
+    }
+    for (int edges = 0; edges < 2 && !err; edges++) {
+        n = 0;
+        for (int32_t f = 0; f < c->n_face; f++) {
+            int32_t first, m = pal_cells_face_loop(c, f, &first);
+            rows.start[f] = n;
+            for (int32_t u = first; u < first + m; u++)
+                rows.item[n++] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex;
+        }
+        rows.start[c->n_face] = n;
+        err = turn_rows(&rows, c->n_face, edges ? c->n_edge : c->n_vertex, edges ? &c->edge_face : &c->vertex_face);
+    }
+    if (!err) {
+        n = 0;
+        for (int32_t i = 0; i < c->n_cell; i++) {
+            rows.start[i] = n;
+            int32_t end = c->face_use[c->cell_use[i + 1]].first_use;
+            for (int32_t u = c->face_use[c->cell_use[i]].first_use; u < end; u++)
+                if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
+        }
+        rows.start[c->n_cell] = n;
+        err = turn_rows(&rows, c->n_cell, c->n_edge, &c->edge_cell);
+    }
+    if (!err) err = turn_rows(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
+    free(rows.start);
+    free(rows.item);
+    return err;
+}
+
+/* ---- boundary ---- */
+
+static void find_boundary(pal_cells *c)
+{
+    for (int32_t f = 0; f < c->n_face; f++) {
+        if (!pal_cells_face_boundary(c, f)) continue;
+        int32_t first, n = pal_cells_face_loop(c, f, &first);
+        c->n_boundary_face++;
+        for (int32_t u = first; u < first + n; u++) {
+            c->vertex_boundary[c->edge_use[u].vertex] = true;
+            c->edge[c->edge_use[u].edge].boundary = true;
+        }
+    }
+    for (int32_t e = 0; e < c->n_edge; e++) {
+        int32_t n = 0;
+        for (int32_t k = c->edge_face.start[e]; k < c->edge_face.start[e + 1]; k++)
+            n += pal_cells_face_boundary(c, c->edge_face.item[k]);
+        if (n <= 2) continue;
+        c->edge[e].pinched = true, c->n_pinched_edge++;
+        c->vertex_pinched[c->edge[e].vertex[0]] = c->vertex_pinched[c->edge[e].vertex[1]] = true;
+    }
+}
+
+/* marks vertices with more than one ring of boundary faces */
+static void find_pinched(builder *b)
+{
+    pal_cells *c = b->c;
+    int32_t *seen = b->last;
+    memset(b->stamp, 0, (size_t)c->n_vertex * sizeof *b->stamp);
+    memset(seen, 0, (size_t)c->n_edge_use * sizeof *seen);
+    for (int32_t u = 0; u < c->n_edge_use; u++) {
+        if (c->edge_use[u].mate >= 0 || seen[u]) continue;
+        int32_t v = c->edge_use[u].vertex, at = u;
+        do {
+            seen[at] = 1;
+            at = pal_cells_over(c, pal_cells_prev(c, at));
+        } while (at != u);
+        if (b->stamp[v]++) c->vertex_pinched[v] = true;
+    }
+    for (int32_t v = 0; v < c->n_vertex; v++) c->n_pinched_vertex += c->vertex_pinched[v];
+}
+
+/* cells on the walks round an edge: the ring of an inner edge, all fans of one of the boundary */
+static int32_t count_round(const pal_cells *c, int32_t e, int32_t first)
+{
+    int32_t n = 0, u = first;
+    if (!c->edge[e].boundary) {
+        do {
+            n++;
+            u = c->edge_use[c->edge_use[u].radial].mate;
+        } while (u != first);
+        return n;
+    }
+    /* a fan ends where it has no mate; the walks from both its ends count it twice */
+    for (int32_t k = c->edge_face.start[e]; k < c->edge_face.start[e + 1]; k++) {
+        if (!pal_cells_face_boundary(c, c->edge_face.item[k])) continue;
+        pal_cells_face_loop(c, c->edge_face.item[k], &u);
+        while (c->edge_use[u].edge != e) u++;
+        for (;;) {
+            n++;
+            u = c->edge_use[c->edge_use[u].radial].mate;
+            if (u < 0) break;
+        }
+    }
+    return n / 2;
+}
+
+static pal_err check_neighbourhoods(builder *b)
+{
+    pal_cells *c = b->c;
+    for (int32_t u = c->n_edge_use - 1; u >= 0; u--) b->last[c->edge_use[u].edge] = u;
+    for (int32_t e = 0; e < c->n_edge; e++) {
+        int32_t n = c->edge_cell.start[e + 1] - c->edge_cell.start[e], first = b->last[e];
+        if (count_round(c, e, first) != n)
+            return refuse_loop(b, c->edge_use[first].face_use,
+                               "cells go more than once round the edge of vertices %d and %d",
+                               shown(b, c->edge[e].vertex[0]), shown(b, c->edge[e].vertex[1]));
+    }
+    for (int32_t v = 0; v < c->n_vertex; v++) {
+        if (c->vertex_pinched[v]) continue;
+        int32_t n_edge = c->vertex_edge.start[v + 1] - c->vertex_edge.start[v];
+        int32_t n_face = c->vertex_face.start[v + 1] - c->vertex_face.start[v];
+        int32_t first = c->vertex_cell.start[v], n_cell = c->vertex_cell.start[v + 1] - first;
+        if (n_edge - n_face + n_cell != (c->vertex_boundary[v] ? 1 : 2))
+            return refuse_cell(b, c->vertex_cell.item[first],
+                               "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
+                               shown(b, v), n_edge, n_face, n_cell);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- sharpness ---- */
+
+static pal_err set_sharpness(builder *b)
+{
+    const pal_cell_loops *in = b->in;
+    pal_cells *c = b->c;
+    for (int32_t v = 0; in->vertex_sharp && v < c->n_vertex; v++) {
+        c->vertex_sharp[v] = in->vertex_sharp[v];
+        if (!sharp_fits(in->vertex_sharp[v]))
+            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
+                                place_of(in->vertex_line, v).text, shown(b, v), (double)in->vertex_sharp[v],
+                                (double)PAL_SHARP_EVER);
+    }
+    memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
+    for (int32_t e = 0; in->n_edge_tag > 0 && e < c->n_edge; e++)
+        b->table[edge_place(b, c->edge[e].vertex[0], c->edge[e].vertex[1])] = e + 1;
+    for (int32_t k = 0; k < in->n_edge_tag; k++) {
+        const pal_cell_tag *tag = &in->edge_tag[k];
+        int32_t e = b->table[edge_place(b, tag->a, tag->b)] - 1;
+        if (e < 0 || !sharp_fits(tag->sharp))
+            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
+                                place_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
+                                (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
+        c->edge[e].sharp = fmaxf(c->edge[e].sharp, tag->sharp);
+    }
+    for (int32_t k = 0; k < in->n_face_tag; k++) {
+        const pal_cell_tag *tag = &in->face_tag[k];
+        if (tag->a < 0 || tag->a >= c->n_face_use)
+            return pal_note_set(b->note, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
+                                (long long)tag->a, c->n_face_use);
+        if (!sharp_fits(tag->sharp))
+            return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
+                               (double)PAL_SHARP_EVER);
+        pal_cell_face *face = &c->face[c->face_use[tag->a].face];
+        face->sharp = fmaxf(face->sharp, tag->sharp);
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- all of it ---- */
+
+static void trim(pal_cells *c)
+{
+    pal_cell_edge *edge = realloc(c->edge, (size_t)c->n_edge * sizeof *edge);
+    if (edge) c->edge = edge;
+    pal_cell_face *face = realloc(c->face, (size_t)c->n_face * sizeof *face);
+    if (face) c->face = face;
+}
+
+static pal_err build(builder *b)
+{
+    PAL_TRY(check_counts(b));
+    b->stamp = malloc((size_t)b->in->n_vertex * sizeof *b->stamp);
+    if (!b->stamp) return PAL_ERR_MEMORY;
+    PAL_TRY(check_corners(b));
+    pal_cells *c = b->c;
+    c->n_vertex = b->in->n_vertex, c->n_cell = b->in->n_cell;
+    c->n_face_use = b->in->cell[c->n_cell];
+    c->n_edge_use = b->in->loop[c->n_face_use];
+    PAL_TRY(get_memory(b));
+    copy_loops(b);
+    PAL_TRY(find_faces(b));
+    find_edges(b);
+    trim(c);
+    join_mates(c);
+    PAL_TRY(find_cells(b));
+    PAL_TRY(find_rows(b));
+    find_boundary(c);
+    find_pinched(b);
+    PAL_TRY(check_neighbourhoods(b));
+    return set_sharpness(b);
+}
+
+/* faces with area and cells with volume, named as the loops are */
+static pal_err check_shape(const builder *b)
+{
+    pal_cells_fault fault;
+    if (pal_cells_shape_good(b->c, NULL, &fault)) return PAL_ERR_OK;
+    if (fault.face_use >= 0)
+        return refuse_loop(b, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
+                           fault.size_m);
+    return refuse_cell(b, fault.cell,
+                       "has no positive volume (%.3g m^3, %.3g m across): its faces must run "
+                       "counter-clockwise seen from outside",
+                       fault.measure, fault.size_m);
+}
+
+pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_note *note)
+{
+    pal_cells cells = {0};
+    builder b = {.in = loops, .c = &cells, .note = note};
+    pal_err err = build(&b);
+    if (!err) err = check_shape(&b);
+    free(b.table);
+    free(b.stamp);
+    free(b.last);
+    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "cells: no memory for %d cells", loops->n_cell);
+    if (err)
+        pal_cells_free(&cells);
+    else
+        *out = cells;
+    return err;
+}

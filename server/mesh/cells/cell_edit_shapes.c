@@ -1,0 +1,217 @@
+/* Edits of control cells that make new ones or join old ones (A 4.1, Fig. 7): extrude, merge, bridge. */
+#include "server/base/vec3.h"
+#include "server/mesh/cells/cell_edit_parts.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* rows of the old vertices, each itself */
+static void put_own_rows(pal_edit_work *w)
+{
+    for (int32_t v = 0; v < w->from->n_vertex; v++) {
+        pal_row_add(&w->rows, v, 1);
+        pal_row_end(&w->rows);
+    }
+}
+
+static pal_err check_boundary_face(const pal_edit_work *w, int32_t face, pal_note *note)
+{
+    PAL_TRY(pal_edit_check_number(w, "face", face, w->from->n_face, note));
+    if (pal_cells_face_boundary(w->from, face)) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: face %d lies between cells %d and %d, not on the boundary", w->what,
+                        face, w->from->face_use[w->from->face[face].use[0]].cell,
+                        w->from->face_use[w->from->face[face].use[1]].cell);
+}
+
+/* A prism on n corners: base runs as the boundary face it stands on, tip [n] as the base, side by side. Its loops: base
+ * turned over, tip, sides. */
+static void put_prism(pal_edit_work *w, int32_t n, const int32_t *base, const int32_t *tip, int32_t cell_from)
+{
+    for (int32_t k = n - 1; k >= 0; k--) pal_edit_corner(w, base[k]);
+    pal_edit_end_loop(w, 0);
+    for (int32_t k = 0; k < n; k++) pal_edit_corner(w, tip[k]);
+    pal_edit_end_loop(w, 0);
+    for (int32_t k = 0; k < n; k++) {
+        int32_t next = k + 1 < n ? k + 1 : 0;
+        pal_edit_corner(w, base[k]);
+        pal_edit_corner(w, base[next]);
+        pal_edit_corner(w, tip[next]);
+        pal_edit_corner(w, tip[k]);
+        pal_edit_end_loop(w, 0);
+    }
+    pal_edit_end_cell(w, cell_from);
+}
+
+/* room for one prism of n corners and more vertices */
+static pal_err room_for_prism(pal_edit_work *w, int32_t n, int32_t more, pal_note *note)
+{
+    const pal_cells *c = w->from;
+    return pal_edit_room(w, (int64_t)c->n_vertex + more, (int64_t)c->n_cell + 1, (int64_t)c->n_face_use + n + 2,
+                         (int64_t)c->n_edge_use + 6 * n, note);
+}
+
+static int32_t list_corners(const pal_cells *c, int32_t face, int32_t corner[PAL_CELL_LOOP_MOST])
+{
+    int32_t first, n = pal_cells_face_loop(c, face, &first);
+    for (int32_t k = 0; k < n; k++) corner[k] = c->edge_use[first + k].vertex;
+    return n;
+}
+
+/* ---- extrude ---- */
+
+static void put_extruded(pal_edit_work *w, int32_t face, double distance_m, double scale)
+{
+    const pal_cells *c = w->from;
+    int32_t base[PAL_CELL_LOOP_MOST], tip[PAL_CELL_LOOP_MOST], n = list_corners(c, face, base);
+    double centre[3], along[3], out[3];
+    pal_cells_face_centre(c, NULL, face, centre);
+    pal_cells_face_area(c, NULL, face, along);
+    pal_scale3(out, distance_m / pal_norm3(along), along);
+    put_own_rows(w);
+    for (int32_t k = 0; k < n; k++) {
+        tip[k] = c->n_vertex + k;
+        double *to = w->offset + 3 * (size_t)tip[k];
+        pal_sub3(to, c->x + 3 * (size_t)base[k], centre);
+        pal_scale3(to, scale - 1, to);
+        pal_add3(to, to, out);
+        pal_row_add(&w->rows, base[k], 1);
+        pal_row_end(&w->rows);
+    }
+    pal_edit_put_old(w, NULL);
+    w->first_new = c->n_cell, w->turned_face = face;
+    w->face_loop = c->n_face_use + 1;
+    put_prism(w, n, base, tip, c->face_use[c->face[face].use[0]].cell);
+}
+
+pal_err pal_cells_extrude(const pal_cells *from, int32_t face, double distance_m, double scale, pal_cells_edit *out,
+                          pal_note *note)
+{
+    pal_edit_work w = pal_edit_begin(from, "extrude face %d", face);
+    int32_t first;
+    memset(out, 0, sizeof *out);
+    PAL_TRY(check_boundary_face(&w, face, note));
+    if (!(distance_m > 0 && distance_m <= 1e9))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: distance is %g m, must be above 0 and at most 1e9", w.what,
+                            distance_m);
+    if (!(scale > 0 && scale <= PAL_EXTRUDE_SCALE_MOST))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: scale is %g, must be above 0 and at most %g", w.what, scale,
+                            PAL_EXTRUDE_SCALE_MOST);
+    int32_t n = pal_cells_face_loop(from, face, &first);
+    pal_err err = room_for_prism(&w, n, n, note);
+    if (!err) put_extruded(&w, face, distance_m, scale);
+    return pal_edit_finish(&w, err, out, note);
+}
+
+/* ---- merge, bridge ---- */
+
+/* Corners of two faces: b[k] goes with a[k]. The loops run opposite ways, of the n turns the nearest is taken. */
+typedef struct pairs {
+    int32_t n, a[PAL_CELL_LOOP_MOST], b[PAL_CELL_LOOP_MOST];
+} pairs;
+
+static void pair_corners(const pal_cells *c, const int32_t *loop, pairs *p)
+{
+    double best = INFINITY;
+    int32_t turn = 0, n = p->n;
+    for (int32_t t = 0; t < n; t++) {
+        double sum = 0;
+        for (int32_t k = 0; k < n; k++) {
+            double d = pal_dist3(c->x + 3 * (size_t)p->a[k], c->x + 3 * (size_t)loop[(t + n - k) % n]);
+            sum += d * d;
+        }
+        if (sum < best) best = sum, turn = t;
+    }
+    for (int32_t k = 0; k < n; k++) p->b[k] = loop[(turn + n - k) % n];
+}
+
+static pal_err find_pairs(const pal_edit_work *w, int32_t face, int32_t other, pairs *p, pal_note *note)
+{
+    const pal_cells *c = w->from;
+    int32_t loop[PAL_CELL_LOOP_MOST];
+    PAL_TRY(check_boundary_face(w, face, note));
+    PAL_TRY(check_boundary_face(w, other, note));
+    if (face == other) return pal_note_set(note, PAL_ERR_REFUSED, "%s: it is the same face twice", w->what);
+    p->n = list_corners(c, face, p->a);
+    int32_t n = list_corners(c, other, loop);
+    if (n != p->n)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: they have %d and %d corners, must have equally many", w->what,
+                            p->n, n);
+    for (int32_t i = 0; i < n; i++)
+        for (int32_t k = 0; k < n; k++)
+            if (p->a[i] == loop[k])
+                return pal_note_set(note, PAL_ERR_REFUSED, "%s: they have vertex %d in common", w->what, loop[k]);
+    pair_corners(c, loop, p);
+    return PAL_ERR_OK;
+}
+
+/* no edge between a pair: merging would leave its cells without it */
+static pal_err check_apart(const pal_edit_work *w, const pairs *p, pal_note *note)
+{
+    const pal_cells *c = w->from;
+    for (int32_t i = 0; i < p->n; i++)
+        for (int32_t k = c->vertex_edge.start[p->a[i]]; k < c->vertex_edge.start[p->a[i] + 1]; k++) {
+            int32_t e = c->vertex_edge.item[k];
+            if (c->edge[e].vertex[0] == p->b[i] || c->edge[e].vertex[1] == p->b[i])
+                return pal_note_set(note, PAL_ERR_REFUSED,
+                                    "%s: edge %d joins their vertices %d and %d and would vanish", w->what, e, p->a[i],
+                                    p->b[i]);
+        }
+    return PAL_ERR_OK;
+}
+
+/* each pair gets the place of its lower number, later ones move up */
+static void put_merged(pal_edit_work *w, const pairs *p)
+{
+    const pal_cells *c = w->from;
+    int32_t *map = w->map, n = 0;
+    for (int32_t v = 0; v < c->n_vertex; v++) map[v] = -1;
+    for (int32_t k = 0; k < p->n; k++) {
+        int32_t low = p->a[k] < p->b[k] ? p->a[k] : p->b[k];
+        map[p->a[k] + p->b[k] - low] = -2 - low;
+        map[low] = -2 - (p->a[k] + p->b[k] - low);
+    }
+    for (int32_t v = 0; v < c->n_vertex; v++) {
+        int32_t mate = map[v] < -1 ? -2 - map[v] : v;
+        if (mate < v) {
+            map[v] = map[mate];
+            continue;
+        }
+        pal_row_add(&w->rows, v, mate == v ? 1 : 0.5);
+        if (mate != v) pal_row_add(&w->rows, mate, 0.5);
+        pal_row_end(&w->rows);
+        map[v] = n++;
+    }
+    pal_edit_put_old(w, map);
+}
+
+pal_err pal_cells_merge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out, pal_note *note)
+{
+    pal_edit_work w = pal_edit_begin(from, "merge faces %d and %d", face, other_face);
+    pairs p;
+    memset(out, 0, sizeof *out);
+    PAL_TRY(find_pairs(&w, face, other_face, &p, note));
+    PAL_TRY(check_apart(&w, &p, note));
+    pal_err err = pal_edit_room(&w, from->n_vertex - p.n, from->n_cell, from->n_face_use, from->n_edge_use, note);
+    if (!err) {
+        put_merged(&w, &p);
+        w.face_loop = from->face[face].use[0];
+    }
+    return pal_edit_finish(&w, err, out, note);
+}
+
+pal_err pal_cells_bridge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out, pal_note *note)
+{
+    pal_edit_work w = pal_edit_begin(from, "bridge faces %d and %d", face, other_face);
+    pairs p;
+    memset(out, 0, sizeof *out);
+    PAL_TRY(find_pairs(&w, face, other_face, &p, note));
+    pal_err err = room_for_prism(&w, p.n, 0, note);
+    if (!err) {
+        put_own_rows(&w);
+        pal_edit_put_old(&w, NULL);
+        w.first_new = from->n_cell;
+        put_prism(&w, p.n, p.a, p.b, from->face_use[from->face[face].use[0]].cell);
+    }
+    return pal_edit_finish(&w, err, out, note);
+}

@@ -1,0 +1,235 @@
+/* Control cells of plain solids: numbered hexahedra whose loops are one table, so that all shapes are oriented alike.
+ */
+#include "server/mesh/cells/cell_shapes.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define TWO_PI 6.283185307179586
+
+/* loops of a hexahedron with corner c at bits 0, 1, 2 for the first, second and third direction, which are right-handed
+ */
+static const int32_t HEX_LOOP[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                       {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+
+static pal_err get_room(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_note *note)
+{
+    if (n_cell > PAL_CELL_SHAPE_MOST)
+        return pal_note_set(note, PAL_ERR_BUDGET, "cells: a shape of %lld cells, at most %d are made",
+                            (long long)n_cell, PAL_CELL_SHAPE_MOST);
+    *l = (pal_cell_loops){.n_vertex = (int32_t)n_vertex, .n_cell = (int32_t)n_cell};
+    l->x = malloc((size_t)n_vertex * 3 * sizeof *l->x);
+    l->cell = malloc(((size_t)n_cell + 1) * sizeof *l->cell);
+    l->loop = malloc(((size_t)n_cell * 6 + 1) * sizeof *l->loop);
+    l->corner = malloc((size_t)n_cell * 24 * sizeof *l->corner);
+    if (!l->x || !l->cell || !l->loop || !l->corner) {
+        pal_cell_loops_free(l);
+        return PAL_ERR_MEMORY;
+    }
+    for (int32_t c = 0; c <= l->n_cell; c++) l->cell[c] = 6 * c;
+    for (int32_t f = 0; f <= 6 * l->n_cell; f++) l->loop[f] = 4 * f;
+    return PAL_ERR_OK;
+}
+
+static void put_hex(pal_cell_loops *l, int32_t cell, const int32_t vertex[8])
+{
+    for (int f = 0; f < 6; f++)
+        for (int k = 0; k < 4; k++) l->corner[24 * (size_t)cell + (size_t)(4 * f + k)] = vertex[HEX_LOOP[f][k]];
+}
+
+static void put_vertex(pal_cell_loops *l, int64_t v, double x, double y, double z)
+{
+    double *to = l->x + 3 * (size_t)v;
+    to[0] = x, to[1] = y, to[2] = z;
+}
+
+/* a cylinder's grid is one of bricks whose first direction may close in itself */
+static void put_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
+{
+    int32_t row = closed ? n[0] : n[0] + 1, cell = 0;
+    for (int32_t k = 0; k < n[2]; k++)
+        for (int32_t j = 0; j < n[1]; j++)
+            for (int32_t i = 0; i < n[0]; i++) {
+                int32_t vertex[8];
+                for (int c = 0; c < 8; c++)
+                    vertex[c] = (i + (c & 1)) % row + row * (j + (c >> 1 & 1) + (n[1] + 1) * (k + (c >> 2)));
+                put_hex(l, cell++, vertex);
+            }
+}
+
+static pal_err finish(pal_cell_loops *l, pal_cells *out, pal_note *note)
+{
+    pal_err err = pal_cells_make(l, out, note);
+    pal_cell_loops_free(l);
+    return err;
+}
+
+static pal_err check_count(const char *name, int32_t n, int32_t least, pal_note *note)
+{
+    if (n >= least && n <= PAL_CELL_SHAPE_MOST) return PAL_ERR_OK;
+    return pal_note_set(note, n < least ? PAL_ERR_REFUSED : PAL_ERR_BUDGET, "cells: %s is %d, must be %d to %d", name,
+                        n, least, PAL_CELL_SHAPE_MOST);
+}
+
+/* above is excluded */
+static pal_err check_length(const char *name, double length, double above, pal_note *note)
+{
+    if (length > above && length <= 1e8) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "cells: %s is %g m, must be above %g and at most 1e8", name, length,
+                        above);
+}
+
+/* corner i of n equal steps from low to high, both ends to the bit */
+static double step_at(int32_t i, int32_t n, double low, double high)
+{
+    return i == n ? high : low + (high - low) * i / n;
+}
+
+/* cells of three counts; the product cannot overflow while it is within the budget */
+static int64_t count_cells(const int32_t n[3])
+{
+    int64_t two = (int64_t)n[0] * n[1];
+    return two > PAL_CELL_SHAPE_MOST ? two : two * n[2];
+}
+
+pal_err pal_cells_block(const int32_t n[3], const double size_m[3], pal_cells *out, pal_note *note)
+{
+    static const char *const count[3] = {"number of cells along x", "number of cells along y",
+                                         "number of cells along z"};
+    static const char *const size[3] = {"size along x", "size along y", "size along z"};
+    pal_cell_loops l;
+    for (int a = 0; a < 3; a++) {
+        PAL_TRY(check_count(count[a], n[a], 1, note));
+        PAL_TRY(check_length(size[a], size_m[a], 0, note));
+    }
+    int64_t v = 0, n_cell = count_cells(n);
+    PAL_TRY(
+        get_room((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MOST ? 1 : n[2] + 1), n_cell, &l, note));
+    for (int32_t k = 0; k <= n[2]; k++)
+        for (int32_t j = 0; j <= n[1]; j++)
+            for (int32_t i = 0; i <= n[0]; i++)
+                put_vertex(&l, v++, step_at(i, n[0], -size_m[0] / 2, size_m[0] / 2),
+                           step_at(j, n[1], -size_m[1] / 2, size_m[1] / 2),
+                           step_at(k, n[2], -size_m[2] / 2, size_m[2] / 2));
+    put_grid(&l, n, false);
+    return finish(&l, out, note);
+}
+
+pal_err pal_cells_tube(const int32_t n[3], double inner_m, double outer_m, double length_m, pal_cells *out,
+                       pal_note *note)
+{
+    pal_cell_loops l;
+    PAL_TRY(check_count("number of cells around", n[0], 3, note));
+    PAL_TRY(check_count("number of cells through the wall", n[1], 1, note));
+    PAL_TRY(check_count("number of cells along the tube", n[2], 1, note));
+    PAL_TRY(check_length("inner radius", inner_m, 0, note));
+    PAL_TRY(check_length("outer radius", outer_m, inner_m, note));
+    PAL_TRY(check_length("length", length_m, 0, note));
+    int64_t v = 0, n_cell = count_cells(n);
+    PAL_TRY(get_room((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MOST ? 1 : n[2] + 1), n_cell, &l, note));
+    /* around, outward, along is a left-handed set of directions when around is counter-clockwise */
+    for (int32_t k = 0; k <= n[2]; k++)
+        for (int32_t j = 0; j <= n[1]; j++)
+            for (int32_t i = 0; i < n[0]; i++) {
+                double a = -TWO_PI * i / n[0], r = step_at(j, n[1], inner_m, outer_m);
+                put_vertex(&l, v++, r * cos(a), r * sin(a), step_at(k, n[2], -length_m / 2, length_m / 2));
+            }
+    put_grid(&l, n, true);
+    return finish(&l, out, note);
+}
+
+pal_err pal_cells_ring(int32_t n, double radius_m, double thick_m, pal_cells *out, pal_note *note)
+{
+    const int32_t count[3] = {n, 1, 1};
+    PAL_TRY(check_length("thickness", thick_m, 0, note));
+    PAL_TRY(check_length("radius", radius_m, thick_m / 2, note));
+    return pal_cells_tube(count, radius_m - thick_m / 2, radius_m + thick_m / 2, thick_m, out, note);
+}
+
+/* Section of the torus: a square of (m + 1)^2 vertices, then m rings of 4 m vertices, each ring in the order of the
+ * square's rim, which is ring 0. */
+static int32_t rim_vertex(int32_t m, int32_t i)
+{
+    int32_t side = i / m, k = i % m, row = m + 1;
+    return side == 0 ? k : side == 1 ? m + k * row : side == 2 ? m * row + m - k : (m - k) * row;
+}
+
+static int32_t ring_vertex(int32_t m, int32_t ring, int32_t i)
+{
+    i %= 4 * m;
+    return ring == 0 ? rim_vertex(m, i) : (m + 1) * (m + 1) + (ring - 1) * 4 * m + i;
+}
+
+/* where a vertex of the section stands, in units of the tube's radius: the square reaches half of it, the rings go over
+ * into the circle */
+static void section_place(int32_t m, int32_t ring, int32_t i, double out[2])
+{
+    static const int turn[4][4] = {{1, 0, 0, 1}, {0, -1, 1, 0}, {-1, 0, 0, -1}, {0, 1, -1, 0}};
+    const int *t = turn[i / m];
+    double s = 2.0 * (i % m) / m - 1, angle = TWO_PI * (-3.0 / 8 + (double)i / (4 * m)), w = (double)ring / m;
+    double h = 0.5 * sqrt(0.5), square[2] = {h * (t[0] * s - t[1]), h * (t[2] * s - t[3])};
+    out[0] = (1 - w) * square[0] + w * cos(angle);
+    out[1] = (1 - w) * square[1] + w * sin(angle);
+}
+
+/* place of each vertex of a section [][2] */
+static void put_section(int32_t m, double *place)
+{
+    double h = 0.5 * sqrt(0.5);
+    for (int32_t j = 0; j <= m; j++)
+        for (int32_t i = 0; i <= m; i++) {
+            double *to = place + 2 * (size_t)(j * (m + 1) + i);
+            to[0] = step_at(i, m, -h, h), to[1] = step_at(j, m, -h, h);
+        }
+    for (int32_t ring = 1; ring <= m; ring++)
+        for (int32_t i = 0; i < 4 * m; i++) section_place(m, ring, i, place + 2 * (size_t)ring_vertex(m, ring, i));
+}
+
+/* corners of cell k of a section: first along the square or the rim, then up or outward */
+static void section_cell(int32_t m, int32_t k, int32_t corner[4])
+{
+    if (k < m * m) {
+        int32_t v = k / m * (m + 1) + k % m;
+        corner[0] = v, corner[1] = v + 1, corner[2] = v + m + 1, corner[3] = v + m + 2;
+        return;
+    }
+    int32_t ring = (k - m * m) / (4 * m), i = (k - m * m) % (4 * m);
+    /* the rim runs counter-clockwise, so outward is on its right: from the far corner back */
+    corner[0] = ring_vertex(m, ring, i + 1), corner[1] = ring_vertex(m, ring, i);
+    corner[2] = ring_vertex(m, ring + 1, i + 1), corner[3] = ring_vertex(m, ring + 1, i);
+}
+
+pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pal_cells *out, pal_note *note)
+{
+    pal_cell_loops l;
+    PAL_TRY(check_count("number of cells around", n, 3, note));
+    PAL_TRY(check_count("number of cells across the middle", m, 1, note));
+    PAL_TRY(check_length("radius of the tube", tube_m, 0, note));
+    PAL_TRY(check_length("radius", radius_m, tube_m, note));
+    const int32_t count[3] = {n, m, m};
+    int64_t n_cell = 5 * count_cells(count), n_place = (int64_t)(m + 1) * (m + 1) + 4LL * m * m;
+    PAL_TRY(get_room(n_cell > PAL_CELL_SHAPE_MOST ? 1 : n_place * n, n_cell, &l, note));
+    double *place = malloc((size_t)n_place * 2 * sizeof *place);
+    if (!place) {
+        pal_cell_loops_free(&l);
+        return PAL_ERR_MEMORY;
+    }
+    put_section(m, place);
+    /* the section lies in the plane of the radius and z; going round clockwise is its third direction */
+    for (int32_t s = 0; s < n; s++) {
+        double a = -TWO_PI * s / n;
+        int32_t here = (int32_t)n_place * s, there = (int32_t)n_place * ((s + 1) % n);
+        for (int32_t v = 0; v < n_place; v++) {
+            double r = radius_m + tube_m * place[2 * v];
+            put_vertex(&l, here + v, r * cos(a), r * sin(a), tube_m * place[2 * v + 1]);
+        }
+        for (int32_t k = 0; k < 5 * m * m; k++) {
+            int32_t corner[4], vertex[8];
+            section_cell(m, k, corner);
+            for (int c = 0; c < 8; c++) vertex[c] = corner[c & 3] + (c & 4 ? there : here);
+            put_hex(&l, s * 5 * m * m + k, vertex);
+        }
+    }
+    free(place);
+    return finish(&l, out, note);
+}

@@ -1,0 +1,373 @@
+/* Polyhedral complexes: memory, loops out of them, measures, and the check that all of it fits together (A 3.4.4). */
+#include "server/mesh/cells/cells.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define LEAST_SHAPE 1e-12
+
+/* ---- arrays ---- */
+
+enum { N_ARRAY = 22 };
+
+typedef struct array {
+    void **at;
+    size_t n, size;
+} array;
+
+static size_t row_items(const pal_cell_rows *rows, int32_t n)
+{
+    return rows->start ? (size_t)rows->start[n] : 0;
+}
+
+/* every array of a complex, its length and item size */
+static int list_arrays(pal_cells *c, array list[N_ARRAY])
+{
+    int n = 0;
+    size_t n_vertex = (size_t)c->n_vertex, n_edge = (size_t)c->n_edge;
+#define ARRAY(field, count) list[n++] = (array){(void **)&c->field, (count), sizeof *c->field}
+#define ROWS(field, count)                                                                                             \
+    ARRAY(field.item, row_items(&c->field, (int32_t)(count)));                                                         \
+    ARRAY(field.start, (count) + 1)
+    ARRAY(x, 3 * n_vertex);
+    ARRAY(vertex_sharp, n_vertex);
+    ARRAY(vertex_boundary, n_vertex);
+    ARRAY(vertex_pinched, n_vertex);
+    ARRAY(edge, n_edge);
+    ARRAY(face, (size_t)c->n_face);
+    ARRAY(cell_use, (size_t)c->n_cell + 1);
+    ARRAY(face_use, (size_t)c->n_face_use + 1);
+    ARRAY(edge_use, (size_t)c->n_edge_use);
+    ARRAY(corner_use, row_items(&c->cell_vertex, c->n_cell));
+    ROWS(vertex_edge, n_vertex);
+    ROWS(vertex_face, n_vertex);
+    ROWS(vertex_cell, n_vertex);
+    ROWS(edge_face, n_edge);
+    ROWS(edge_cell, n_edge);
+    ROWS(cell_vertex, (size_t)c->n_cell);
+#undef ROWS
+#undef ARRAY
+    return n;
+}
+
+void pal_cells_free(pal_cells *cells)
+{
+    array list[N_ARRAY];
+    int n = list_arrays(cells, list);
+    for (int k = 0; k < n; k++) free(*list[k].at);
+    memset(cells, 0, sizeof *cells);
+}
+
+pal_err pal_cells_copy(const pal_cells *from, pal_cells *to)
+{
+    pal_cells copy = *from;
+    array list[N_ARRAY];
+    bool ok = true;
+    int n = list_arrays(&copy, list);
+    for (int k = 0; k < n; k++) {
+        size_t byte = list[k].n * list[k].size;
+        const void *old = *list[k].at;
+        *list[k].at = malloc(byte ? byte : 1);
+        if (*list[k].at && old)
+            memcpy(*list[k].at, old, byte);
+        else
+            ok = false;
+    }
+    if (ok) {
+        *to = copy;
+        return PAL_ERR_OK;
+    }
+    for (int k = 0; k < n; k++) free(*list[k].at);
+    return PAL_ERR_MEMORY;
+}
+
+static bool same_doubles(const double *a, const double *b, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!(a[i] == b[i])) return false;
+    return true;
+}
+
+static bool same_sharpness(const pal_cells *a, const pal_cells *b)
+{
+    for (int32_t v = 0; v < a->n_vertex; v++)
+        if (!(a->vertex_sharp[v] == b->vertex_sharp[v])) return false;
+    for (int32_t e = 0; e < a->n_edge; e++)
+        if (!(a->edge[e].sharp == b->edge[e].sharp)) return false;
+    for (int32_t f = 0; f < a->n_face; f++)
+        if (!(a->face[f].sharp == b->face[f].sharp)) return false;
+    return true;
+}
+
+bool pal_cells_equal(const pal_cells *a, const pal_cells *b)
+{
+    if (a->n_vertex != b->n_vertex || a->n_cell != b->n_cell || a->n_face_use != b->n_face_use ||
+        a->n_edge_use != b->n_edge_use || a->n_edge != b->n_edge || a->n_face != b->n_face)
+        return false;
+    if (a->n_cell == 0) return true;
+    /* all else follows from the loops */
+    for (int32_t i = 0; i <= a->n_cell; i++)
+        if (a->cell_use[i] != b->cell_use[i]) return false;
+    for (int32_t l = 0; l <= a->n_face_use; l++)
+        if (a->face_use[l].first_use != b->face_use[l].first_use) return false;
+    for (int32_t u = 0; u < a->n_edge_use; u++)
+        if (a->edge_use[u].vertex != b->edge_use[u].vertex) return false;
+    return same_sharpness(a, b) && same_doubles(a->x, b->x, 3 * (size_t)a->n_vertex);
+}
+
+/* ---- loops ---- */
+
+void pal_cell_loops_free(pal_cell_loops *loops)
+{
+    void *all[] = {loops->x,        loops->cell,     loops->loop, loops->corner,      loops->vertex_sharp,
+                   loops->edge_tag, loops->face_tag, loops->line, loops->vertex_line, loops->tag_line};
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
+    memset(loops, 0, sizeof *loops);
+}
+
+static void put_loops(const pal_cells *c, pal_cell_loops *l)
+{
+    memcpy(l->x, c->x, (size_t)c->n_vertex * 3 * sizeof *l->x);
+    memcpy(l->vertex_sharp, c->vertex_sharp, (size_t)c->n_vertex * sizeof *l->vertex_sharp);
+    memcpy(l->cell, c->cell_use, ((size_t)c->n_cell + 1) * sizeof *l->cell);
+    for (int32_t i = 0; i <= c->n_face_use; i++) l->loop[i] = c->face_use[i].first_use;
+    for (int32_t u = 0; u < c->n_edge_use; u++) l->corner[u] = c->edge_use[u].vertex;
+    for (int32_t e = 0; e < c->n_edge; e++)
+        if (c->edge[e].sharp > 0)
+            l->edge_tag[l->n_edge_tag++] = (pal_cell_tag){c->edge[e].vertex[0], c->edge[e].vertex[1], c->edge[e].sharp};
+    for (int32_t f = 0; f < c->n_face; f++)
+        for (int side = 0; side < 2; side++)
+            if (c->face[f].sharp > 0 && c->face[f].use[side] >= 0)
+                l->face_tag[l->n_face_tag++] = (pal_cell_tag){c->face[f].use[side], 0, c->face[f].sharp};
+}
+
+pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
+{
+    const pal_cells *c = cells;
+    pal_cell_loops l = {.n_vertex = c->n_vertex, .n_cell = c->n_cell};
+    size_t n_edge_tag = 0, n_face_tag = 0;
+    for (int32_t e = 0; e < c->n_edge; e++) n_edge_tag += c->edge[e].sharp > 0;
+    for (int32_t f = 0; f < c->n_face; f++) n_face_tag += c->face[f].sharp > 0;
+    l.x = malloc((size_t)c->n_vertex * 3 * sizeof *l.x);
+    l.vertex_sharp = malloc((size_t)c->n_vertex * sizeof *l.vertex_sharp);
+    l.cell = malloc(((size_t)c->n_cell + 1) * sizeof *l.cell);
+    l.loop = malloc(((size_t)c->n_face_use + 1) * sizeof *l.loop);
+    l.corner = malloc((size_t)c->n_edge_use * sizeof *l.corner);
+    l.edge_tag = malloc((n_edge_tag + 1) * sizeof *l.edge_tag);
+    l.face_tag = malloc((2 * n_face_tag + 1) * sizeof *l.face_tag);
+    if (!l.x || !l.vertex_sharp || !l.cell || !l.loop || !l.corner || !l.edge_tag || !l.face_tag) {
+        pal_cell_loops_free(&l);
+        return PAL_ERR_MEMORY;
+    }
+    put_loops(c, &l);
+    *out = l;
+    return PAL_ERR_OK;
+}
+
+typedef struct side {
+    int32_t low, high;
+} side;
+
+static int compare_sides(const void *a, const void *b)
+{
+    const side *p = a, *q = b;
+    return p->low != q->low ? (p->low > q->low) - (p->low < q->low) : (p->high > q->high) - (p->high < q->high);
+}
+
+static side make_side(int32_t v, int32_t w)
+{
+    return v < w ? (side){v, w} : (side){w, v};
+}
+
+/* keeps the tags of edges that some loop still has; sides [corners] is scratch */
+static void keep_edge_tags(pal_cell_loops *l, side *sides)
+{
+    int32_t n_loop = l->cell[l->n_cell], n_kept = 0;
+    if (l->n_edge_tag == 0) return;
+    for (int32_t i = 0; i < n_loop; i++)
+        for (int32_t k = l->loop[i]; k < l->loop[i + 1]; k++)
+            sides[k] = make_side(l->corner[k], l->corner[k + 1 < l->loop[i + 1] ? k + 1 : l->loop[i]]);
+    qsort(sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides);
+    for (int32_t t = 0; t < l->n_edge_tag; t++) {
+        side want = make_side(l->edge_tag[t].a, l->edge_tag[t].b);
+        if (!bsearch(&want, sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides)) continue;
+        if (l->tag_line) l->tag_line[n_kept] = l->tag_line[t];
+        l->edge_tag[n_kept++] = l->edge_tag[t];
+    }
+    l->n_edge_tag = n_kept;
+}
+
+/* moves the kept cells, their loops, corners, lines and face tags together; number [loops + 1] is scratch */
+static void keep_cells(pal_cell_loops *l, const bool *keep, int32_t *number)
+{
+    int32_t n_cell = 0, n_loop = 0, n_corner = 0, n_tag = 0;
+    for (int32_t i = 0; i < l->n_cell; i++) {
+        int32_t first = l->cell[i], end = l->cell[i + 1];
+        for (int32_t k = first; k < end; k++) number[k] = -1;
+        if (!keep[i]) continue;
+        /* starts of later cells and loops are still the old ones: nothing moves up */
+        for (int32_t k = first; k < end; k++) {
+            int32_t from = l->loop[k], n = l->loop[k + 1] - from;
+            memmove(l->corner + n_corner, l->corner + from, (size_t)n * sizeof *l->corner);
+            if (l->line) l->line[n_loop] = l->line[k];
+            number[k] = n_loop;
+            l->loop[n_loop++] = n_corner;
+            n_corner += n;
+        }
+        l->cell[n_cell++] = n_loop - (end - first);
+    }
+    for (int32_t t = 0; t < l->n_face_tag; t++) {
+        int32_t k = number[l->face_tag[t].a];
+        if (k >= 0) l->face_tag[n_tag++] = (pal_cell_tag){k, 0, l->face_tag[t].sharp};
+    }
+    l->n_face_tag = n_tag, l->n_cell = n_cell;
+    l->cell[n_cell] = n_loop, l->loop[n_loop] = n_corner;
+}
+
+pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept)
+{
+    pal_cell_loops *l = loops;
+    size_t n_loop = (size_t)l->cell[l->n_cell], n_number = (size_t)l->n_vertex + 1;
+    if (n_loop + 1 > n_number) n_number = n_loop + 1;
+    int32_t *number = calloc(n_number, sizeof *number);
+    side *sides = malloc(((size_t)l->loop[n_loop] + 1) * sizeof *sides);
+    if (!number || !sides) {
+        free(number);
+        free(sides);
+        return PAL_ERR_MEMORY;
+    }
+    if (keep) keep_cells(l, keep, number);
+    keep_edge_tags(l, sides);
+    int32_t n_corner = l->loop[l->cell[l->n_cell]], n = 0;
+    memset(number, 0, n_number * sizeof *number);
+    for (int32_t k = 0; k < n_corner; k++) number[l->corner[k]] = 1;
+    for (int32_t v = 0; v < l->n_vertex; v++) {
+        if (!number[v]) continue;
+        memmove(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v, 3 * sizeof *l->x);
+        if (l->vertex_sharp) l->vertex_sharp[n] = l->vertex_sharp[v];
+        if (l->vertex_line) l->vertex_line[n] = l->vertex_line[v];
+        if (kept) kept[n] = v;
+        number[v] = n++;
+    }
+    for (int32_t k = 0; k < n_corner; k++) l->corner[k] = number[l->corner[k]];
+    for (int32_t t = 0; t < l->n_edge_tag; t++)
+        l->edge_tag[t].a = number[l->edge_tag[t].a], l->edge_tag[t].b = number[l->edge_tag[t].b];
+    l->n_vertex = n;
+    free(number);
+    free(sides);
+    return PAL_ERR_OK;
+}
+
+/* ---- measures ---- */
+
+static void use_centre(const pal_cells *c, const double *x, int32_t face_use, double out[3])
+{
+    int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
+    pal_set3(out, 0, 0, 0);
+    for (int32_t u = first; u < end; u++) pal_add3(out, out, x + 3 * (size_t)c->edge_use[u].vertex);
+    pal_scale3(out, 1.0 / (end - first), out);
+}
+
+void pal_cells_face_centre(const pal_cells *cells, const double *x, int32_t face, double out[3])
+{
+    use_centre(cells, x ? x : cells->x, cells->face[face].use[0], out);
+}
+
+void pal_cells_cell_centre(const pal_cells *cells, const double *x, int32_t cell, double out[3])
+{
+    const double *p = x ? x : cells->x;
+    int32_t first = cells->cell_vertex.start[cell], end = cells->cell_vertex.start[cell + 1];
+    pal_set3(out, 0, 0, 0);
+    for (int32_t k = first; k < end; k++) pal_add3(out, out, p + 3 * (size_t)cells->cell_vertex.item[k]);
+    pal_scale3(out, 1.0 / (end - first), out);
+}
+
+/* vector area and longest edge squared of a face use */
+static double use_area(const pal_cells *c, const double *x, int32_t face_use, double out[3])
+{
+    int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
+    const double *o = x + 3 * (size_t)c->edge_use[first].vertex;
+    double longest = 0, d[3], p[3], q[3], a[3];
+    pal_set3(out, 0, 0, 0);
+    for (int32_t u = first; u < end; u++) {
+        const double *v = x + 3 * (size_t)c->edge_use[u].vertex;
+        const double *w = x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex;
+        pal_sub3(p, v, o);
+        pal_sub3(q, w, o);
+        pal_sub3(d, w, v);
+        pal_cross3(a, p, q);
+        pal_axpy3(out, 0.5, a);
+        longest = fmax(longest, pal_dot3(d, d));
+    }
+    return longest;
+}
+
+void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, double out[3])
+{
+    use_area(cells, x ? x : cells->x, cells->face[face].use[0], out);
+}
+
+/* six times the volume of the cone from o over a face use, as triangles about the mean of its corners */
+static double cone(const pal_cells *c, const double *x, int32_t face_use, const double o[3])
+{
+    int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
+    double centre[3], p[3], q[3], n[3], sum = 0;
+    use_centre(c, x, face_use, centre);
+    pal_sub3(centre, centre, o);
+    for (int32_t u = first; u < end; u++) {
+        pal_sub3(p, x + 3 * (size_t)c->edge_use[u].vertex, o);
+        pal_sub3(q, x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex, o);
+        pal_cross3(n, p, q);
+        sum += pal_dot3(n, centre);
+    }
+    return sum;
+}
+
+double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell)
+{
+    const double *p = x ? x : cells->x;
+    double o[3], sum = 0;
+    pal_cells_cell_centre(cells, p, cell, o);
+    for (int32_t l = cells->cell_use[cell]; l < cells->cell_use[cell + 1]; l++) sum += cone(cells, p, l, o);
+    return sum / 6;
+}
+
+double pal_cells_volume(const pal_cells *cells, const double *x)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < cells->n_cell; i++) sum += pal_cells_cell_volume(cells, x, i);
+    return sum;
+}
+
+static double cell_diagonal(const pal_cells *c, const double *x, int32_t cell)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int32_t k = c->cell_vertex.start[cell]; k < c->cell_vertex.start[cell + 1]; k++)
+        for (int a = 0; a < 3; a++) {
+            double v = x[3 * (size_t)c->cell_vertex.item[k] + (size_t)a];
+            low[a] = fmin(low[a], v), high[a] = fmax(high[a], v);
+        }
+    return pal_dist3(low, high);
+}
+
+bool pal_cells_shape_good(const pal_cells *cells, const double *x, pal_cells_fault *fault)
+{
+    const pal_cells *c = cells;
+    const double *p = x ? x : c->x;
+    pal_cells_fault f = {.cell = -1, .face_use = -1};
+    for (int32_t k = 0; k < c->n_face && f.cell < 0; k++) {
+        int32_t use = c->face[k].use[0];
+        double area[3], longest = use_area(c, p, use, area);
+        if (pal_norm3(area) > LEAST_SHAPE * longest) continue; /* NaN does not pass */
+        f = (pal_cells_fault){c->face_use[use].cell, use, pal_norm3(area), sqrt(longest)};
+    }
+    for (int32_t i = 0; i < c->n_cell && f.cell < 0; i++) {
+        double volume = pal_cells_cell_volume(c, p, i), d = cell_diagonal(c, p, i);
+        if (volume > LEAST_SHAPE * d * d * d) continue;
+        f = (pal_cells_fault){i, -1, volume, d};
+    }
+    if (fault) *fault = f;
+    return f.cell < 0;
+}

@@ -1,0 +1,137 @@
+/* Surfaces from files: which reader, the checks that all formats share, cleaning and units. */
+#include "server/mesh/files/mesh_file.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/files/file_bytes.h"
+#include "server/mesh/files/mesh_build.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* no file is read beyond this */
+static const size_t most_byte = (size_t)4 << 30;
+
+typedef pal_err reader(pal_mesh_build *build);
+
+static bool ends_with(const char *name, const char *tail)
+{
+    size_t n = strlen(name), m = strlen(tail);
+    return n >= m && strcasecmp(name + n - m, tail) == 0;
+}
+
+/* content first, name second; NULL: neither says anything */
+static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
+{
+    if (n_byte >= 4 && memcmp(bytes, "ply", 3) == 0 && bytes[3] <= ' ') return pal_ply_parse;
+    if (pal_stl_is(bytes, n_byte)) return pal_stl_parse;
+    if (pal_off_is(bytes, n_byte)) return pal_off_parse;
+    if (ends_with(name, ".obj")) return pal_obj_parse;
+    if (ends_with(name, ".stl")) return pal_stl_parse;
+    if (ends_with(name, ".off")) return pal_off_parse;
+    return pal_obj_is(bytes, n_byte) ? pal_obj_parse : NULL;
+}
+
+static pal_err parse(pal_mesh_build *build)
+{
+    if (build->n_byte == 0) return pal_mesh_refuse(build, 0, "the file is empty");
+    reader *read = choose(build->name, build->bytes, build->n_byte);
+    if (!read) return pal_mesh_refuse(build, 0, "neither OBJ, STL, PLY nor OFF");
+    PAL_TRY(read(build));
+    if (build->most_index >= (int64_t)build->n_vertex)
+        return pal_mesh_refuse(build, build->most_at, "a face uses vertex index %lld (from 0) of only %zu vertices",
+                               (long long)build->most_index, build->n_vertex);
+    return PAL_ERR_OK;
+}
+
+/* file units to metres */
+static void scale(pal_surface *s, double unit_m)
+{
+    for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit_m;
+    pal_scale3(s->origin_m, unit_m, s->origin_m);
+}
+
+/* cleans and scales what was read */
+static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *options, pal_surface *s,
+                      pal_surface_report *report, double *unit_m, const char **unit_name)
+{
+    if (options->weld >= 0) {
+        pal_note why = {{0}};
+        pal_err err = pal_surface_clean(s, options->weld, report, &why);
+        if (err == PAL_ERR_REFUSED) return pal_mesh_refuse(build, build->first_at, "%s", why.text);
+        if (err) return pal_note_set(build->note, err, "%s: %s", build->name, why.text);
+    }
+    double low[3], high[3], unit = options->unit_m;
+    const char *word = "given";
+    pal_surface_box(s, low, high);
+    if (!(unit > 0)) unit = pal_mesh_unit_guess(pal_dist3(low, high), &word);
+    scale(s, unit);
+    if (unit_m) *unit_m = unit;
+    if (unit_name) *unit_name = word;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_mesh_file_options *options,
+                            pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
+                            pal_note *note)
+{
+    static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
+    char shown[128];
+    pal_file_show_name(shown, name);
+    pal_mesh_build build = {
+        .name = shown, .bytes = bytes, .n_byte = n_byte, .note = note, .binary = true, .most_index = -1};
+    pal_err err = parse(&build);
+    pal_surface s = {.n_vertex = (int)build.n_vertex, .n_tri = (int)build.n_tri, .x = build.x, .tri = build.tri};
+    pal_surface_report found = {.n_vertex_read = (int64_t)build.n_vertex, .n_tri_read = (int64_t)build.n_tri};
+    if (!err) {
+        snprintf(found.format, sizeof found.format, "%s", build.format);
+        snprintf(found.place, sizeof found.place, "%s %lld", build.binary ? "byte" : "line", (long long)build.first_at);
+        err = finish(&build, options ? options : &plain, &s, &found, unit_m, unit_name);
+    }
+    if (err) {
+        pal_surface_free(&s);
+        return err;
+    }
+    *out = s;
+    if (report) *report = found;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
+                           pal_surface_report *report, double *unit_m, const char **unit_name, pal_note *note)
+{
+    uint8_t *bytes;
+    size_t n_byte;
+    PAL_TRY(pal_file_read(path, most_byte, &bytes, &n_byte, note));
+    pal_err err = pal_mesh_file_parse(path, bytes, n_byte, options, out, report, unit_m, unit_name, note);
+    free(bytes);
+    return err;
+}
+
+double pal_mesh_unit_guess(double diagonal, const char **name)
+{
+    const char *word = "scaled";
+    double unit = 1;
+    if (diagonal >= 3 && diagonal <= 3000) {
+        word = "mm";
+        unit = 1e-3;
+    } else if (diagonal >= 0.003 && diagonal < 3) {
+        word = "m";
+    } else if (diagonal > 0 && isfinite(diagonal)) {
+        unit = 0.2 / diagonal;
+    }
+    if (name) *name = word;
+    return unit;
+}
+
+double pal_mesh_unit_named(const char *word)
+{
+    static const struct {
+        const char *word;
+        double unit_m;
+    } known[] = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}, {"in", 0.0254}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (strcmp(word, known[i].word) == 0) return known[i].unit_m;
+    return 0;
+}

@@ -1,0 +1,93 @@
+/* Wavefront OBJ: positions and faces; everything else is left out. */
+#include "server/mesh/files/mesh_build.h"
+#include "server/mesh/files/text_scan.h"
+
+#include <string.h>
+
+static const char *const keywords[] = {"v", "vt", "vn", "vp", "f", "l", "p", "g", "o", "s", "usemtl", "mtllib", "#"};
+
+bool pal_obj_is(const uint8_t *bytes, size_t n_byte)
+{
+    pal_text_scan scan = {.at = bytes, .end = bytes + n_byte, .line = 1};
+    do {
+        if (!pal_text_more(&scan)) continue;
+        if (*scan.at == '#') continue;
+        for (size_t k = 0; k < sizeof keywords / sizeof *keywords; k++)
+            if (pal_text_is(&scan, keywords[k])) return true;
+        return false;
+    } while (scan.line < 1000 && pal_text_next_line(&scan));
+    return false;
+}
+
+static pal_err read_position(pal_mesh_build *build, pal_text_scan *scan)
+{
+    double p[3];
+    for (int a = 0; a < 3; a++)
+        if (!pal_text_double(scan, &p[a]))
+            return pal_mesh_refuse(build, scan->line, "a position needs three numbers, found %s",
+                                   pal_text_show(scan).text);
+    return pal_mesh_vertex(build, p);
+}
+
+/* the position index of a corner v, v/vt, v//vn or v/vt/vn; false when the word is none of these */
+static bool read_corner(pal_text_scan *scan, int64_t *index)
+{
+    const uint8_t *p = scan->at, *end = scan->end;
+    bool negative = p < end && *p == '-';
+    int64_t value = 0;
+    const uint8_t *first = p += negative;
+    for (; p < end && *p >= '0' && *p <= '9'; p++)
+        if (value < (int64_t)1 << 40) value = 10 * value + (*p - '0');
+    if (p == first) return false;
+    if (p < end && *p == '/')
+        while (p < end && (*p == '/' || *p == '-' || (*p >= '0' && *p <= '9'))) p++;
+    if (p<end && * p> ' ' && *p != '\\') return false;
+    scan->at = p;
+    *index = negative ? -value : value;
+    return true;
+}
+
+static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan)
+{
+    if (!pal_text_more(scan)) return pal_mesh_refuse(build, scan->line, "a face without corners");
+    pal_mesh_fan_begin(build, scan->line);
+    while (pal_text_more(scan)) {
+        int64_t index;
+        if (!read_corner(scan, &index))
+            return pal_mesh_refuse(build, scan->line, "a face corner is %s", pal_text_show(scan).text);
+        if (index == 0) return pal_mesh_refuse(build, scan->line, "a face uses vertex 0, the first is 1");
+        if (index < 0 && -index > (int64_t)build->n_vertex)
+            return pal_mesh_refuse(build, scan->line, "a face uses vertex %lld, only %zu came before", (long long)index,
+                                   build->n_vertex);
+        PAL_TRY(pal_mesh_fan_corner(build, scan->line, index < 0 ? (int64_t)build->n_vertex + index : index - 1));
+    }
+    return pal_mesh_fan_end(build);
+}
+
+/* a line of another keyword: text is left out, other bytes mean that this is no OBJ file */
+static pal_err skip_line(pal_mesh_build *build, pal_text_scan *scan)
+{
+    for (const uint8_t *p = scan->at; p < scan->end && *p != '\n' && *p != '\r'; p++)
+        if (*p < 0x20 && *p != '\t' && *p != '\v' && *p != '\f')
+            return pal_mesh_refuse(build, scan->line, "byte 0x%02x in a text file", *p);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_obj_parse(pal_mesh_build *build)
+{
+    build->format = "obj";
+    build->binary = false;
+    pal_text_scan scan = {
+        .at = build->bytes, .end = build->bytes + build->n_byte, .line = 1, .hash = true, .joins = true};
+    do {
+        if (pal_text_is(&scan, "v"))
+            PAL_TRY(read_position(build, &scan));
+        else if (pal_text_is(&scan, "f"))
+            PAL_TRY(read_face(build, &scan));
+        else
+            PAL_TRY(skip_line(build, &scan));
+    } while (pal_text_next_line(&scan));
+    if (build->n_tri == 0)
+        return pal_mesh_refuse(build, scan.line, "the file ends after %zu positions without a face", build->n_vertex);
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,94 @@
+/* Legacy VTK, version 3.0, ASCII (VTK User's Guide, "VTK File Formats").
+ *
+ * VTK goes around the lower face of a hexahedron and then around the upper one, so corners 2 and 3, 6 and 7 change
+ * places; its quadratic tetrahedron has the middles of edges 01 12 20 03 13 23, as num/shape.h has. */
+#include "server/mesh/files/vtk_file.h"
+
+#include "server/mesh/files/file_bytes.h"
+
+#include <stdbool.h>
+
+static const uint8_t HEX_ORDER[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+
+static int cell_type(int n_corner)
+{
+    return n_corner == 8 ? 12 : n_corner == 4 ? 10 : n_corner == 10 ? 24 : 0;
+}
+
+/* n numbers on a line */
+static void write_row(FILE *file, const double *value, const double *shift, int n)
+{
+    for (int k = 0; k < n; k++) {
+        char text[40];
+        snprintf(text, sizeof text, "%.17g", value[k] + (shift ? shift[k] : 0));
+        for (char *c = text; *c; c++)
+            if (*c == ',') *c = '.'; /* the locale's point */
+        fputs(text, file);
+        fputc(k + 1 < n ? ' ' : '\n', file);
+    }
+}
+
+/* a word without blanks, or the title's line */
+static void write_word(FILE *file, const char *word, bool blanks)
+{
+    int n = 0;
+    for (; word[n] && n < 200; n++) {
+        unsigned char c = (unsigned char)word[n];
+        fputc(c < 0x20 || c == 0x7F || (c == ' ' && !blanks) ? '_' : c, file);
+    }
+    if (n == 0) fputs("field", file);
+}
+
+static void write_fields(FILE *file, const char *where, const pal_vtk_field *field, int n_field, int n)
+{
+    if (n_field > 0) fprintf(file, "%s %d\n", where, n);
+    for (int f = 0; f < n_field; f++) {
+        bool vector = field[f].n_component == 3;
+        fputs(vector ? "VECTORS " : "SCALARS ", file);
+        write_word(file, field[f].name, false);
+        fputs(vector ? " double\n" : " double 1\nLOOKUP_TABLE default\n", file);
+        for (size_t i = 0; i < (size_t)n; i++)
+            write_row(file, field[f].value + i * (vector ? 3 : 1), NULL, vector ? 3 : 1);
+    }
+}
+
+static void write_cells(FILE *file, const pal_vtk_grid *g)
+{
+    fprintf(file, "CELLS %d %lld\n", g->n_element, (long long)g->n_element * (g->n_corner + 1));
+    for (size_t e = 0; e < (size_t)g->n_element; e++) {
+        const int32_t *node = g->node + e * (size_t)g->n_corner;
+        fprintf(file, "%d", g->n_corner);
+        for (int c = 0; c < g->n_corner; c++) fprintf(file, " %d", node[g->n_corner == 8 ? HEX_ORDER[c] : c]);
+        fputc('\n', file);
+    }
+    fprintf(file, "CELL_TYPES %d\n", g->n_element);
+    for (int e = 0; e < g->n_element; e++) fprintf(file, "%d\n", cell_type(g->n_corner));
+}
+
+static pal_err check_fields(const pal_vtk_field *field, int n, const char *path, pal_note *note)
+{
+    for (int f = 0; f < n; f++)
+        if (field[f].n_component != 1 && field[f].n_component != 3)
+            return pal_note_set(note, PAL_ERR_REFUSED, "%s: field %.60s has %d components, not 1 or 3", path,
+                                field[f].name, field[f].n_component);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_note *note)
+{
+    const pal_vtk_grid *g = grid;
+    pal_file_out out;
+    if (!cell_type(g->n_corner))
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: elements of %d corners", path, g->n_corner);
+    PAL_TRY(check_fields(g->point, g->n_point, path, note));
+    PAL_TRY(check_fields(g->cell, g->n_cell, path, note));
+    PAL_TRY(pal_file_begin(&out, path, note));
+    fputs("# vtk DataFile Version 3.0\n", out.file);
+    write_word(out.file, g->title ? g->title : "mesh", true);
+    fprintf(out.file, "\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS %d double\n", g->n_node);
+    for (size_t i = 0; i < (size_t)g->n_node; i++) write_row(out.file, g->x + 3 * i, g->origin_m, 3);
+    write_cells(out.file, g);
+    write_fields(out.file, "POINT_DATA", g->point, g->n_point, g->n_node);
+    write_fields(out.file, "CELL_DATA", g->cell, g->n_cell, g->n_element);
+    return pal_file_end(&out, PAL_ERR_OK, note);
+}

@@ -1,0 +1,453 @@
+/* Detail levels: checks, edges of the coarse surface, then split by split (C, pre-processing phase).
+ *
+ * Departures: the paper stores pointers to parents and children; here they follow from the order of the numbers. It
+ * takes any mesh; here what has no winged edges or no stencil is refused by name, and the boundary's corners, which the
+ * four-point rule would round off, are found by their angle at rest. */
+#include "server/mesh/geometry/levels.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define FLAT       1e-9 /* least height of a face, of its longest edge; least edge, of the surface's diagonal */
+#define FAR_M      1e9
+#define CORNER_COS 0.25881904510252074 /* cos 75 degrees */
+#define BUDGET     ((size_t)512 << 20)
+#define OFFER      "prepare it as voxels: palpate prepare"
+
+void pal_levels_free(pal_levels *l)
+{
+    void *all[] = {l->x,          l->edge,  l->face,   l->face_edge,     l->vertex_level,   l->edge_level,
+                   l->face_level, l->spoke, l->corner, l->stencil_start, l->stencil_vertex, l->stencil_weight};
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
+    memset(l, 0, sizeof *l);
+}
+
+/* ---- what is refused before any edge is known ---- */
+
+static pal_err check_face(const pal_surface *s, int t, pal_note *note)
+{
+    const int32_t *c = s->tri + 3 * (size_t)t;
+    for (int k = 0; k < 3; k++) {
+        if (c[k] < 0 || c[k] >= s->n_vertex)
+            return pal_note_set(note, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d, there are %d", t, c[k],
+                                s->n_vertex);
+        if (c[k] == c[(k + 1) % 3])
+            return pal_note_set(note, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
+    }
+    double longest = 0, u[3], v[3], n[3];
+    for (int k = 0; k < 3; k++)
+        longest = fmax(longest, pal_dist3(s->x + 3 * (size_t)c[k], s->x + 3 * (size_t)c[(k + 1) % 3]));
+    pal_sub3(u, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[0]);
+    pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
+    pal_cross3(n, u, v);
+    if (pal_norm3(n) > FLAT * longest * longest) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED,
+                        "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
+                        c[2]);
+}
+
+static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pal_note *note)
+{
+    if (o->n_level < 1 || o->n_level > PAL_LEVELS_MOST)
+        return pal_note_set(note, PAL_ERR_REFUSED, "levels: %d levels asked for, 1 to %d are made", o->n_level,
+                            PAL_LEVELS_MOST);
+    if (s->n_tri < 1 || s->n_vertex < 3)
+        return pal_note_set(note, PAL_ERR_REFUSED, "levels: a surface of %d vertices and %d triangles", s->n_vertex,
+                            s->n_tri);
+    if (s->n_tri > INT32_MAX / 8 || s->n_vertex > INT32_MAX / 8)
+        return pal_note_set(note, PAL_ERR_BUDGET, "levels: %d vertices and %d triangles, at most %d are taken",
+                            s->n_vertex, s->n_tri, INT32_MAX / 8);
+    for (int v = 0; v < s->n_vertex; v++) {
+        const double *x = s->x + 3 * (size_t)v;
+        for (int a = 0; a < 3; a++)
+            if (!(fabs(x[a]) <= FAR_M))
+                return pal_note_set(note, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0], x[1],
+                                    x[2]);
+    }
+    for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, note));
+    return PAL_ERR_OK;
+}
+
+/* ---- edges of the coarse surface ---- */
+
+/* side k of a triangle t as 3 t + k; the smaller and the larger of its vertices */
+static void side_ends(const pal_surface *s, int32_t side, int32_t *low, int32_t *high)
+{
+    int32_t a = s->tri[side], b = s->tri[side % 3 == 2 ? side - 2 : side + 1];
+    *low = a < b ? a : b, *high = a < b ? b : a;
+}
+
+/* sides in the order of their larger (of = 1) or smaller (of = 0) vertex, equal ones in the order they came in */
+static void order_sides(const pal_surface *s, int of, const int32_t *from, int32_t *to, int32_t *count)
+{
+    int32_t n = 3 * s->n_tri, end[2];
+    memset(count, 0, ((size_t)s->n_vertex + 1) * sizeof *count);
+    for (int32_t i = 0; i < n; i++) {
+        side_ends(s, i, &end[0], &end[1]);
+        count[end[of] + 1]++;
+    }
+    for (int v = 0; v < s->n_vertex; v++) count[v + 1] += count[v];
+    for (int32_t i = 0; i < n; i++) {
+        int32_t side = from ? from[i] : i;
+        side_ends(s, side, &end[0], &end[1]);
+        to[count[end[of]]++] = side;
+    }
+}
+
+/* one edge from its n sides; the first gives its direction */
+static pal_err make_edge(const pal_surface *s, const int32_t *side, int n, int32_t e, pal_winged_edge *edge,
+                         int32_t *face_edge, pal_note *note)
+{
+    int32_t low, high, a = s->tri[side[0]];
+    side_ends(s, side[0], &low, &high);
+    if (n > 2)
+        return pal_note_set(
+            note, PAL_ERR_REFUSED,
+            "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
+            "at most; " OFFER,
+            n, side[0] / 3, side[1] / 3, side[2] / 3, n > 3 ? ", ..." : "", low, high);
+    if (n == 2 && s->tri[side[1]] == a)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
+                            "one over, or " OFFER,
+                            side[0] / 3, side[1] / 3, low, high);
+    edge[e] = (pal_winged_edge){{a, a == low ? high : low}, {side[0] / 3, n == 2 ? side[1] / 3 : -1}, {0, 0}, {0, 0}};
+    for (int k = 0; k < n; k++) face_edge[side[k]] = e;
+    return PAL_ERR_OK;
+}
+
+/* edges with their ends and faces, and face_edge; room for 3 n_tri edges */
+static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *face_edge, int32_t *n_edge,
+                          pal_note *note)
+{
+    size_t n = 3 * (size_t)s->n_tri;
+    int32_t *order = malloc(2 * n * sizeof *order), *count = malloc(((size_t)s->n_vertex + 1) * sizeof *count);
+    pal_err err = order && count ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    *n_edge = 0;
+    if (!err) {
+        order_sides(s, 1, NULL, order, count);
+        order_sides(s, 0, order, order + n, count);
+    }
+    const int32_t *side = order + n;
+    for (size_t i = 0, many; !err && i < n; i += many) {
+        int32_t low, high, l, h;
+        side_ends(s, side[i], &low, &high);
+        for (many = 1; i + many < n; many++) {
+            side_ends(s, side[i + many], &l, &h);
+            if (l != low || h != high) break;
+        }
+        err = make_edge(s, side + i, many < 1000 ? (int)many : 1000, (*n_edge)++, edge, face_edge, note);
+    }
+    free(order);
+    free(count);
+    return err;
+}
+
+/* ---- one level's adjacency ---- */
+
+/* faces, walks and spokes of a level from its faces' edges and its edges' ends; edge e of the level has face[1] = -1
+ * when it is a boundary edge. False when two boundary edges start at one vertex, *bad. */
+static bool link_level(pal_levels *l, int level, int32_t *bad)
+{
+    pal_winged_edge *edge = l->edge;
+    int32_t *spoke = l->spoke + l->first_spoke[level];
+    for (int32_t v = 0; v < l->n_vertex[level]; v++) spoke[v] = -1;
+    for (int32_t f = l->first_face[level]; f < l->first_face[level + 1]; f++)
+        for (int k = 0; k < 3; k++) {
+            const int32_t *side = l->face_edge + 3 * (size_t)f;
+            int32_t v = l->face[3 * (size_t)f + (size_t)k];
+            pal_winged_edge *e = &edge[side[k]];
+            int s = e->vertex[0] == v ? 0 : 1;
+            e->face[s] = f, e->prev[s] = side[(k + 2) % 3], e->next[s] = side[(k + 1) % 3];
+            if (spoke[v] < 0 || e->face[1] < 0) spoke[v] = side[k];
+        }
+    for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++) {
+        if (edge[e].face[1] >= 0) continue;
+        if (spoke[edge[e].vertex[0]] != e) {
+            *bad = edge[e].vertex[0];
+            return false;
+        }
+        /* walked against their direction, hole on the left, the next after an edge starts where this one ends */
+        int32_t before = spoke[edge[e].vertex[1]];
+        edge[e].prev[1] = before;
+        edge[before].next[1] = e;
+    }
+    return true;
+}
+
+static pal_err refuse_fans(int32_t v, pal_note *note)
+{
+    return pal_note_set(note, PAL_ERR_REFUSED,
+                        "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
+}
+
+/* every vertex has one fan of at least three faces, or one or more at the boundary; irregular: K (K + 1), summed over
+ * irregular vertices of K edges */
+static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_note *note)
+{
+    const int32_t n = l->n_vertex[0];
+    int32_t *count = calloc((size_t)n, sizeof *count);
+    if (!count) return PAL_ERR_MEMORY;
+    for (int32_t c = 0; c < 3 * l->first_face[1]; c++) count[l->face[c]]++;
+    pal_err err = PAL_ERR_OK;
+    int64_t sum = 0;
+    for (int32_t v = 0; v < n && !err; v++) {
+        if (count[v] == 0) {
+            err = pal_note_set(note, PAL_ERR_REFUSED, "levels: vertex %d belongs to no triangle: clean the surface", v);
+            break;
+        }
+        int32_t e = l->spoke[v], n_face = 0, n_edge = 0;
+        do {
+            n_face += pal_wing_face(l->edge, e, v) >= 0, n_edge++;
+            e = pal_wing_turn(l->edge, e, v);
+        } while (e != l->spoke[v] && n_edge <= count[v] + 1);
+        if (n_face != count[v])
+            err = refuse_fans(v, note);
+        else if (n_edge < 3 && n_face == n_edge)
+            err = pal_note_set(note, PAL_ERR_REFUSED, "levels: triangles %d and %d have the same corners",
+                               l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
+        else if (n_edge != (n_face == n_edge ? 6 : 4))
+            sum += (int64_t)n_edge * (n_edge + 1);
+    }
+    free(count);
+    *irregular = sum;
+    return err;
+}
+
+static void find_corners(pal_levels *l)
+{
+    for (int32_t v = 0; v < l->n_vertex[0]; v++) {
+        if (!pal_levels_on_rim(l, v)) continue;
+        const pal_winged_edge *out = &l->edge[l->spoke[v]], *in = &l->edge[out->next[1]];
+        double a[3], b[3];
+        pal_sub3(a, l->x + 3 * (size_t)v, l->x + 3 * (size_t)in->vertex[0]);
+        pal_sub3(b, l->x + 3 * (size_t)out->vertex[1], l->x + 3 * (size_t)v);
+        l->corner[v] = pal_dot3(a, b) < CORNER_COS * pal_norm3(a) * pal_norm3(b);
+    }
+}
+
+/* ---- memory ---- */
+
+/* counts of all levels; false beyond int32 */
+static bool count_levels(pal_levels *l, int32_t n_vertex, int32_t n_edge, int32_t n_face)
+{
+    int64_t v = n_vertex, e = n_edge, f = n_face, all_v = 0, all_e = 0, all_f = 0;
+    for (int k = 0; k < l->n_level; k++) {
+        l->n_vertex[k] = (int32_t)v, l->first_spoke[k] = (int32_t)all_v;
+        l->first_edge[k] = (int32_t)all_e, l->first_face[k] = (int32_t)all_f;
+        all_v += v, all_e += e, all_f += f;
+        if (all_v > INT32_MAX || all_e > INT32_MAX / 8 || all_f > INT32_MAX / 4) return false;
+        v += e, e = 2 * e + 3 * f, f = 4 * f;
+    }
+    l->first_spoke[l->n_level] = (int32_t)all_v;
+    l->first_edge[l->n_level] = (int32_t)all_e, l->first_face[l->n_level] = (int32_t)all_f;
+    return true;
+}
+
+/* bytes of all arrays but the entries of stencils */
+static size_t plain_bytes(const pal_levels *l)
+{
+    int last = l->n_level - 1;
+    size_t v = (size_t)l->n_vertex[last], e = (size_t)l->first_edge[last + 1], f = (size_t)l->first_face[last + 1];
+    size_t rows = v - (size_t)l->n_vertex[0] + 1, spokes = (size_t)l->first_spoke[last + 1];
+    return v * (3 * sizeof(double) + 1) + e * (sizeof(pal_winged_edge) + 1) + f * (6 * sizeof(int32_t) + 1) +
+           (rows + spokes) * sizeof(int32_t) + (size_t)l->n_vertex[0];
+}
+
+#define ENTRY_BYTES (sizeof(int32_t) + sizeof(double))
+
+static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pal_note *note)
+{
+    return pal_note_set(note, PAL_ERR_BUDGET,
+                        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
+                        "surface",
+                        l->n_level, byte / 1048576, (double)budget / 1048576);
+}
+
+static pal_err get_memory(pal_levels *l)
+{
+    int last = l->n_level - 1;
+    size_t v = (size_t)l->n_vertex[last], e = (size_t)l->first_edge[last + 1], f = (size_t)l->first_face[last + 1];
+    l->x = malloc(v * 3 * sizeof *l->x);
+    l->edge = malloc(e * sizeof *l->edge);
+    l->face = malloc(f * 3 * sizeof *l->face);
+    l->face_edge = malloc(f * 3 * sizeof *l->face_edge);
+    l->vertex_level = malloc(v);
+    l->edge_level = malloc(e);
+    l->face_level = malloc(f);
+    l->spoke = malloc((size_t)l->first_spoke[last + 1] * sizeof *l->spoke);
+    l->stencil_start = calloc(v - (size_t)l->n_vertex[0] + 1, sizeof *l->stencil_start);
+    l->corner = calloc((size_t)l->n_vertex[0], 1);
+    bool ok = l->x && l->edge && l->face && l->face_edge && l->vertex_level && l->edge_level && l->face_level &&
+              l->spoke && l->stencil_start && l->corner;
+    for (int k = 0; ok && k <= last; k++) {
+        int32_t from = k ? l->n_vertex[k - 1] : 0;
+        memset(l->vertex_level + from, k, (size_t)(l->n_vertex[k] - from));
+        memset(l->edge_level + l->first_edge[k], k, (size_t)pal_levels_n_edge(l, k));
+        memset(l->face_level + l->first_face[k], k, (size_t)pal_levels_n_face(l, k));
+    }
+    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* rows of stencils are written one after another: room for the most there can be, 8 for an edge with regular ends and,
+ * on every level, K + 1 more for the K edges of an irregular vertex */
+static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_note *note)
+{
+    double n = 8.0 * l->first_edge[l->n_level - 1] + (double)(l->n_level - 1) * (double)irregular;
+    double byte = (double)plain_bytes(l) + n * (double)ENTRY_BYTES;
+    if (byte > (double)budget || n > INT32_MAX) return refuse_budget(byte, budget, l, note);
+    l->stencil_vertex = malloc(((size_t)n + 1) * sizeof *l->stencil_vertex);
+    l->stencil_weight = malloc(((size_t)n + 1) * sizeof *l->stencil_weight);
+    return l->stencil_vertex && l->stencil_weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* gives back what the stencils did not need */
+static void trim_entries(pal_levels *l)
+{
+    size_t n = (size_t)l->stencil_start[l->n_vertex[l->n_level - 1] - l->n_vertex[0]];
+    int32_t *vertex = realloc(l->stencil_vertex, (n + 1) * sizeof *vertex);
+    if (vertex) l->stencil_vertex = vertex;
+    double *weight = realloc(l->stencil_weight, (n + 1) * sizeof *weight);
+    if (weight) l->stencil_weight = weight;
+    l->n_byte = plain_bytes(l) + n * ENTRY_BYTES;
+}
+
+/* ---- splitting ---- */
+
+static void place_midpoints(pal_levels *l, int level)
+{
+    pal_wings wings = {l->edge, l->corner, l->n_vertex[0]};
+    int32_t v = l->n_vertex[level];
+    for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++, v++) {
+        int32_t *start = l->stencil_start + (v - l->n_vertex[0]);
+        start[1] =
+            start[0] + pal_butterfly_stencil(&wings, e, l->stencil_vertex + start[0], l->stencil_weight + start[0]);
+        pal_levels_midpoint(l, v, l->x, l->x + 3 * (size_t)v);
+    }
+}
+
+/* children of one face: three at the corners, one in the middle */
+static void split_face(pal_levels *l, int32_t f)
+{
+    const int32_t *v = l->face + 3 * (size_t)f, *e = l->face_edge + 3 * (size_t)f;
+    int32_t mid[3], inner[3], child = pal_levels_face_child(l, f, 0), middle = child + 3;
+    for (int k = 0; k < 3; k++)
+        mid[k] = pal_levels_edge_midpoint(l, e[k]), inner[k] = pal_levels_face_inner_edge(l, f, k);
+    for (int k = 0; k < 3; k++, child++) {
+        int before = (k + 2) % 3, after = (k + 1) % 3;
+        int32_t *c = l->face + 3 * (size_t)child, *ce = l->face_edge + 3 * (size_t)child;
+        /* corner k of the child is the face's; the halves touch it */
+        c[k] = v[k], c[after] = mid[k], c[before] = mid[before];
+        ce[k] = pal_levels_edge_half(l, e[k], l->edge[e[k]].vertex[0] != v[k]);
+        ce[after] = inner[k];
+        ce[before] = pal_levels_edge_half(l, e[before], l->edge[e[before]].vertex[0] != v[k]);
+        l->face[3 * (size_t)middle + (size_t)k] = mid[k];
+        /* the middle face runs from midpoint k - 1 to k along inner edge k */
+        l->face_edge[3 * (size_t)middle + (size_t)before] = inner[k];
+        l->edge[inner[k]] = (pal_winged_edge){{mid[before], mid[k]}, {0, 0}, {0, 0}, {0, 0}};
+    }
+}
+
+/* faces and edges of the level below */
+static void split_level(pal_levels *l, int level)
+{
+    for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++) {
+        pal_winged_edge from = l->edge[e], *half = &l->edge[pal_levels_edge_half(l, e, 0)];
+        int32_t mid = pal_levels_edge_midpoint(l, e), right = from.face[1] < 0 ? -1 : 0;
+        half[0] = (pal_winged_edge){{from.vertex[0], mid}, {0, right}, {0, 0}, {0, 0}};
+        half[1] = (pal_winged_edge){{mid, from.vertex[1]}, {0, right}, {0, 0}, {0, 0}};
+    }
+    for (int32_t f = l->first_face[level]; f < l->first_face[level + 1]; f++) split_face(l, f);
+}
+
+/* edges that shrink to nothing have no direction for a spring */
+static pal_err check_edges(const pal_levels *l, double diagonal, pal_note *note)
+{
+    for (int32_t e = 0; e < l->first_edge[l->n_level]; e++) {
+        const int32_t *end = l->edge[e].vertex;
+        double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
+        if (!(length > FLAT * diagonal))
+            return pal_note_set(
+                note, PAL_ERR_REFUSED,
+                "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
+                "m: smooth the surface or ask for fewer levels",
+                end[0], end[1], l->edge_level[e], length, diagonal);
+    }
+    return PAL_ERR_OK;
+}
+
+/* the coarse level in l's arrays, linked and checked */
+static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged_edge *edge, const int32_t *face_edge,
+                           int64_t *irregular, pal_note *note)
+{
+    size_t n_corner = 3 * (size_t)s->n_tri;
+    int32_t bad;
+    memcpy(l->x, s->x, 3 * (size_t)s->n_vertex * sizeof *l->x);
+    memcpy(l->face, s->tri, n_corner * sizeof *l->face);
+    memcpy(l->face_edge, face_edge, n_corner * sizeof *l->face_edge);
+    memcpy(l->edge, edge, (size_t)l->first_edge[1] * sizeof *l->edge);
+    memcpy(l->origin_m, s->origin_m, sizeof l->origin_m);
+    if (!link_level(l, 0, &bad)) return refuse_fans(bad, note);
+    PAL_TRY(check_fans(l, irregular, note));
+    find_corners(l);
+    l->closed = true;
+    for (int32_t e = 0; e < l->first_edge[1]; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
+    int32_t *label = malloc((size_t)s->n_tri * sizeof *label);
+    pal_err err = label ? pal_surface_components(s, label, &l->n_component) : PAL_ERR_MEMORY;
+    free(label);
+    return err;
+}
+
+static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
+                           int32_t *face_edge, pal_note *note)
+{
+    size_t budget = o->budget_byte ? o->budget_byte : BUDGET;
+    int32_t n_edge;
+    int64_t irregular = 0;
+    PAL_TRY(find_edges(s, edge, face_edge, &n_edge, note));
+    if (!count_levels(l, s->n_vertex, n_edge, s->n_tri))
+        return pal_note_set(note, PAL_ERR_BUDGET, "levels: %d levels of %d triangles make more than %d edges",
+                            l->n_level, s->n_tri, INT32_MAX / 8);
+    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, note);
+    PAL_TRY(get_memory(l));
+    PAL_TRY(take_coarse(s, l, edge, face_edge, &irregular, note));
+    PAL_TRY(get_entries(l, irregular, budget, note));
+    for (int k = 0; k + 1 < l->n_level; k++) {
+        int32_t none;
+        place_midpoints(l, k);
+        split_level(l, k);
+        if (!link_level(l, k + 1, &none)) return PAL_ERR_INTERNAL;
+    }
+    trim_entries(l);
+    double low[3], high[3];
+    pal_surface_box(s, low, high);
+    return check_edges(l, pal_dist3(low, high), note);
+}
+
+pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out, pal_note *note)
+{
+    PAL_TRY(check_input(surface, options, note));
+    pal_levels l = {.n_level = options->n_level};
+    size_t n_corner = 3 * (size_t)surface->n_tri;
+    pal_winged_edge *edge = malloc(n_corner * sizeof *edge);
+    int32_t *face_edge = malloc(n_corner * sizeof *face_edge);
+    pal_err err = edge && face_edge ? make_levels(surface, options, &l, edge, face_edge, note) : PAL_ERR_MEMORY;
+    free(edge);
+    free(face_edge);
+    if (err) {
+        pal_levels_free(&l);
+        return err;
+    }
+    *out = l;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_levels_surface(const pal_levels *levels, int level, pal_surface *out)
+{
+    pal_surface view = {.n_vertex = levels->n_vertex[level], .n_tri = pal_levels_n_face(levels, level), .x = levels->x};
+    view.tri = levels->face + 3 * (size_t)levels->first_face[level];
+    memcpy(view.origin_m, levels->origin_m, sizeof view.origin_m);
+    return pal_surface_copy(&view, out);
+}

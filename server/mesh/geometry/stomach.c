@@ -1,0 +1,413 @@
+/* Hollow bodies: rings of vertices zipped into a tube with closed ends, blown up onto the zero set of a distance-like
+ * function, spread evenly along it and turned to a Delaunay triangulation edge by edge. Counts are those of the rings.
+ */
+#include "server/mesh/geometry/stomach.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define PI       3.14159265358979323846
+#define WIDE_COS 0.766 /* of 40 degrees: angles above are left alone */
+
+/* distance-like: positive inside, zero at the surface */
+typedef double (*shape)(const double p[3]);
+
+typedef struct ring {
+    int n;        /* vertices, 1: a pole */
+    double along; /* place on the spine, in nodes */
+    double swell; /* radius, of the spine's there */
+    bool held;    /* stays as it is made */
+} ring;
+
+typedef struct node {
+    double x[3], r; /* m */
+} node;
+
+typedef struct shell {
+    pal_surface *s;
+    shape inside;
+    int32_t *owner;   /* face that runs from a to b, or -1          [n_vertex][n_vertex] */
+    uint8_t *valence; /* [n_vertex] */
+    uint8_t *held;    /* [n_vertex] */
+    double *move;     /* [n_vertex][4] */
+    double reach;     /* longest way in a step, m */
+} shell;
+
+/* ---- rings ---- */
+
+static void spine_at(const node *spine, int n, double along, node *out, double axis[3])
+{
+    int i = (int)along;
+    if (i > n - 2) i = n - 2;
+    double t = along - i;
+    for (int a = 0; a < 3; a++) {
+        out->x[a] = spine[i].x[a] + t * (spine[i + 1].x[a] - spine[i].x[a]);
+        axis[a] = spine[i + 1].x[a] - spine[i].x[a];
+    }
+    out->r = spine[i].r + t * (spine[i + 1].r - spine[i].r);
+    pal_unit3(axis, axis, 0);
+}
+
+/* vertex i of a ring, at angle 2 pi i / n around the axis, from the side that looks along `up` */
+static void ring_vertices(const ring *r, const node *at, const double axis[3], double *x)
+{
+    double up[3] = {0, 0, 1}, side[3];
+    pal_axpy3(up, -pal_dot3(up, axis), axis);
+    if (!pal_unit3(up, up, 1e-6)) pal_set3(up, 1, 0, 0);
+    pal_cross3(side, axis, up);
+    for (int i = 0; i < r->n; i++) {
+        double angle = 2 * PI * i / r->n, radius = r->n == 1 ? 0 : at->r * r->swell;
+        pal_copy3(x + 3 * i, at->x);
+        pal_axpy3(x + 3 * i, radius * cos(angle), up);
+        pal_axpy3(x + 3 * i, radius * sin(angle), side);
+    }
+}
+
+/* faces between two rings that begin at vertices a and b, b's further along the axis, in the order of their angles;
+ * returns their number */
+static int zip(int n_a, int32_t a, int n_b, int32_t b, int32_t *tri)
+{
+    int i = 0, j = 0, n = 0, end_a = n_a > 1 ? n_a : 0, end_b = n_b > 1 ? n_b : 0;
+    while (i < end_a || j < end_b) {
+        /* the side whose middle comes first */
+        bool on_a = j == end_b || (i < end_a && (2 * i + 1) * n_b <= (2 * j + 1) * n_a);
+        int32_t p = a + i % n_a, q = b + j % n_b;
+        int32_t face[3] = {p, on_a ? a + (i + 1) % n_a : b + (j + 1) % n_b, q};
+        memcpy(tri + 3 * n++, face, sizeof face);
+        if (on_a)
+            i++;
+        else
+            j++;
+    }
+    return n;
+}
+
+/* all rings along the spine as one closed surface */
+static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n_node, shell *sh)
+{
+    int n_vertex = 0, first = 0;
+    for (int k = 0; k < n_ring; k++) n_vertex += rings[k].n;
+    pal_surface *s = sh->s;
+    *s = (pal_surface){.n_vertex = n_vertex};
+    s->x = malloc((size_t)n_vertex * 3 * sizeof *s->x);
+    s->tri = malloc((size_t)n_vertex * 6 * sizeof *s->tri);
+    if (!s->x || !s->tri) return PAL_ERR_MEMORY;
+    for (int k = 0; k < n_ring; k++) {
+        node at;
+        double axis[3];
+        spine_at(spine, n_node, rings[k].along, &at, axis);
+        ring_vertices(&rings[k], &at, axis, s->x + 3 * first);
+        memset(sh->held + first, rings[k].held, (size_t)rings[k].n);
+        if (k > 0) s->n_tri += zip(rings[k - 1].n, first - rings[k - 1].n, rings[k].n, first, s->tri + 3 * s->n_tri);
+        first += rings[k].n;
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- spreading ---- */
+
+static void gradient(shape inside, const double p[3], double g[3])
+{
+    const double h = 1e-6;
+    for (int a = 0; a < 3; a++) {
+        double q[3];
+        pal_copy3(q, p);
+        q[a] += h;
+        g[a] = inside(q);
+        q[a] -= 2 * h;
+        g[a] = (g[a] - inside(q)) / (2 * h);
+    }
+}
+
+static void count_around(shell *sh)
+{
+    const pal_surface *s = sh->s;
+    size_t n = (size_t)s->n_vertex;
+    memset(sh->owner, -1, n * n * sizeof *sh->owner);
+    memset(sh->valence, 0, n);
+    for (int c = 0; c < 3 * s->n_tri; c++) {
+        int32_t a = s->tri[c], b = s->tri[c % 3 == 2 ? c - 2 : c + 1];
+        sh->owner[(size_t)a * n + (size_t)b] = c / 3;
+        sh->valence[a]++;
+    }
+}
+
+/* cotangent of the angle at c between a and b */
+static double cotangent(const double *c, const double *a, const double *b)
+{
+    double u[3], v[3], w[3];
+    pal_sub3(u, a, c);
+    pal_sub3(v, b, c);
+    pal_cross3(w, u, v);
+    return pal_dot3(u, v) / fmax(pal_norm3(w), 1e-30);
+}
+
+static int32_t third(const int32_t *tri, int32_t a, int32_t b)
+{
+    return tri[0] != a && tri[0] != b ? tri[0] : tri[1] != a && tri[1] != b ? tri[1] : tri[2];
+}
+
+static void face_normal(const double *x, int32_t a, int32_t b, int32_t c, double n[3])
+{
+    double u[3], v[3];
+    pal_sub3(u, x + 3 * b, x + 3 * a);
+    pal_sub3(v, x + 3 * c, x + 3 * a);
+    pal_cross3(n, u, v);
+}
+
+/* whether c d b and d c a look the way a b c and b a d do together */
+static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t d)
+{
+    double n[3], m[3];
+    face_normal(x, a, b, c, n);
+    face_normal(x, b, a, d, m);
+    pal_add3(n, n, m);
+    face_normal(x, c, d, b, m);
+    if (!(pal_dot3(n, m) > 0)) return false;
+    face_normal(x, d, c, a, m);
+    return pal_dot3(n, m) > 0;
+}
+
+/* turns the edge a b of two faces into c d when its opposite angles are more than a half circle together */
+static void turn_edge(shell *sh, int32_t a, int32_t b)
+{
+    const pal_surface *s = sh->s;
+    size_t n = (size_t)s->n_vertex;
+    int32_t left = sh->owner[(size_t)a * n + (size_t)b], right = sh->owner[(size_t)b * n + (size_t)a];
+    int32_t *tl = s->tri + 3 * left, *tr = s->tri + 3 * right, c = third(tl, a, b), d = third(tr, a, b);
+    const double *x = s->x;
+    if (sh->held[a] && sh->held[b]) return;
+    if (sh->valence[a] < 5 || sh->valence[b] < 5 || sh->valence[c] > 6 || sh->valence[d] > 6) return;
+    if (sh->owner[(size_t)c * n + (size_t)d] >= 0 || sh->owner[(size_t)d * n + (size_t)c] >= 0) return;
+    if (cotangent(x + 3 * c, x + 3 * a, x + 3 * b) + cotangent(x + 3 * d, x + 3 * a, x + 3 * b) > -1e-3) return;
+    if (!stays_flat(x, a, b, c, d)) return;
+    int32_t one[3] = {c, d, b}, two[3] = {d, c, a};
+    memcpy(tl, one, sizeof one);
+    memcpy(tr, two, sizeof two);
+    sh->owner[(size_t)a * n + (size_t)b] = sh->owner[(size_t)b * n + (size_t)a] = -1;
+    sh->owner[(size_t)c * n + (size_t)d] = sh->owner[(size_t)d * n + (size_t)b] = sh->owner[(size_t)b * n + (size_t)c] =
+        left;
+    sh->owner[(size_t)d * n + (size_t)c] = sh->owner[(size_t)c * n + (size_t)a] = sh->owner[(size_t)a * n + (size_t)d] =
+        right;
+    sh->valence[a]--, sh->valence[b]--, sh->valence[c]++, sh->valence[d]++;
+}
+
+static void to_surface(const shell *sh, double x[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double g[3], depth = sh->inside(x);
+        if (fabs(depth) < 1e-6 * sh->reach) return;
+        gradient(sh->inside, x, g);
+        double gg = fmax(pal_dot3(g, g), 1e-6), most = sh->reach / sqrt(gg);
+        pal_axpy3(x, fmax(fmin(-depth / gg, most), -most), g);
+    }
+}
+
+/* along the surface a share of the way to the middle of the faces around, and onto the zero set; the middle is weighted
+ * by area, or the vertices would slip off together as a rubber band slips off a ball */
+static void spread(shell *sh, double share)
+{
+    pal_surface *s = sh->s;
+    memset(sh->move, 0, 4 * (size_t)s->n_vertex * sizeof *sh->move);
+    for (int t = 0; t < s->n_tri; t++) {
+        const int32_t *c = s->tri + 3 * t;
+        double n[3];
+        face_normal(s->x, c[0], c[1], c[2], n);
+        double area = pal_norm3(n);
+        for (int k = 0; k < 9; k++) pal_axpy3(sh->move + 4 * c[k / 3], area / 3, s->x + 3 * c[k % 3]);
+        for (int k = 0; k < 3; k++) sh->move[4 * c[k] + 3] += area;
+    }
+    for (int v = 0; v < s->n_vertex; v++) {
+        if (sh->held[v]) continue;
+        double *x = s->x + 3 * v, *to = sh->move + 4 * v, g[3];
+        pal_scale3(to, 1 / to[3], to);
+        pal_sub3(to, to, x);
+        gradient(sh->inside, x, g);
+        double gg = fmax(pal_dot3(g, g), 1e-6);
+        pal_axpy3(to, -pal_dot3(to, g) / gg, g);
+        pal_axpy3(x, share, to);
+        to_surface(sh, x);
+    }
+}
+
+/* cosine of the least angle of the faces of a vertex at x and the n sides across from it */
+static double worst_cosine(const double *all, const double x[3], int32_t side[][2], int n)
+{
+    double worst = -1;
+    for (int i = 0; i < n; i++) {
+        const double *p[5] = {x, all + 3 * side[i][0], all + 3 * side[i][1], x, all + 3 * side[i][0]};
+        for (int k = 0; k < 3; k++) {
+            double u[3], v[3];
+            pal_sub3(u, p[k + 1], p[k]);
+            pal_sub3(v, p[k + 2], p[k]);
+            worst = fmax(worst, pal_dot3(u, v) / sqrt(pal_dot3(u, u) * pal_dot3(v, v)));
+        }
+    }
+    return worst;
+}
+
+/* small steps along the surface that widen the least angle around a vertex */
+static void widen(shell *sh, int32_t v, double step)
+{
+    enum { WAYS = 8 };
+    pal_surface *s = sh->s;
+    double *x = s->x + 3 * v, g[3], up[3] = {0, 0, 1}, side[3];
+    int32_t around[16][2];
+    int n = 0;
+    for (int c = 0; c < 3 * s->n_tri && n < 16; c++) {
+        const int32_t *t = s->tri + 3 * (c / 3);
+        if (s->tri[c] == v) around[n][0] = t[(c + 1) % 3], around[n++][1] = t[(c + 2) % 3];
+    }
+    gradient(sh->inside, x, g);
+    if (!pal_unit3(g, g, 0)) return;
+    if (fabs(g[2]) > 0.7) pal_set3(up, 1, 0, 0);
+    pal_cross3(side, g, up);
+    pal_unit3(side, side, 0);
+    pal_cross3(up, side, g);
+    double best = worst_cosine(s->x, x, around, n), from[3];
+    pal_copy3(from, x);
+    for (int k = 0; k < WAYS && best > WIDE_COS; k++) {
+        double to[3];
+        pal_copy3(to, from);
+        pal_axpy3(to, step * cos(2 * PI * k / WAYS), side);
+        pal_axpy3(to, step * sin(2 * PI * k / WAYS), up);
+        to_surface(sh, to);
+        double now = worst_cosine(s->x, to, around, n);
+        if (now < best) best = now, pal_copy3(x, to);
+    }
+}
+
+/* the rings, blown up and spread evenly; on failure nothing is left */
+static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int n_node, shape inside, double reach,
+                          pal_surface *out)
+{
+    enum { MOST = 256, STEPS = 500, WIDENINGS = 40 };
+    uint8_t valence[MOST], held[MOST];
+    pal_surface s;
+    shell sh = {&s,   inside, malloc(MOST * MOST * sizeof(int32_t)), valence, held, malloc(MOST * 4 * sizeof(double)),
+                reach};
+    pal_err err = sh.owner && sh.move ? make_tube(rings, n_ring, spine, n_node, &sh) : PAL_ERR_MEMORY;
+    for (int step = 0; !err && step < STEPS; step++) {
+        count_around(&sh);
+        for (int32_t a = 0; a < s.n_vertex; a++)
+            for (int32_t b = 0; b < a; b++)
+                if (sh.owner[a * s.n_vertex + b] >= 0) turn_edge(&sh, a, b);
+        spread(&sh, step < STEPS / 4 ? 0.05 : 0.5);
+    }
+    for (int step = 0; !err && step < WIDENINGS; step++)
+        for (int32_t v = 0; v < s.n_vertex; v++)
+            if (!sh.held[v]) widen(&sh, v, reach / (2 + step));
+    free(sh.owner);
+    free(sh.move);
+    if (err)
+        pal_surface_free(&s);
+    else
+        *out = s;
+    return err;
+}
+
+/* ---- bodies ---- */
+
+static double unit_ball(const double p[3])
+{
+    return 1 - pal_norm3(p);
+}
+
+pal_err pal_sphere_make(double radius_m, pal_surface *out)
+{
+    static const ring rings[] = {{1, 0, 0, false},    {6, 0.35, 1, false}, {12, 0.7, 1, false},  {18, 1.05, 1, false},
+                                 {20, 1.4, 1, false}, {20, 1.6, 1, false}, {18, 1.95, 1, false}, {12, 2.3, 1, false},
+                                 {6, 2.65, 1, false}, {1, 3, 0, false}};
+    static const node spine[] = {{{0, 0, -1}, 0.02}, {{0, 0, -0.5}, 0.8}, {{0, 0, 0.5}, 0.8}, {{0, 0, 1}, 0.02}};
+    if (!(radius_m > 0) || !isfinite(radius_m)) return PAL_ERR_REFUSED;
+    PAL_TRY(make_shell(rings, sizeof rings / sizeof *rings, spine, 4, unit_ball, 0.1, out));
+    for (int i = 0; i < out->n_vertex; i++) {
+        pal_unit3(out->x + 3 * i, out->x + 3 * i, 0);
+        pal_scale3(out->x + 3 * i, radius_m, out->x + 3 * i);
+    }
+    return PAL_ERR_OK;
+}
+
+/* oesophagus, cardia, body, antrum, pylorus, duodenum */
+static const node gut[] = {{{-0.014, 0.155, 0}, 0.0155},      {{0.004, 0.100, 0}, 0.0155},
+                           {{0.050, 0.078, 0}, 0.042},        {{0.050, 0.015, 0}, 0.041},
+                           {{0.022, -0.040, 0.004}, 0.036},   {{-0.030, -0.055, 0.008}, 0.026},
+                           {{-0.066, -0.036, 0.004}, 0.0155}, {{-0.095, -0.012, -0.004}, 0.0155}};
+enum { N_GUT = sizeof gut / sizeof *gut };
+
+/* about the distance to the surface of the cone between two balls */
+static double cone(const double p[3], const node *a, const node *b)
+{
+    double u[3], v[3];
+    pal_sub3(u, b->x, a->x);
+    pal_sub3(v, p, a->x);
+    double t = fmin(fmax(pal_dot3(u, v) / pal_dot3(u, u), 0), 1);
+    pal_axpy3(v, -t, u);
+    return a->r + t * (b->r - a->r) - pal_norm3(v);
+}
+
+/* the larger of two, rounded where they are within r of each other */
+static double blend(double a, double b, double r)
+{
+    double t = fmax(r - fabs(a - b), 0) / r;
+    return fmax(a, b) + t * t * r / 4;
+}
+
+static double stomach(const double p[3])
+{
+    static const node fundus = {{0.060, 0.088, 0}, 0.042};
+    double inside = fundus.r - pal_dist3(p, fundus.x);
+    for (int k = 0; k + 1 < N_GUT; k++) inside = blend(inside, cone(p, &gut[k], &gut[k + 1]), 0.02);
+    return inside;
+}
+
+pal_err pal_stomach_make(pal_stomach *out)
+{
+    static const ring rings[] = {{1, 0, 0, true},     {6, 0, 1, true},     {6, 0.3, 1, false},  {8, 0.6, 1, false},
+                                 {12, 0.9, 1, false}, {17, 1.3, 1, false}, {20, 1.7, 1, false}, {22, 2.2, 1, false},
+                                 {22, 2.6, 1, false}, {20, 3.1, 1, false}, {18, 3.6, 1, false}, {14, 4.3, 1, false},
+                                 {9, 5.1, 1, false},  {6, 5.8, 1, false},  {6, 7.0, 1, true},   {1, 7.0, 0, true}};
+    pal_stomach made = {.oesophagus_cap = 0, .duodenum_cap = PAL_STOMACH_VERTEX - 1};
+    PAL_TRY(make_shell(rings, sizeof rings / sizeof *rings, gut, N_GUT, stomach, 0.003, &made.surface));
+    for (int k = 0; k < PAL_STOMACH_RING; k++) {
+        made.oesophagus[k] = 1 + k;
+        made.duodenum[k] = PAL_STOMACH_VERTEX - 1 - PAL_STOMACH_RING + k;
+    }
+    *out = made;
+    return PAL_ERR_OK;
+}
+
+void pal_stomach_free(pal_stomach *stomach)
+{
+    pal_surface_free(&stomach->surface);
+}
+
+pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_note *note)
+{
+    if (n < 2 || m < 2 || n > 20000 || m > 20000 || (double)n * m > 1e7)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "sheet: %d x %d vertices, 2 to 20000 along a side and 10 million together are made", n, m);
+    if (!(width_m > 0 && width_m <= 1e6 && height_m > 0 && height_m <= 1e6))
+        return pal_note_set(note, PAL_ERR_REFUSED, "sheet: a size of %g x %g m", width_m, height_m);
+    pal_surface s = {.n_vertex = n * m, .n_tri = 2 * (n - 1) * (m - 1)};
+    s.x = malloc((size_t)s.n_vertex * 3 * sizeof *s.x);
+    s.tri = malloc((size_t)s.n_tri * 3 * sizeof *s.tri);
+    if (!s.x || !s.tri) {
+        pal_surface_free(&s);
+        return PAL_ERR_MEMORY;
+    }
+    int32_t *to = s.tri;
+    for (int j = 0; j < m; j++)
+        for (int i = 0; i < n; i++) {
+            int32_t a = j * n + i;
+            pal_set3(s.x + 3 * (size_t)a, width_m * (i / (n - 1.0) - 0.5), height_m * (j / (m - 1.0) - 0.5), 0);
+            if (i == n - 1 || j == m - 1) continue;
+            int32_t two[6] = {a, a + 1, a + n + 1, a, a + n + 1, a + n};
+            memcpy(to, two, sizeof two);
+            to += 6;
+        }
+    *out = s;
+    return PAL_ERR_OK;
+}

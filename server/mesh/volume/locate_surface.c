@@ -1,0 +1,195 @@
+/* A part of a surface as quadrature points in the elements of a mesh.
+ *
+ * Triangles are cut by the box, then by the planes of the voxel lattice, whose pieces lie in one hexahedron each. In
+ * tetrahedra a piece is peeled: the element around its middle takes what its four planes leave of the piece, and the
+ * rest, in convex pieces, is dealt with likewise. Areas are of polygons cut without loss, so they sum exactly. */
+#include "server/base/vec3.h"
+#include "server/mesh/geometry/polygon.h"
+#include "server/mesh/volume/locate.h"
+#include "server/num/shape.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* cosine of the angle that a triangle's normal may be off; pieces smaller than this share of their triangle are
+ * rounding; barycentric coordinates within this of 0 lie on the face */
+#define COS_OFF 0.90630778703664996324
+#define CRUMB   1e-15
+#define ON_FACE 1e-12
+enum { MOST_PEEL = 24 };
+
+typedef struct cutter {
+    const pal_locate *locate;
+    const pal_tets *tets;
+    bool hex;
+    double low[3], h; /* of the voxel lattice */
+    double normal[3]; /* of the triangle at hand */
+    double crumb_m2;
+    pal_piece *piece;
+    size_t n, cap;
+    bool full; /* out of memory */
+} cutter;
+
+static double area_of(const cutter *c, const pal_polygon *p)
+{
+    double sum = 0;
+    for (int i = 1; i + 1 < p->n; i++) {
+        double a[3], b[3], cross[3];
+        pal_sub3(a, p->x[i], p->x[0]);
+        pal_sub3(b, p->x[i + 1], p->x[0]);
+        pal_cross3(cross, a, b);
+        sum += pal_dot3(cross, c->normal) / 2;
+    }
+    return sum;
+}
+
+static pal_piece *next_piece(cutter *c)
+{
+    if (c->n == c->cap) {
+        size_t cap = c->cap ? 2 * c->cap : 256;
+        pal_piece *piece = cap <= INT32_MAX ? realloc(c->piece, cap * sizeof *piece) : NULL;
+        if (!piece) {
+            c->full = true;
+            return NULL;
+        }
+        c->piece = piece;
+        c->cap = cap;
+    }
+    return &c->piece[c->n++];
+}
+
+/* a polygon within an element, as a fan of triangles with six points each */
+static void add_points(cutter *c, const pal_polygon *p, int element)
+{
+    for (int i = 1; i + 1 < p->n && !c->full; i++) {
+        const double *corner[3] = {p->x[0], p->x[i], p->x[i + 1]};
+        double a[3], b[3], cross[3];
+        pal_sub3(a, corner[1], corner[0]);
+        pal_sub3(b, corner[2], corner[0]);
+        pal_cross3(cross, a, b);
+        double area = pal_dot3(cross, c->normal) / 2;
+        if (!(area > 0)) continue;
+        for (int q = 0; q < 6; q++) {
+            double x[3] = {0};
+            for (int k = 0; k < 3; k++) pal_axpy3(x, pal_tri_gauss[q][k], corner[k]);
+            pal_piece *piece = next_piece(c);
+            if (!piece) return;
+            piece->element = element;
+            piece->area_m2 = area * pal_tri_gauss[q][3];
+            pal_copy3(piece->normal, c->normal);
+            pal_locate_local(c->locate, element, x, piece->local);
+        }
+    }
+}
+
+static int element_at_middle(const cutter *c, const pal_polygon *p, double *outside_m)
+{
+    double middle[3] = {0}, local[4];
+    for (int i = 0; i < p->n; i++) pal_axpy3(middle, 1.0 / p->n, p->x[i]);
+    return pal_locate_point(c->locate, middle, local, outside_m);
+}
+
+/* heights of the corners over face f of a tetrahedron, rounding taken off; true when they lie on both sides */
+static bool find_heights(const cutter *c, const pal_polygon *p, int element, int f, double height[PAL_POLYGON_MOST])
+{
+    bool below = false, above = false;
+    for (int i = 0; i < p->n; i++) {
+        double local[4];
+        pal_locate_local(c->locate, element, p->x[i], local);
+        height[i] = fabs(local[f]) < ON_FACE ? 0 : local[f];
+        below |= height[i] < 0;
+        above |= height[i] > 0;
+    }
+    return below && above;
+}
+
+static void peel(cutter *c, pal_polygon *p, int depth)
+{
+    double outside, height[PAL_POLYGON_MOST];
+    if (p->n < 3 || area_of(c, p) <= c->crumb_m2) return;
+    int element = element_at_middle(c, p, &outside);
+    for (int f = 0; f < 4 && depth < MOST_PEEL && outside == 0; f++) {
+        pal_polygon off, on;
+        if (!find_heights(c, p, element, f, height)) continue;
+        pal_polygon_cut(p, height, &off, &on);
+        peel(c, &off, depth + 1);
+        *p = on;
+    }
+    if (p->n >= 3) add_points(c, p, element);
+}
+
+/* cuts by the lattice planes of one axis after the other */
+static void cut_lattice(cutter *c, pal_polygon *p, int axis)
+{
+    if (p->n < 3 || area_of(c, p) <= c->crumb_m2) return;
+    if (axis == 3) {
+        if (c->hex)
+            add_points(c, p, element_at_middle(c, p, NULL));
+        else
+            peel(c, p, 0);
+        return;
+    }
+    double least, most;
+    pal_polygon_range(p, axis, &least, &most);
+    for (double i = floor((least - c->low[axis]) / c->h); !c->full; i++) {
+        double at = c->low[axis] + i * c->h;
+        if (at >= most) break;
+        if (at <= least) continue;
+        pal_polygon low, high;
+        pal_polygon_cut_axis(p, axis, at, &low, &high);
+        cut_lattice(c, &low, axis + 1);
+        *p = high;
+    }
+    cut_lattice(c, p, axis + 1);
+}
+
+static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const double low[3], const double high[3],
+                         const double *normal)
+{
+    pal_polygon p = {.n = 3}, cut;
+    double a[3], b[3], cross[3];
+    for (int k = 0; k < 3; k++)
+        for (int d = 0; d < 3; d++)
+            p.x[k][d] = surface->x[3 * (size_t)surface->tri[3 * t + (size_t)k] + (size_t)d] + surface->origin_m[d] -
+                        c->tets->origin_m[d];
+    pal_sub3(a, p.x[1], p.x[0]);
+    pal_sub3(b, p.x[2], p.x[0]);
+    pal_cross3(cross, a, b);
+    if (!pal_unit3(c->normal, cross, 0)) return;
+    if (normal && pal_dot3(c->normal, normal) < COS_OFF) return;
+    c->crumb_m2 = CRUMB * pal_norm3(cross) / 2;
+    for (int k = 0; k < 3 && p.n >= 3; k++) {
+        pal_polygon_cut_axis(&p, k, low[k], NULL, &cut);
+        pal_polygon_cut_axis(&cut, k, high[k], &p, NULL);
+    }
+    cut_lattice(c, &p, 0);
+}
+
+/* lowest corner of the mesh: where the lattice of a voxel split begins */
+static void find_low(cutter *c)
+{
+    for (int k = 0; k < 3; k++) {
+        c->low[k] = INFINITY;
+        for (size_t i = 0; i < (size_t)c->tets->n_node; i++) c->low[k] = fmin(c->low[k], c->tets->x[3 * i + (size_t)k]);
+    }
+}
+
+pal_err pal_locate_surface(const pal_locate *locate, const pal_surface *surface, const double low[3],
+                           const double high[3], const double *normal, pal_piece **out, int *n_piece)
+{
+    double unit[3];
+    cutter c = {.locate = locate};
+    c.tets = pal_locate_mesh(locate, &c.hex);
+    c.h = c.tets->h_m;
+    find_low(&c);
+    if (normal && !pal_unit3(unit, normal, 0)) normal = NULL;
+    for (size_t t = 0; t < (size_t)surface->n_tri && !c.full; t++)
+        add_triangle(&c, surface, t, low, high, normal ? unit : NULL);
+    if (c.full) {
+        free(c.piece);
+        return PAL_ERR_MEMORY;
+    }
+    *out = c.piece;
+    *n_piece = (int)c.n;
+    return PAL_ERR_OK;
+}

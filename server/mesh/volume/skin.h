@@ -1,0 +1,60 @@
+/* Skinning of a shown surface to the surface nodes of a tetrahedral mesh (paper B 4.2 with errata B6-B8, B15).
+ *
+ * Each used surface node has a frame: X = unit sum of its boundary faces' normals, Y = a chosen surface edge made
+ * normal to X, Z = X x Y. Each shown vertex stores, for its 5 nearest surface nodes, the offset in their frames and
+ * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the node's
+ * position is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
+ * is the one with the largest tangential part at rest, with another as fallback (B15), whose angle to the first is
+ * stored, so that the fallback gives the same axes.
+ *
+ * Frames depend on the present positions only. Where a neighbourhood has collapsed (its normal sum or its edge is less
+ * than half of its length at rest) the axes shrink in proportion instead of turning about at once, so the surface
+ * closes in on the nodes, passes smoothly through flat and inverted states and stays finite. Elsewhere the axes are
+ * unit vectors.
+ *
+ * Binding is [load]; evaluation is [sim], without heap use. One pal_skin may serve several threads; each needs its own
+ * frames buffer. */
+#ifndef PAL_MESH_SKIN_H
+#define PAL_MESH_SKIN_H
+#include "server/base/arena.h"
+#include "server/mesh/geometry/surface.h"
+#include "server/mesh/geometry/tets.h"
+
+enum { PAL_SKIN_NEAR = 5 };
+
+typedef struct pal_skin {
+    int n_vertex;        /* shown vertices                                                               */
+    int n_frame;         /* surface nodes that some vertex uses                                          */
+    int n_node;          /* nodes of the mesh, for checks                                                */
+    int32_t *frame;      /* node of each frame, ascending                          [n_frame]             */
+    int32_t *frame_edge; /* other ends of its two candidate edges (second may be -1) [n_frame][2]        */
+    float *frame_turn;   /* cos, sin of the angle about X from second to first edge at rest [n_frame][2] */
+    float *frame_rest;   /* rest lengths: sum of the fan's cross products, m^2; tangential parts of the two edges, m
+                                                                                   [n_frame][3]          */
+    int32_t *fan_start;  /* boundary faces around each frame's node, as sparse rows [n_frame+1]          */
+    int32_t *fan;        /* the two other corners of each face, in outward order    [fan_start[n_frame]][2] */
+    int32_t *near;       /* frames of each vertex                                   [n_vertex][5]        */
+    float *coef;         /* weight w (sum 1 over a row) and offset o in the frame's axes, m, as
+                            w oX, w oY, w oZ, w                                     [n_vertex][5][4]     */
+} pal_skin;
+
+/* binds vertices x [n_vertex][3] (same frame as tets->x) to the mesh; heap arrays, pal_skin_free; MEMORY, REFUSED when
+ * the mesh has no surface */
+pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_skin *out);
+void pal_skin_free(pal_skin *skin);
+
+/* The frames buffer: 64 bytes a frame, 16 floats X Y Z P each padded to 4 (an array of 9 doubles a frame is large
+ * enough). Caller's memory, zeroed before the first use, best at a multiple of 64; its content is this room's own. */
+static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
+{
+    return (size_t)skin->n_frame * 64;
+}
+/* axes from node positions x [n_node][3]; a frame whose nodes are not finite keeps what the buffer holds. [sim] */
+void pal_skin_frames(const pal_skin *skin, const double *x, void *frames);
+/* the same for the n frames of list only [sim] */
+void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames);
+/* all shown vertices: out [n_vertex][3] float metres; writes the nodes' positions into frames. [sim] */
+void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out);
+/* one shown vertex. [sim] */
+void pal_skin_vertex(const pal_skin *skin, const double *x, const void *frames, int vertex, double out[3]);
+#endif

@@ -1,0 +1,126 @@
+/* Where the rig's scene rests, and where it would be untouched when it never does. */
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/robustness/torture_parts.h"
+#include "server/solve/preflight.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double settle_most_s = 30;
+static const double back_s = 10, longest_s = 120, n_period = 10;
+static const double lead_s = 0.5; /* that a led scene is on its way before an insult */
+
+/* RMS speed of the fastest body over its S, 1/s */
+double pal_rig_speed_S_s(const pal_rig *rig)
+{
+    double most = 0;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        double sum = 0;
+        for (int k = 0; k < body->n_active; k++) {
+            const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
+            sum += pal_dot3(v, v);
+        }
+        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->size_m;
+        if (!(speed <= most)) most = speed;
+    }
+    return most;
+}
+
+/* ---- rest ---- */
+
+/* how long bodies have to come back, s: ten of the slowest periods (numerics.md part 3), no less than 10 s, no more
+ * than two minutes */
+double pal_rig_patience(const pal_rig *rig)
+{
+    double most = 0;
+    pal_preflight *look = malloc(sizeof *look);
+    if (look && !pal_preflight_look(rig->scene, PAL_PREFLIGHT_FULL, look, NULL))
+        for (int b = 0; b < look->n_body; b++) most = fmax(most, look->body[b].slow_s); /* of NaN the other */
+    free(look);
+    return fmax(back_s, fmin(longest_s, n_period * most));
+}
+
+/* runs until nothing moves; false: it still does */
+bool pal_rig_settle(pal_rig *rig, double *took_s)
+{
+    const double step = rig->scene->step_s;
+    double still_s = 0, t = 0;
+    for (; t < settle_most_s && still_s < 0.25; t += step) {
+        if (pal_world_step(rig->world, step) || 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s) return false;
+        still_s = pal_rig_speed_S_s(rig) <= still_S_s ? still_s + step : 0;
+    }
+    *took_s = t;
+    return still_s >= 0.25;
+}
+
+void pal_rig_keep(pal_rig *rig, double **to)
+{
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->world, b);
+        memcpy(to[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    rig->rest_J = pal_world_energy_J(rig->world);
+}
+
+/* ---- a scene that is led for ever ---- */
+
+/* one step of the untouched run; false: it cannot follow, and nothing can be said any more */
+bool pal_rig_step_twin(pal_rig *rig, double dt_s)
+{
+    if (!rig->twin) return true;
+    if (pal_world_step(rig->twin, dt_s)) return false;
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(rig->twin, b);
+        if (body->frozen) return false;
+        memcpy(rig->rest[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    rig->rest_J = pal_world_energy_J(rig->twin);
+    return true;
+}
+
+/* both worlds anew, and both on their way for a while */
+static bool begin_twin(pal_rig *rig)
+{
+    pal_world *twin = NULL;
+    if (pal_world_create(rig->scene, NULL, &twin)) return false;
+    pal_world_destroy(rig->twin);
+    rig->twin = twin;
+    for (double t = 0; t < lead_s; t += rig->scene->step_s)
+        if (pal_world_step(rig->world, rig->scene->step_s) || !pal_rig_step_twin(rig, rig->scene->step_s)) return false;
+    return true;
+}
+
+/* it did not come to rest: is it because something leads it? Then an untouched run beside it says where it should be */
+bool pal_rig_lead(pal_rig *rig)
+{
+    bool led = false;
+    for (int i = 0; i < pal_world_rows(rig->world); i++)
+        led |= !strcmp(pal_world_effect(rig->world, i)->effect->name, "moving_support");
+    return led && !pal_world_create(rig->scene, NULL, &rig->twin);
+}
+
+/* the scene at rest, as if nothing had been: a new world, as solvers keep factors of what they have seen */
+bool pal_rig_back_to_rest(pal_rig *rig)
+{
+    double took_s;
+    pal_world *fresh = NULL;
+    if (pal_world_create(rig->scene, NULL, &fresh)) return false;
+    pal_world_destroy(rig->world);
+    rig->world = fresh;
+    if (rig->twin) return begin_twin(rig);
+    if (rig->anew) {
+        bool still = pal_rig_settle(rig, &took_s);
+        if (still) pal_rig_keep(rig, rig->rest);
+        return still;
+    }
+    for (int b = 0; b < rig->scene->n_body; b++) {
+        pal_body *body = pal_world_body(rig->world, b);
+        memcpy(body->x, rig->rest[b], 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_world_moved(rig->world, b);
+    }
+    return true;
+}

@@ -1,0 +1,26 @@
+/* Told apart by the name: *.json and folders are scenes, *.palcells are control cells, all else is a surface or scan.
+ */
+#include "server/scene/scene_arg.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+pal_err pal_scene_arg(const char *word, const pal_surface_scene *options, pal_loaded_scene **out, bool *is_surface,
+                      pal_surface_scene_report *report, pal_note *note)
+{
+    static const pal_surface_scene plain = {.label = -1};
+    char path[1200];
+    struct stat facts;
+    size_t n = strlen(word);
+    bool folder = stat(word, &facts) == 0 && S_ISDIR(facts.st_mode);
+    bool json = n > 5 && !strcmp(word + n - 5, ".json");
+    bool cells = n > 9 && !strcmp(word + n - 9, ".palcells");
+    if (is_surface) *is_surface = !folder && !json && !cells;
+    if (!folder && cells) return pal_scene_from_cells(word, options ? options : &plain, out, note);
+    if (!folder && !json) return pal_scene_from_surface(word, options ? options : &plain, out, report, note);
+    int size = snprintf(path, sizeof path, folder ? "%s/scene.json" : "%s", word);
+    if (size < 0 || (size_t)size >= sizeof path)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", word);
+    return pal_scene_load(path, out, note);
+}

@@ -1,0 +1,413 @@
+/* Contact of one tool with an implicit solver: ties, settled forces, caps, felt stiffness. */
+#include "server/sim/contact/press.h"
+
+#include "server/base/vec3.h"
+
+#include <string.h>
+
+/* passes of conjugate gradients for the stiffness of a contact, and steps from one answer to the next */
+enum { FELT_PASSES = 2, FELT_EVERY = 3 };
+/* times that a solver goes round again (pal_tangent.settle) */
+enum { ROUNDS = 2 };
+#define FELT_FORCE_CHANGE 0.02
+/* share of the pushing forces that ties may pull, or points may come through, without another round */
+#define WRONG 0.05
+
+pal_err pal_press_make(pal_arena *arena, pal_press *out)
+{
+    memset(out, 0, sizeof *out);
+    out->force_N = PAL_NEW(arena, double, PAL_PRESS_MOST + 2);
+    out->share = PAL_NEW(arena, double, PAL_PRESS_MOST);
+    out->active = PAL_NEW(arena, uint8_t, PAL_PRESS_MOST);
+    return out->force_N && out->share && out->active ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+void pal_press_reset(pal_press *press)
+{
+    *press = (pal_press){.force_N = press->force_N, .share = press->share, .active = press->active, .across = -1};
+}
+
+int pal_press_thin(pal_contact *contact, int n)
+{
+    int count[2] = {0, 0}, m = 0;
+    for (int i = 0; i < n; i++) count[contact[i].depth_m > 0]++;
+    if (n <= PAL_PRESS_MOST) return n;
+    /* those that touch have room for three quarters, those that may come to touch have the rest */
+    int room[2], stride[2], seen[2] = {0, 0};
+    room[1] = count[0] < PAL_PRESS_MOST / 4 ? PAL_PRESS_MOST - count[0] : 3 * PAL_PRESS_MOST / 4;
+    room[0] = PAL_PRESS_MOST - (count[1] < room[1] ? count[1] : room[1]);
+    for (int k = 0; k < 2; k++) stride[k] = (count[k] + room[k] - 1) / room[k];
+    for (int i = 0; i < n; i++) {
+        int k = contact[i].depth_m > 0;
+        if (seen[k]++ % stride[k] != 0) continue;
+        contact[m] = contact[i];
+        contact[m++].k_N_m *= stride[k];
+    }
+    return m;
+}
+
+/* two unit directions across n */
+static void basis(const double n[3], double t[2][3])
+{
+    int least = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
+    if (fabs(n[2]) < fabs(n[least])) least = 2;
+    double e[3] = {least == 0, least == 1, least == 2};
+    pal_cross3(t[0], n, e);
+    pal_unit3(t[0], t[0], 0);
+    pal_cross3(t[1], n, t[0]);
+}
+
+/* the rows of friction: elastic while they stick, a constant force while they slide */
+static void add_across(pal_press *press, pal_ties *ties, pal_touch *touch, const pal_body *body,
+                       const pal_contact *contact, double friction)
+{
+    double along[3] = {0}, stiffness = 0, sum = 0, stretch[3];
+    int n = press->n_contact;
+    for (int i = 0; i < n; i++) {
+        pal_axpy3(along, press->force_N[i], contact[i].away);
+        stiffness += contact[i].k_N_m;
+        sum += press->force_N[i];
+    }
+    if (!pal_unit3(along, along, 0) || !(sum > 0)) return;
+    for (int i = 0; i < n; i++) press->share[i] = press->force_N[i] / sum;
+    pal_axpy3(press->slip_m, -pal_dot3(press->slip_m, along), along);
+    pal_add3(stretch, press->slip_m, press->tool_move_m);
+    pal_axpy3(stretch, -pal_dot3(stretch, along), along);
+    double size = pal_norm3(stretch), most = friction * press->normal_N;
+    press->slides = press->slides && size > 0;
+    basis(along, press->t);
+    for (int k = 0; k < 2; k++) {
+        int row =
+            pal_ties_add_mean(ties, touch, body, contact, press->share, n, press->t[k], press->slides ? 0 : stiffness);
+        if (row < 0) return;
+        double part = pal_dot3(stretch, press->t[k]);
+        press->force_N[n + k] = press->slides ? most * part / size : stiffness * part;
+    }
+    press->across = press->first + n;
+    press->across_N_m = stiffness;
+}
+
+void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_body *body, const pal_contact *contact,
+                     int n, double friction, const double move_m[3])
+{
+    press->first = ties->n_row;
+    press->across = -1;
+    press->constant = press->settled = false;
+    press->round = 0;
+    pal_set3(press->total_N, 0, 0, 0);
+    press->raw_N = 0;
+    press->allowed_N = INFINITY;
+    press->capped = false;
+    pal_copy3(press->slip_m, press->next_slip_m);
+    press->slides = press->next_slides;
+    pal_copy3(press->tool_move_m, move_m);
+    bool touches = false;
+    int m = 0;
+    while (m < n && pal_ties_add(ties, touch, body, contact[m].point, contact[m].away, contact[m].k_N_m) >= 0) {
+        press->active[m] = contact[m].depth_m > 0;
+        if (!press->active[m]) ties->k_N_m[press->first + m] = 0;
+        press->force_N[m] = press->active[m] ? contact[m].k_N_m * contact[m].depth_m : 0;
+        touches = touches || press->active[m];
+        m++;
+    }
+    press->n_contact = m;
+    if (!touches) {
+        pal_set3(press->next_slip_m, 0, 0, 0);
+        press->next_slides = false;
+        press->normal_N = 0;
+    }
+    if (m == 0) return;
+    if (touches && friction > 0) add_across(press, ties, touch, body, contact, friction);
+    pal_ties_load(ties, 1, press->force_N, press->first, ties->n_row - press->first, body->load);
+}
+
+/* k (d - m) of every contact, whether it acts or not; true: what acts is not what should have, by a noticeable part of
+ * the forces, and is what should have now */
+static bool choose(pal_press *press, pal_ties *ties, pal_body *body, const pal_contact *contact, double *force_N)
+{
+    int n = press->n_contact;
+    double wrong = 0, push = 0, *change = press->share;
+    for (int i = 0; i < n; i++) {
+        force_N[i] = contact[i].k_N_m * (contact[i].depth_m - ties->motion_m[press->first + i]);
+        if (press->active[i] == (force_N[i] > 0))
+            push += press->active[i] ? force_N[i] : 0;
+        else
+            wrong += fabs(force_N[i]);
+    }
+    if (press->round++ >= ROUNDS || !(wrong > WRONG * push)) return false;
+    for (int i = 0; i < n; i++) {
+        press->active[i] = force_N[i] > 0;
+        double load = press->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
+        change[i] = load - press->force_N[i];
+        press->force_N[i] = load;
+        ties->k_N_m[press->first + i] = press->active[i] ? contact[i].k_N_m : 0;
+    }
+    pal_ties_load(ties, 1, change, press->first, n, body->load);
+    return true;
+}
+
+/* friction after the solve, for a normal force; true: it slid although it was taken as sticking or the other way round,
+ * and its two ties are changed */
+static bool settle_across(pal_press *press, pal_ties *ties, pal_body *body, double normal_N, double friction,
+                          double out_N[2])
+{
+    double begin[2], stretch[2], change[2], stiffness = press->across_N_m, along = 0, had = 0;
+    double free = friction * normal_N / stiffness, *load = press->force_N + press->n_contact;
+    for (int k = 0; k < 2; k++) {
+        begin[k] = pal_dot3(press->slip_m, press->t[k]) + pal_dot3(press->tool_move_m, press->t[k]);
+        stretch[k] = begin[k] - ties->motion_m[press->across + k];
+        along += stretch[k] * load[k];
+        had += load[k] * load[k];
+    }
+    double size = hypot(stretch[0], stretch[1]), keep = size > free ? free / size : 1;
+    /* while it slides its force drags tissue no farther than a spring stretched to the limit would */
+    bool sticks = press->slides && along < 0.98 * free * sqrt(had), slips = !press->slides && size > 1.02 * free;
+    pal_set3(press->next_slip_m, 0, 0, 0);
+    for (int k = 0; k < 2; k++) {
+        out_N[k] = press->slides && !sticks ? load[k] : stiffness * keep * stretch[k];
+        pal_axpy3(press->next_slip_m, keep * stretch[k], press->t[k]);
+    }
+    press->next_slides = size > free && !sticks;
+    press->normal_N = normal_N;
+    if (press->round > ROUNDS || !(sticks || slips)) return false;
+    press->slides = slips;
+    for (int k = 0; k < 2; k++) {
+        double to = slips ? out_N[k] : stiffness * begin[k];
+        change[k] = to - load[k];
+        load[k] = to;
+        ties->k_N_m[press->across + k] = slips ? 0 : stiffness;
+    }
+    pal_ties_load(ties, 1, change, press->across, 2, body->load);
+    return true;
+}
+
+/* other constant loads instead of the present ones; the ties give no stiffness any more */
+static void hold_constant(pal_press *press, pal_ties *ties, pal_body *body, const double *force_N, int n)
+{
+    pal_ties_load(ties, -1, press->force_N, press->first, n, body->load);
+    memcpy(press->force_N, force_N, sizeof(double) * (size_t)n);
+    pal_ties_load(ties, 1, press->force_N, press->first, n, body->load);
+    for (int i = 0; i < n; i++) ties->k_N_m[press->first + i] = 0;
+    press->constant = true;
+}
+
+static void sum_forces(const pal_press *press, pal_contact *contact, const double *force_N, double total[3])
+{
+    double across[3] = {0}, sum = 0;
+    int n = press->n_contact;
+    for (int i = 0; i < n; i++) sum += force_N[i];
+    if (press->across >= 0)
+        for (int k = 0; k < 2; k++) pal_axpy3(across, force_N[n + k], press->t[k]);
+    pal_set3(total, 0, 0, 0);
+    for (int i = 0; i < n; i++) {
+        pal_scale3(contact[i].force, force_N[i], contact[i].away);
+        if (sum > 0) pal_axpy3(contact[i].force, force_N[i] / sum, across);
+        pal_sub3(total, total, contact[i].force);
+    }
+}
+
+bool pal_press_settle(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact,
+                      double friction)
+{
+    double force[PAL_PRESS_MOST + 2], normal[3] = {0};
+    int n = press->n_contact, n_row = press->across >= 0 ? n + 2 : n;
+    if (n == 0) return false;
+    if (press->settled) pal_sub3(tool->force_N, tool->force_N, press->total_N);
+    bool again = false, chosen = false;
+    if (press->constant) {
+        memcpy(force, press->force_N, sizeof(double) * (size_t)n_row);
+    } else {
+        chosen = choose(press, ties, body, contact, force);
+        for (int i = 0; i < n; i++) {
+            force[i] = press->active[i] && force[i] > 0 ? force[i] : 0;
+            pal_axpy3(normal, force[i], contact[i].away);
+        }
+        force[n] = force[n + 1] = 0;
+        if (press->across >= 0 && !chosen)
+            chosen = settle_across(press, ties, body, pal_norm3(normal), friction, force + n);
+    }
+    sum_forces(press, contact, force, press->total_N);
+    if (!pal_finite3(press->total_N)) {
+        pal_set3(press->total_N, 0, 0, 0);
+        press->settled = true;
+        return false;
+    }
+    if (!press->constant) press->raw_N = pal_norm3(press->total_N);
+    if (chosen) pal_scale3(press->total_N, pal_tool_room(tool, press->total_N), press->total_N);
+    if (!press->constant && !chosen) {
+        double largest = pal_ties_largest(ties, force, press->first, n_row), room = pal_tool_room(tool, press->total_N);
+        if (body->load_cap_N > 0 && largest > body->load_cap_N) room = fmin(room, body->load_cap_N / largest);
+        press->allowed_N = fmin(room * press->raw_N, tool->force_cap_N * tool->ramp);
+        if (room >= 1) {
+            double node_N = largest > 0 && body->load_cap_N > 0 ? press->raw_N * body->load_cap_N / largest : INFINITY;
+            press->allowed_N = fmin(tool->force_cap_N * tool->ramp, node_N);
+        }
+        press->capped = room < 1;
+        again = press->capped;
+        if (again) {
+            for (int i = 0; i < n_row; i++) force[i] *= room;
+            hold_constant(press, ties, body, force, n_row);
+            sum_forces(press, contact, force, press->total_N);
+        }
+    }
+    pal_add3(tool->force_N, tool->force_N, press->total_N);
+    press->settled = true;
+    tool->touching = tool->touching || pal_dot3(press->total_N, press->total_N) > 0;
+    return again || chosen;
+}
+
+/* ---- felt stiffness ---- */
+
+static int find_entry(const pal_felt *felt, const pal_blob *blob)
+{
+    int best = -1;
+    double cosine = 0.70710678118654752;
+    for (int i = 0; i < PAL_PATCH_MAX; i++) {
+        const pal_felt_entry *e = &felt->entry[i];
+        if (!e->used || e->contact != (blob->force_N > 0)) continue;
+        double c = pal_dot3(e->normal, blob->normal);
+        if (c > cosine) cosine = c, best = i;
+    }
+    return best;
+}
+
+bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blob *blob)
+{
+    double axis[3], sum[3];
+    int seed = -1;
+    double most = 0;
+    for (int i = 0; i < n; i++) {
+        double f2 = pal_dot3(contact[i].force, contact[i].force);
+        if (!grouped[i] && f2 > most) most = f2, seed = i;
+    }
+    if (seed < 0) return false;
+    pal_copy3(axis, contact[seed].away);
+    for (int pass = 0; pass < 2; pass++) {
+        pal_set3(sum, 0, 0, 0);
+        for (int i = 0; i < n; i++)
+            if (!grouped[i] && pal_dot3(contact[i].away, axis) >= PAL_BLOB_COSINE) pal_add3(sum, sum, contact[i].force);
+        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
+    }
+    for (int i = 0; i < n; i++)
+        if (pal_dot3(contact[i].away, axis) >= PAL_BLOB_COSINE) grouped[i] = 1;
+    grouped[seed] = 1;
+    blob->force_N = pal_norm3(sum);
+    blob->gap_m = blob->k_N_m = 0;
+    pal_scale3(sum, -1, sum);
+    return pal_unit3(blob->normal, sum, 0);
+}
+
+bool pal_press_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                    const pal_blob *earlier, int n_earlier, pal_blob *blob)
+{
+    double least = INFINITY, sum[3] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < n_point; i++) {
+            double out[3];
+            pal_sub3(out, centre, x + 3 * i);
+            double distance = pal_norm3(out);
+            if (distance > radius_m + near_m || (pass == 1 && distance > least + 0.2 * radius_m)) continue;
+            if (!pal_unit3(out, out, 1e-9 * radius_m)) continue;
+            bool seen = false;
+            for (int b = 0; b < n_earlier && !seen; b++)
+                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : PAL_BLOB_COSINE);
+            if (seen) continue;
+            if (pass == 0)
+                least = fmin(least, distance);
+            else
+                pal_axpy3(sum, least + 0.2 * radius_m - distance, out);
+        }
+    if (!(least < INFINITY)) return false;
+    *blob = (pal_blob){.gap_m = fmax(0, least - radius_m)};
+    return pal_unit3(blob->normal, sum, 0);
+}
+
+bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m)
+{
+    int i = find_entry(felt, blob);
+    blob->k_N_m = 0;
+    if (i < 0) return true;
+    const pal_felt_entry *e = &felt->entry[i];
+    blob->k_N_m = e->k_N_m;
+    if (felt->step - e->step < FELT_EVERY) return false;
+    return pal_dist3(e->at_m, at_m) > least_m || fabs(blob->force_N - e->force_N) > FELT_FORCE_CHANGE * e->force_N ||
+           fabs(blob->gap_m - e->gap_m) > least_m || pal_dot3(e->normal, blob->normal) < 0.995;
+}
+
+static void keep(pal_felt *felt, pal_blob *blob, const double at_m[3], double k_N_m)
+{
+    int i = find_entry(felt, blob);
+    for (int j = 0; j < PAL_PATCH_MAX && i < 0; j++)
+        if (!felt->entry[j].used) i = j;
+    if (i < 0) i = felt->turn++ % PAL_PATCH_MAX;
+    blob->k_N_m = k_N_m;
+    pal_felt_entry *e = &felt->entry[i];
+    *e = (pal_felt_entry){.used = true,
+                          .step = felt->step,
+                          .contact = blob->force_N > 0,
+                          .force_N = blob->force_N,
+                          .gap_m = blob->gap_m,
+                          .k_N_m = k_N_m};
+    pal_copy3(e->normal, blob->normal);
+    pal_copy3(e->at_m, at_m);
+}
+
+/* what the normal force loses for each metre because contacts turn: tissue moves with `answer` for each metre that the
+ * tool goes against the normal */
+static double turned_N_m(const pal_touch *touch, const pal_body *body, const pal_contact *contact, double radius_m,
+                         const double normal[3], const double *answer)
+{
+    int32_t slot[PAL_TOUCH_BEARERS];
+    double weight[PAL_TOUCH_BEARERS], arm[PAL_TOUCH_BEARERS][3], r[3];
+    int n = pal_touch_bearers(touch, body, contact->point, slot, weight, arm);
+    pal_copy3(r, normal);
+    for (int k = 0; k < n; k++) pal_axpy3(r, weight[k], answer + 3 * (size_t)pal_touch_slot_node(body, slot[k]));
+    pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
+    return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
+}
+
+void pal_felt_contact(pal_felt *felt, pal_blob *blob, const double at_m[3], pal_press *press, pal_ties *ties,
+                      const pal_touch *touch, const pal_body *body, const pal_contact *contact, double radius_m,
+                      pal_arena *scratch)
+{
+    size_t used = pal_arena_used(scratch);
+    double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node), lost = 0;
+    int32_t row[PAL_PRESS_MOST];
+    int n = 0;
+    for (int i = 0; i < press->n_contact; i++) {
+        double into = -pal_dot3(contact[i].away, blob->normal);
+        if (into < PAL_BLOB_COSINE || pal_dot3(contact[i].force, contact[i].force) == 0) continue;
+        if (ties->k_N_m[press->first + i] <= 0) continue;
+        press->share[n] = into;
+        row[n++] = press->first + i;
+    }
+    double k = pal_ties_stiffness(ties, body, row, press->share, n, FELT_PASSES, answer, scratch);
+    for (int i = 0; i < n && answer && k > 0; i++)
+        lost += turned_N_m(touch, body, &contact[row[i] - press->first], radius_m, blob->normal, answer);
+    pal_arena_return(scratch, used);
+    keep(felt, blob, at_m, fmax(0.25 * k, k - lost));
+}
+
+void pal_felt_near(pal_felt *felt, pal_blob *blob, const double at_m[3], const pal_touch *touch, const pal_body *body,
+                   const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
+{
+    size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
+    double *load = PAL_NEW(scratch, double, n3), *move = PAL_NEW(scratch, double, n3), give = 1 / k_N_m;
+    int32_t slot[PAL_TOUCH_BEARERS];
+    double share[PAL_TOUCH_BEARERS], arm[PAL_TOUCH_BEARERS][3];
+    bool known = load && move && body->compliance && k_N_m > 0;
+    for (int i = 0; i < n && known; i++) {
+        int m = pal_touch_bearers(touch, body, point[i], slot, share, arm);
+        for (int k = 0; k < m; k++)
+            pal_axpy3(load + 3 * (size_t)pal_touch_slot_node(body, slot[k]), -weight[i] * share[k], blob->normal);
+    }
+    known = known && body->compliance->solve(body->compliance->self, body, load, move);
+    for (size_t i = 0; i < n3 && known; i++) give += load[i] * move[i];
+    pal_arena_return(scratch, used);
+    keep(felt, blob, at_m, known && give > 0 && isfinite(give) ? 1 / give : 0);
+}
+
+size_t pal_felt_scratch(const pal_body *body)
+{
+    return 9 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_PRESS_MOST + 1024;
+}

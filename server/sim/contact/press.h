@@ -1,0 +1,94 @@
+/* One tool's contact with tissue in a sub-step of an implicit solver, which is as long as the whole step.
+ *
+ * Each point near the tool is a tie (contact_tangent.h) of stiffness k along `away`. One that touches acts: its load at
+ * the start of the sub-step is k d, the solver takes k back as tissue gives way, and the force that is left is k (d -
+ * m), m the tissue's motion along `away`. Those that came out pulling should not have acted, and tissue that would have
+ * come through the sphere should: where that is a noticeable part of the forces they are changed and the solver goes
+ * round again. What pulls in the end counts as zero. Coulomb friction is two more ties across the mean direction, as
+ * stiff as all contacts together, on the mean of their points weighted by their loads; where they would pass friction
+ * times the normal force, they give that constant force instead.
+ *
+ * Caps. The sum of the settled forces is bounded by the tool's cap at its ramp and by the node's load_cap_N. When the
+ * solve left more, all ties of the tool become constant forces shortened to the cap, and the solver goes round once
+ * more (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped.
+ *
+ * What a tool feels: pal_felt keeps, for each direction of contact, the tangent stiffness that the solver's compliance
+ * gives (haptics.md 2.3 step 3 a). Thread: [sim], makes [load]. */
+#ifndef PAL_SIM_PRESS_H
+#define PAL_SIM_PRESS_H
+#include "server/sim/contact/contact_tangent.h"
+#include "server/sim/contact/patch.h"
+
+enum { PAL_PRESS_MOST = 512 }; /* points of one tool; of more, every second, third ... stands for its neighbours */
+
+typedef struct pal_press {
+    int first, n_contact; /* rows of the contacts in pal_ties                                  */
+    int across;           /* first of the two rows of friction, -1: none                       */
+    double across_N_m;    /* their stiffness while they stick                                  */
+    double *force_N;      /* of the loads now in body->load, by row from `first` [PAL_PRESS_MOST + 2] */
+    double *share;        /* scratch [PAL_PRESS_MOST]                                          */
+    double t[2][3];       /* unit directions across                                            */
+    bool constant;        /* the loads stay as they are whatever tissue does                   */
+    uint8_t *active;      /* contacts that act [PAL_PRESS_MOST]                                */
+    int round;            /* of the solver in this sub-step                                    */
+    bool settled;         /* total_N is part of the tool's force                               */
+    double total_N[3];    /* on the tool                                                       */
+    double raw_N;         /* what it was before caps                                           */
+    double allowed_N;     /* what caps leave of it, or would                                   */
+    bool capped;          /* it was more                                                       */
+    /* friction: how far its spring is stretched at the start and end of the sub-step, tool minus tissue, m */
+    double slip_m[3], next_slip_m[3], tool_move_m[3], normal_N;
+    bool slides, next_slides;
+} pal_press;
+
+pal_err pal_press_make(pal_arena *arena, pal_press *out);
+void pal_press_reset(pal_press *press);
+/* keeps at most PAL_PRESS_MOST contacts, stiffer for those left out; returns how many */
+int pal_press_thin(pal_contact *contact, int n);
+/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that touch into body->load;
+ * move_m: the tool's own way in this sub-step (friction only) */
+void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_body *body, const pal_contact *contact,
+                     int n, double friction, const double move_m[3]);
+/* after the solve, ties->motion_m taken: force of every contact, total on the tool. True: beyond a cap, loads changed
+ */
+bool pal_press_settle(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact,
+                      double friction);
+
+/* tangent stiffness in a direction, found when it is asked for and has changed */
+typedef struct pal_felt_entry {
+    bool used, contact;
+    double normal[3], at_m[3], force_N, gap_m, k_N_m;
+    int step; /* when it was found */
+} pal_felt_entry;
+typedef struct pal_felt {
+    pal_felt_entry entry[PAL_PATCH_MAX];
+    int turn, step; /* entry to be replaced next; steps of the world */
+} pal_felt;
+
+/* contacts within 75 degrees of a patch's direction belong to it */
+#define PAL_BLOB_COSINE 0.25
+/* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
+ */
+bool pal_press_blob(const pal_contact *contact, int n, uint8_t *grouped, pal_blob *blob);
+
+/* the nearest tissue, of points x [n_point][3] within radius + near of a sphere's centre, not in the direction of an
+ * earlier blob (beside a contact: only what faces it, since the tissue around a dent goes along with the tool);
+ * directions of what is about as near are averaged. False: there is none */
+bool pal_press_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                    const pal_blob *earlier, int n_earlier, pal_blob *blob);
+
+/* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
+ * more than `least_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
+bool pal_felt_look(const pal_felt *felt, pal_blob *blob, const double at_m[3], double least_m);
+/* Finds it again. Ties do not know that the direction of a contact turns when tissue slips round the sphere: with r the
+ * tool's motion relative to tissue across `away`, a contact of force f loses f r / distance of its part along the
+ * normal, which is taken off. Rows are those of the press's contacts that bear force and belong to the blob, or, for a
+ * blob without contact, points near with weights (sum 1) and the contact stiffness k_N_m behind them */
+void pal_felt_contact(pal_felt *felt, pal_blob *blob, const double at_m[3], pal_press *press, pal_ties *ties,
+                      const pal_touch *touch, const pal_body *body, const pal_contact *contact, double radius_m,
+                      pal_arena *scratch);
+void pal_felt_near(pal_felt *felt, pal_blob *blob, const double at_m[3], const pal_touch *touch, const pal_body *body,
+                   const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch);
+/* scratch that these need in a sub-step */
+size_t pal_felt_scratch(const pal_body *body);
+#endif

@@ -1,0 +1,125 @@
+/* Body arrays and sums over them. */
+#include "server/sim/core/body.h"
+
+#include "server/base/vec3.h"
+#include "server/num/mass_operator.h"
+
+#include <math.h>
+#include <string.h>
+
+static const char *const field_name[PAL_FIELD_COUNT] = {"none",      "displacement", "von_mises", "energy",
+                                                        "stiffness", "strain",       "distortion"};
+
+const char *pal_field_name(pal_field field)
+{
+    return field_name[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
+}
+
+pal_field pal_field_find(const char *name)
+{
+    int found = PAL_FIELD_COUNT - 1;
+    while (found > PAL_FIELD_NONE && strcmp(field_name[found], name)) found--;
+    return (pal_field)found;
+}
+
+const char *pal_field_title(pal_field field)
+{
+    static const char *const title[PAL_FIELD_COUNT] = {
+        "no field",       "displacement",   "von Mises stress", "strain energy density",
+        "edge stiffness", "largest strain", "volume distortion"};
+    return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
+}
+
+pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
+{
+    size_t n3 = 3 * (size_t)n_node;
+    double *x = PAL_NEW(arena, double, n3), *v = PAL_NEW(arena, double, n3), *f = PAL_NEW(arena, double, n3);
+    double *load = PAL_NEW(arena, double, n3), *rest = PAL_NEW(arena, double, n3);
+    double *mass = PAL_NEW(arena, double, n_node);
+    uint8_t *held = PAL_NEW(arena, uint8_t, n_node);
+    if (!x || !v || !f || !load || !rest || !mass || !held) return PAL_ERR_MEMORY;
+    body->n_dof = body->n_node = body->n_active = n_node;
+    body->x = body->d = x;
+    body->v = body->dv = v;
+    body->f = body->g = f;
+    body->load = load;
+    body->x_rest = rest;
+    body->mass_kg = body->node_mass_kg = mass;
+    body->node_rest = rest;
+    body->held = held;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows)
+{
+    size_t n3 = 3 * (size_t)rows->n_row;
+    PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
+    body->d = PAL_NEW(arena, double, n3);
+    body->dv = PAL_NEW(arena, double, n3);
+    body->f = PAL_NEW(arena, double, n3);
+    body->load = PAL_NEW(arena, double, n3);
+    body->node_rest = PAL_NEW(arena, double, n3);
+    body->node_mass_kg = PAL_NEW(arena, double, rows->n_row);
+    if (!body->d || !body->dv || !body->f || !body->load || !body->node_rest || !body->node_mass_kg)
+        return PAL_ERR_MEMORY;
+    body->n_node = rows->n_row;
+    body->embed = rows;
+    return PAL_ERR_OK;
+}
+
+void pal_body_place(pal_body *body)
+{
+    if (!body->embed) return;
+    pal_point_rows_place(body->embed, body->x, body->d);
+    pal_point_rows_place(body->embed, body->v, body->dv);
+}
+
+double pal_body_kinetic_J(const pal_body *body)
+{
+    double sum = 0;
+    if (body->mass_operator) return pal_mass_operator_kinetic_J(body->mass_operator, body->v);
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        const double *v = body->v + 3 * i;
+        sum += 0.5 * body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
+    return sum;
+}
+
+void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3])
+{
+    double sum[3] = {0, 0, 0};
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        for (int c = 0; c < 3; c++) sum[c] += body->mass_kg[i] * body->v[3 * i + c];
+    }
+    for (int c = 0; c < 3; c++) momentum_kg_m_s[c] = sum[c];
+}
+
+bool pal_body_finite(const pal_body *body)
+{
+    /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells; in lanes, as no addition then waits for another */
+    const int n = body->active ? 0 : 3 * body->n_dof;
+    double sum = 0, lane[8] = {0};
+    int j = 0;
+    for (int k = 0; k < body->n_active && body->active; k++) {
+        size_t i = 3 * (size_t)body->active[k];
+        for (size_t c = 0; c < 3; c++) sum += 0 * body->x[i + c] + 0 * body->v[i + c];
+    }
+    for (; j + 8 <= n; j += 8)
+        for (int l = 0; l < 8; l++) lane[l] += 0 * body->x[j + l] + 0 * body->v[j + l];
+    for (; j < n; j++) sum += 0 * body->x[j] + 0 * body->v[j];
+    for (int l = 0; l < 8; l++) sum += lane[l];
+    return sum == 0;
+}
+
+void pal_body_add_lag(pal_body *body)
+{
+    float part = (float)body->lag_part;
+    /* of a body that adapts the points in use are written anew each time, the others stay */
+    int n = !body->lag_m ? 0 : body->shell ? body->n_active : body->n_shown;
+    for (int k = 0; k < n; k++) {
+        size_t i = 3 * (size_t)(body->shell ? body->active[k] : k);
+        for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->lag_m[c];
+    }
+}

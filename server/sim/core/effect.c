@@ -1,0 +1,32 @@
+/* Running a body's FORCE rows. */
+#include "server/sim/core/effect.h"
+
+#include "server/base/clock.h"
+
+#include <string.h>
+
+pal_err pal_gather(pal_step *step)
+{
+    pal_body *body = step->body;
+    for (int k = 0; k < body->n_active && body->active; k++) {
+        size_t i = 3 * (size_t)body->active[k];
+        for (size_t c = 0; c < 3; c++) body->f[i + c] = body->load[i + c];
+    }
+    pal_body_place(body);
+    if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
+    uint64_t before = pal_clock_ns();
+    for (int i = 0; i < step->n_force; i++) {
+        pal_row *row = &step->force[i];
+        if (step->drag_apart && row->effect->drag) continue;
+        row->n_run++;
+        PAL_TRY(row->effect->run(row->self, step));
+        uint64_t now = pal_clock_ns();
+        row->spent_ns += now - before;
+        before = now;
+    }
+    if (body->embed) {
+        memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_point_rows_pull(body->embed, body->f, body->g);
+    }
+    return PAL_ERR_OK;
+}

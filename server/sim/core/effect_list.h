@@ -1,0 +1,56 @@
+/* The one table of effects, solvers and models. Adding one is its file in effects/, solvers/ or models/, which defines
+ * `const pal_effect pal_effect_NAME` (or `pal_model_NAME`), its line in CMakeLists.txt and its line here. Tests loop
+ * over these tables, so a new entry is covered by every test that holds for all. Thread: any (constants). */
+#ifndef PAL_SIM_EFFECT_LIST_H
+#define PAL_SIM_EFFECT_LIST_H
+#include "server/sim/core/effect.h"
+#include "server/sim/core/model.h"
+
+#define PAL_EFFECT_LIST(X)                                                                                             \
+    X(gravity)                                                                                                         \
+    X(viscous)                                                                                                         \
+    X(edge_distance)                                                                                                   \
+    X(face_area)                                                                                                       \
+    X(tet_volume)                                                                                                      \
+    X(tet_elastic)                                                                                                     \
+    X(hex_elastic)                                                                                                     \
+    X(cell_elastic)                                                                                                    \
+    X(moving_support)                                                                                                  \
+    X(penalty)                                                                                                         \
+    X(edge_spring)                                                                                                     \
+    X(shape_spring)                                                                                                    \
+    X(inflate)                                                                                                         \
+    X(verlet)                                                                                                          \
+    X(rk4)                                                                                                             \
+    X(central_cg)                                                                                                      \
+    X(implicit_euler)                                                                                                  \
+    X(sdirk2)                                                                                                          \
+    X(static_newton)                                                                                                   \
+    X(tool_push)                                                                                                       \
+    X(tool_grab)                                                                                                       \
+    X(refine)                                                                                                          \
+    X(finite_guard)                                                                                                    \
+    X(sleep)                                                                                                           \
+    X(surface_out)                                                                                                     \
+    X(skin_out)                                                                                                        \
+    X(field_out)
+
+#define PAL_MODEL_LIST(X) X(tet_springs) X(fem) X(adaptive_springs) X(subdivision_fem)
+
+#define X(name) extern const pal_effect pal_effect_##name;
+PAL_EFFECT_LIST(X)
+#undef X
+#define X(name) extern const pal_model pal_model_##name;
+PAL_MODEL_LIST(X)
+#undef X
+
+#define X(name) +1
+enum { PAL_EFFECT_COUNT = 0 PAL_EFFECT_LIST(X), PAL_MODEL_COUNT = 0 PAL_MODEL_LIST(X) };
+#undef X
+
+/* tables in the order above, and look-up by name; NULL: no such name */
+extern const pal_effect *const pal_effects[PAL_EFFECT_COUNT];
+extern const pal_model *const pal_models[PAL_MODEL_COUNT];
+const pal_effect *pal_effect_find(const char *name);
+const pal_model *pal_model_find(const char *name);
+#endif

@@ -1,0 +1,73 @@
+/* Tool bookkeeping between poses and CONTACT rows. */
+#include "server/sim/core/tools.h"
+
+#include <math.h>
+#include <string.h>
+
+/* a tool's forces rise and fall within this many steps, so that a client that comes or goes does not strike tissue */
+enum { RAMP_STEPS = 10 };
+
+bool pal_pose_ok(const pal_pose *pose, double limit_m)
+{
+    double far2 = 0, fast2 = 0, quat2 = 0;
+    for (int c = 0; c < 3; c++) {
+        if (!isfinite(pose->position_m[c]) || !isfinite(pose->velocity_m_s[c])) return false;
+        far2 += pose->position_m[c] * pose->position_m[c];
+        fast2 += pose->velocity_m_s[c] * pose->velocity_m_s[c];
+    }
+    for (int c = 0; c < 4; c++) quat2 += pose->quat[c] * pose->quat[c];
+    return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
+}
+
+void pal_tool_take(pal_tool *tool, const pal_pose *pose)
+{
+    if (pose) {
+        tool->next = *pose;
+        /* a tool that appears is where it is: its way there touches nothing, and its forces begin at zero */
+        if (!tool->present) {
+            tool->ramp = 0;
+            tool->last = *pose;
+            memcpy(tool->here_m, pose->position_m, sizeof tool->here_m);
+        }
+        tool->ramp += 1.0 / RAMP_STEPS;
+        if (tool->ramp > 1) tool->ramp = 1;
+    } else {
+        /* a tool that was let go stays where it is while its forces fade */
+        tool->next = tool->last;
+        tool->ramp -= 1.0 / RAMP_STEPS;
+        if (tool->ramp < 1e-9) tool->ramp = 0;
+    }
+    tool->present = pose != NULL;
+    tool->grab = tool->present && (tool->next.buttons & 1);
+    tool->gripping = tool->holding;
+    tool->touching = tool->holding = false;
+    tool->n_patch = 0;
+    tool->has_grip = false;
+    for (int c = 0; c < 3; c++) tool->force_N[c] = tool->mean_force_N[c] = 0;
+}
+
+void pal_tools_advance(pal_tools *tools, int sub, int n_sub, double dt_s)
+{
+    for (int t = 0; t < tools->n_tool; t++) {
+        pal_tool *tool = &tools->tool[t];
+        for (int c = 0; c < 3; c++) {
+            /* the rest of the way in equal parts; the last part ends on the pose exactly */
+            double from = tool->here_m[c], to = tool->next.position_m[c];
+            double here = sub >= n_sub - 1 ? to : from + (to - from) / (n_sub - sub);
+            tool->velocity_m_s[c] = (here - from) / dt_s;
+            tool->here_m[c] = here;
+            tool->mean_force_N[c] += tool->force_N[c];
+            tool->force_N[c] = 0;
+        }
+    }
+}
+
+void pal_tools_finish(pal_tools *tools, int n_sub)
+{
+    for (int t = 0; t < tools->n_tool; t++) {
+        pal_tool *tool = &tools->tool[t];
+        for (int c = 0; c < 3; c++)
+            tool->mean_force_N[c] = (tool->mean_force_N[c] + tool->force_N[c]) / (n_sub > 0 ? n_sub : 1);
+        tool->last = tool->next;
+    }
+}

@@ -1,0 +1,143 @@
+/* What is shown of voxel hexahedra: von Mises stress, energy density, strain and distortion at the Gauss point nearest
+ * to each corner, which stands for an eighth of the cube. And the stress there, for estimates. */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/num/shape.h"
+#include "server/sim/elements/elastic_hex.h"
+
+#include <string.h>
+
+/* one cube: its constants and the gradients at its points; out: stress at its points (corotational, linear: of the
+ * small strain in the frame of the cube; neo-Hookean: Kirchhoff) and energy density */
+typedef struct cube {
+    bool bbar;
+    double volume_m3;  /* by its share */
+    double mu, lambda; /* Pa */
+    double f[8][9], r[9];
+    double stress[8][9], density[8];
+} cube;
+
+/* stress (symmetric) and energy density of the small strain in the frame of the cube */
+static double small_strain(const cube *q, double mean, const double e[9], double stress[9])
+{
+    double trace = e[0] + e[4] + e[8], square = 0;
+    /* B-bar: the deviator of the point, the dilatation of the cube */
+    double kappa = q->lambda + 2 * q->mu / 3, volume = q->bbar ? mean : trace;
+    for (int i = 0; i < 9; i++) {
+        double deviator = e[i] - (i % 4 == 0 ? trace / 3 : 0);
+        square += deviator * deviator;
+        stress[i] = 2 * q->mu * deviator + (i % 4 == 0 ? kappa * volume : 0);
+    }
+    return q->mu * square + 0.5 * kappa * volume * volume;
+}
+
+static void corot_points(cube *q)
+{
+    double e[8][9], mean = 0;
+    for (int p = 0; p < 8; p++) {
+        double m[9];
+        for (int i = 0; i < 9; i++)
+            m[i] = q->r[i / 3] * q->f[p][i % 3] + q->r[3 + i / 3] * q->f[p][3 + i % 3] +
+                   q->r[6 + i / 3] * q->f[p][6 + i % 3];
+        for (int i = 0; i < 9; i++) e[p][i] = 0.5 * (m[i] + m[3 * (i % 3) + i / 3]) - (i % 4 == 0);
+        mean += (e[p][0] + e[p][4] + e[p][8]) / 8;
+    }
+    for (int p = 0; p < 8; p++) q->density[p] = small_strain(q, mean, e[p], q->stress[p]);
+}
+
+static void neo_points(cube *q)
+{
+    double mean = 0, kappa = q->bbar ? q->lambda + 2 * q->mu / 3 : 0, k1 = q->bbar ? q->mu / 3 : q->lambda + q->mu;
+    for (int p = 0; p < 8; p++) mean += pal_det3(q->f[p]) / 8;
+    for (int p = 0; p < 8; p++) {
+        double stress[9];
+        pal_neo_stress(q->mu, k1, kappa * (mean - 1), q->f[p], stress);
+        for (int i = 0; i < 9; i++) q->stress[p][i] = pal_dot3(stress + 3 * (i / 3), q->f[p] + 3 * (i % 3));
+        q->density[p] = pal_neo_energy(q->mu, k1, q->f[p]) + 0.5 * kappa * (mean - 1) * (mean - 1);
+    }
+}
+
+static void take_cube(const pal_hex_row *row, const pal_body *body, int e, const double grad[8][8][3], cube *at)
+{
+    const double h = row->h_m;
+    const int32_t *node = row->hexes->node + 8 * e;
+    int lane = row->strips.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
+    double share = row->share[lane], centre[9] = {0}, q[4];
+    *at = (cube){.bbar = row->element == PAL_HEX_BBAR,
+                 .volume_m3 = share * h * h * h,
+                 .mu = row->mu[lane] * 16 / (h * share),
+                 .lambda = row->lambda[lane] * 16 / (h * share)};
+    for (int p = 0; p < 8; p++)
+        for (int i = 0; i < 9; i++) {
+            for (int c = 0; c < 8; c++) at->f[p][i] += 2 / h * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
+            centre[i] += at->f[p][i] / 8;
+        }
+    for (int i = 0; i < 4; i++) q[i] = row->law == PAL_LAW_LINEAR ? i == 0 : row->q[(4 * block + i) * PAL_LANES + l];
+    if (row->law == PAL_LAW_COROTATIONAL) pal_polar_turn(centre, q, 50);
+    pal_quat_matrix(q, at->r);
+    if (row->law == PAL_LAW_NEO_HOOKEAN)
+        neo_points(at);
+    else
+        corot_points(at);
+}
+
+static double von_mises(const pal_hex_row *row, const cube *at, int p)
+{
+    if (row->law != PAL_LAW_NEO_HOOKEAN) return pal_von_mises(at->stress[p]);
+    double det = fmax(fabs(pal_det3(at->f[p])), 1e-3), cauchy[9];
+    for (int i = 0; i < 9; i++) cauchy[i] = at->stress[p][i] / det;
+    return pal_von_mises(cauchy);
+}
+
+void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    double grad[8][8][3];
+    if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
+    for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
+    for (int e = 0; e < row->n_hex; e++) {
+        const int32_t *node = row->hexes->node + 8 * e;
+        cube at;
+        take_cube(row, body, e, (const double(*)[8][3])grad, &at);
+        double volume = at.volume_m3 / 8;
+        for (int c = 0; c < 8; c++) {
+            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA  ? von_mises(row, &at, c)
+                                      : field == PAL_FIELD_ENERGY_J_M3 ? at.density[c]
+                                      : field == PAL_FIELD_STRAIN      ? pal_largest_strain(at.f[c])
+                                                                       : pal_det3(at.f[c]) - 1);
+            volume_m3[node[c]] += volume;
+        }
+    }
+}
+
+/* R s R' */
+static void turn_stress(const double r[9], const double s[9], double out[9])
+{
+    double half[9];
+    for (int i = 0; i < 9; i++)
+        half[i] = r[3 * (i / 3)] * s[i % 3] + r[3 * (i / 3) + 1] * s[3 + i % 3] + r[3 * (i / 3) + 2] * s[6 + i % 3];
+    for (int i = 0; i < 9; i++) out[i] = pal_dot3(half + 3 * (i / 3), r + 3 * (i % 3));
+}
+
+void pal_hex_stress(pal_hex_row *row, const pal_body *body, pal_stress_take *take, void *user)
+{
+    double grad[8][8][3], shape[8][8];
+    for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], shape[p], grad[p]);
+    for (int e = 0; e < row->n_hex; e++) {
+        cube at;
+        take_cube(row, body, e, (const double(*)[8][3])grad, &at);
+        pal_stress_point to = {.element = e,
+                               .n_corner = 8,
+                               .node = row->hexes->node + 8 * e,
+                               .volume_m3 = at.volume_m3 / 8,
+                               .mu_Pa = at.mu,
+                               .lambda_Pa = at.lambda};
+        for (int p = 0; p < 8; p++) {
+            to.shape = shape[p];
+            if (row->law == PAL_LAW_NEO_HOOKEAN)
+                memcpy(to.stress, at.stress[p], sizeof to.stress);
+            else
+                turn_stress(at.r, at.stress[p], to.stress);
+            take(user, &to);
+        }
+    }
+}

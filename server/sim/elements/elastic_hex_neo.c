@@ -1,0 +1,405 @@
+/* Neo-Hookean voxel hexahedra at 2x2x2 Gauss points, in the stable form of Smith, de Goes, Kim 2018 (elastic_law.h).
+ *
+ * hex8: W(F) with k1 = lambda + mu at each point. hex8_bbar: the volume part works on the mean dilatation,
+ *     V (<mu/2 (F:F - 3) - mu (J - 1) + (mu/3)/2 (J - 1)^2> + kappa/2 (Jm - 1)^2),  Jm = <J>,  kappa = lambda + 2 mu/3,
+ * Jm the cube's volume now over that at rest (2x2x2 points integrate it exactly); its linearisation is the B-bar
+ * element of linear elasticity. The tangent is the sum of the points' Hessians, each projected to positive
+ * semi-definite with the mean's pressure kappa (Jm - 1) in it, and of the mean's own rank one kappa V grad Jm grad Jm'.
+ *
+ * Everything is kept in modes (elastic_hex_lanes.h): F_ij at xi = sum over modes m with j of a_im xi^(m without j), a =
+ * U / (4 h), so that sums over the points are Walsh transforms over their signs, and K of a cube is made from the
+ * transform of the points' Hessians: K_(i,m)(k,n) = V sum_{j in m, l in n} H_ij,kl^ (m without j XOR n without l)
+ * g^(|m| + |n| - 2) with g = 1/sqrt 3, where an axis in both exponents gives 1. 21 unknowns (translations are left
+ * out), 231 numbers. */
+#include "server/sim/elements/elastic_hex_lanes.h"
+
+static const double gauss = 0.57735026918962576451;
+
+/* mu, k1 and kappa of the mean dilatation, times share and h / 16 */
+PAL_WIDE_INLINE void load_neo(const pal_hex_row *row, int block, int l, pal_wide *mu, pal_wide *k1, pal_wide *kappa)
+{
+    pal_wide lambda = wide_load(row->lambda + PAL_LANES * block + l);
+    *mu = wide_load(row->mu + PAL_LANES * block + l);
+    if (row->element == PAL_HEX_BBAR)
+        *k1 = *mu * (1.0 / 3), *kappa = lambda + *mu * (2.0 / 3);
+    else
+        *k1 = lambda + *mu, *kappa = wide_of(0);
+}
+
+/* F at the Gauss points from the modes; point p at the signs of its bits */
+PAL_WIDE_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3;
+            pal_wide c0 = scale * u[i][self], ca = (gauss * scale) * u[i][self | a];
+            pal_wide cb = (gauss * scale) * u[i][self | b], cab = (gauss * gauss * scale) * u[i][7];
+            pal_wide low = c0 - ca, high = c0 + ca, low_b = cb - cab, high_b = cb + cab;
+            f[0][3 * i + j] = f[self][3 * i + j] = low - low_b;
+            f[a][3 * i + j] = f[a | self][3 * i + j] = high - high_b;
+            f[b][3 * i + j] = f[b | self][3 * i + j] = low + low_b;
+            f[a | b][3 * i + j] = f[7][3 * i + j] = high + high_b;
+        }
+}
+
+/* the transposed: sums over the points of p_ij times the modes' gradients, modes 1..7 */
+PAL_WIDE_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
+{
+    for (int i = 0; i < 3; i++) {
+        for (int m = 0; m < 8; m++) u[i][m] = wide_of(0);
+        for (int j = 0; j < 3; j++) {
+            const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3, ij = 3 * i + j;
+            pal_wide s0 = p[0][ij] + p[self][ij], sa = p[a][ij] + p[a | self][ij];
+            pal_wide sb = p[b][ij] + p[b | self][ij], sab = p[a | b][ij] + p[7][ij];
+            pal_wide low = s0 + sa, high = sb + sab, low_a = sa - s0, high_a = sab - sb;
+            u[i][self] += scale * (low + high);
+            u[i][self | a] += (gauss * scale) * (low_a + high_a);
+            u[i][self | b] += (gauss * scale) * (high - low);
+            u[i][7] += (gauss * gauss * scale) * (high_a - low_a);
+        }
+    }
+}
+
+/* cofactors c = dJ/dF; returns J */
+PAL_WIDE_INLINE pal_wide cofactors(const pal_wide f[9], pal_wide c[9])
+{
+    c[0] = f[4] * f[8] - f[5] * f[7], c[1] = f[5] * f[6] - f[3] * f[8], c[2] = f[3] * f[7] - f[4] * f[6];
+    c[3] = f[2] * f[7] - f[1] * f[8], c[4] = f[0] * f[8] - f[2] * f[6], c[5] = f[1] * f[6] - f[0] * f[7];
+    c[6] = f[1] * f[5] - f[2] * f[4], c[7] = f[2] * f[3] - f[0] * f[5], c[8] = f[0] * f[4] - f[1] * f[3];
+    return f[0] * c[0] + f[1] * c[1] + f[2] * c[2];
+}
+
+/* volume now over that at rest, - 1 */
+PAL_WIDE_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
+{
+    pal_wide sum = wide_of(-8), c[9];
+    for (int p = 0; p < 8; p++) sum += cofactors(f[p], c);
+    return 0.125 * sum;
+}
+
+enum { FORCE = 1, ENERGY = 2 };
+
+/* forces are added, the energy is returned */
+PAL_WIDE_INLINE double all_blocks(const pal_hex_row *row, pal_slots *slots, int what)
+{
+    pal_wide sum = {0};
+    for (int b = 0; b < row->n_block; b++) {
+        hex_view v;
+        hex_open(row, slots, b, &v);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa, e = {0};
+            load_neo(row, b, l, &mu, &k1, &kappa);
+            hex_modes(&v, l, u);
+            gauss_gradients(1 / (4 * row->h_m), u, f);
+            pal_wide mean = mean_dilatation(f), pressure = kappa * mean - mu - k1;
+            for (int p = 0; p < 8; p++) {
+                pal_wide det = cofactors(f[p], c), j1 = det - 1, square = wide_of(-3), t = det * k1 + pressure;
+                for (int i = 0; i < 9 && (what & ENERGY); i++) square += f[p][i] * f[p][i];
+                if (what & ENERGY) e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
+                for (int i = 0; i < 9 && (what & FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
+            }
+            e = 0.125 * e + 0.5 * kappa * mean * mean;
+            if (what & ENERGY) sum += wide_pick(mu > 0, e, wide_of(0));
+            if (!(what & FORCE)) continue;
+            gauss_sums(-0.5 * row->h_m, f, u);
+            hex_add(&v, l, u);
+        }
+        if (what & FORCE) hex_close(row, slots, b, &v);
+    }
+    double all = 0;
+    for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
+    return 16 * row->h_m * row->h_m * all;
+}
+
+void pal_hex_neo_force(pal_hex_row *row, pal_slots *slots)
+{
+    all_blocks(row, slots, FORCE);
+}
+
+double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots, bool forces)
+{
+    return forces ? all_blocks(row, slots, FORCE | ENERGY) : all_blocks(row, slots, ENERGY);
+}
+
+/* place of (r, s), r >= s, in the packed K; unknown 7 axis + mode - 1 */
+PAL_WIDE_INLINE int packed(int r, int s)
+{
+    return r * (r + 1) / 2 + s;
+}
+
+/* K in modes from the transforms of the points' Hessians h [45][8] (packed over entries of F) and the mean's gradient
+ */
+PAL_WIDE_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal_wide mean[3][8])
+{
+    static const double power[5] = {0.125, 0.125 * 0.57735026918962576451, 0.125 / 3,
+                                    0.125 / 3 * 0.57735026918962576451, 0.125 / 9};
+    /* the axes of each mode */
+    static const int size_of[8] = {0, 1, 1, 2, 1, 2, 2, 3};
+    static const int axis_of[8][3] = {{0}, {0}, {1}, {0, 1}, {2}, {0, 2}, {1, 2}, {0, 1, 2}};
+    for (int r = 0; r < 21; r++) {
+        const int i = r / 7, m = r % 7 + 1;
+        const pal_wide own = kappa * mean[i][m];
+        for (int s = 0; s <= r; s++) {
+            const int k = s / 7, n = s % 7 + 1;
+            pal_wide sum = wide_of(0);
+            for (int a = 0; a < size_of[m]; a++)
+                for (int b = 0; b < size_of[n]; b++) {
+                    const int j = axis_of[m][a], q = axis_of[n][b], x = 3 * i + j, y = 3 * k + q;
+                    sum += h[x >= y ? packed(x, y) : packed(y, x)][m ^ 1 << j ^ n ^ 1 << q];
+                }
+            wide_store(to + packed(r, s) * PAL_LANES, power[size_of[m] + size_of[n] - 2] * sum + own * mean[k][n]);
+        }
+    }
+}
+
+/* one Jacobi rotation of the symmetric a (xx yy zz yz xz xy) in the plane p, q; columns of v turn along */
+PAL_WIDE_INLINE void jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
+{
+    const int o = 3 - p - q;
+    pal_wide *app = a + p, *aqq = a + q, *apq = a + 3 + o, *apo = a + 3 + q, *aqo = a + 3 + p;
+    pal_wide d = *aqq - *app, twice = 2 * *apq, sum = d * d + twice * twice;
+    pal_wide_mask turned = sum > 1e-280, down = d < 0;
+    pal_wide root = wide_root(sum) + wide_pick(down, -d, d);
+    pal_wide t = wide_pick(down, -twice, twice) / wide_pick(turned, root, wide_of(1));
+    pal_wide c = 1 / wide_root(1 + t * t), s = t * c;
+    *app -= t * *apq, *aqq += t * *apq, *apq = wide_of(0);
+    pal_wide x = *apo, y = *aqo;
+    *apo = c * x - s * y, *aqo = s * x + c * y;
+    for (int i = 0; i < 3; i++) {
+        pal_wide b = v[3 * i + p], e = v[3 * i + q];
+        v[3 * i + p] = c * b - s * e, v[3 * i + q] = s * b + c * e;
+    }
+}
+
+/* eigenvalues a[0..2] and eigenvectors, columns of v, of a symmetric matrix (xx yy zz yz xz xy) */
+PAL_WIDE_INLINE void jacobi(pal_wide a[6], pal_wide v[9])
+{
+    for (int i = 0; i < 9; i++) v[i] = wide_of(i % 4 == 0);
+    for (int sweep = 0; sweep < 6; sweep++) {
+        pal_wide off = a[3] * a[3] + a[4] * a[4] + a[5] * a[5], on = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+        if (!wide_any(off > 1e-18 * on)) break;
+        jacobi_turn(a, v, 0, 1), jacobi_turn(a, v, 0, 2), jacobi_turn(a, v, 1, 2);
+    }
+}
+
+/* h += weight e e', packed */
+PAL_WIDE_INLINE void add_mode(pal_wide h[45], pal_wide weight, const pal_wide e[9])
+{
+    for (int i = 0; i < 9; i++) {
+        pal_wide t = weight * e[i];
+        for (int j = 0; j <= i; j++) h[packed(i, j)] += t * e[j];
+    }
+}
+
+/* mu I + c d2J/dF2 + k1 g g', packed; g = dJ/dF. d2J/dF_ij dF_kl = +- F_mn for the rows i k m and the columns j l n in
+ * cyclic order or not */
+PAL_WIDE_INLINE void plain_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
+                                   pal_wide h[45])
+{
+    for (int x = 0; x < 9; x++) {
+        pal_wide t = k1 * g[x];
+        for (int y = 0; y <= x; y++) h[packed(x, y)] = t * g[y];
+        h[packed(x, x)] += mu;
+    }
+    for (int m = 0; m < 3; m++)
+        for (int n = 0; n < 3; n++) {
+            const int i = m == 2 ? 1 : 2, k = m == 0 ? 1 : 0, j = (n + 1) % 3, l = (n + 2) % 3;
+            /* rows i > k: i k m is cyclic for m = 1 only */
+            pal_wide t = c * f[3 * m + n];
+            if (m != 1) t = -t;
+            h[packed(3 * i + j, 3 * k + l)] += t;
+            h[packed(3 * i + l, 3 * k + j)] -= t;
+        }
+}
+
+/* what the negative eigenvalues of the 3x3 matrix on the stretches are raised by; s: singular values */
+static void raise_stretches(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide s[3], const pal_wide u[9],
+                            const pal_wide v[9], pal_wide h[45])
+{
+    pal_wide g[3] = {s[1] * s[2], s[0] * s[2], s[0] * s[1]}, a[6], n[9], e[9];
+    for (int i = 0; i < 3; i++) {
+        a[i] = mu + k1 * g[i] * g[i];
+        a[3 + i] = c * s[i] + k1 * g[(i + 1) % 3] * g[(i + 2) % 3];
+    }
+    pal_wide least = 1e-13 * (a[0] + a[1] + a[2]), x = a[0] + least, y = a[1] + least, z = a[2] + least;
+    pal_wide minor = x * y - a[5] * a[5];
+    pal_wide det = z * minor - x * a[3] * a[3] - y * a[4] * a[4] + 2 * a[3] * a[4] * a[5];
+    if (!wide_any(~((minor > 0) & (det > 0)))) return;
+    jacobi(a, n);
+    for (int k = 0; k < 3; k++) {
+        if (!wide_any(a[k] < 0)) continue;
+        for (int i = 0; i < 9; i++) {
+            e[i] = wide_of(0);
+            for (int m = 0; m < 3; m++) e[i] += n[3 * m + k] * u[3 * (i / 3) + m] * v[3 * (i % 3) + m];
+        }
+        add_mode(h, wide_pick(a[k] < 0, -a[k], wide_of(0)), e);
+    }
+}
+
+/* the Hessian of one point, projected to positive semi-definite as pal_neo_modes_take does it: F = R S, S = v diag(s)
+ * v', u = R v; the eigenvalues are those of the stretches and mu + c s_k (twist), mu - c s_k (flip) of the pairs. r:
+ * in, a rotation that makes R'F symmetric */
+PAL_WIDE_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
+                                   const pal_wide r[9], pal_wide h[45])
+{
+    static const int row_of[6] = {0, 1, 2, 1, 0, 0}, column_of[6] = {0, 1, 2, 2, 2, 1};
+    pal_wide a[6], v[9], u[9], e[9];
+    plain_hessian(mu, c, k1, f, g, h);
+    for (int n = 0; n < 6; n++) {
+        const int i = row_of[n], j = column_of[n];
+        a[n] = r[i] * f[j] + r[3 + i] * f[3 + j] + r[6 + i] * f[6 + j];
+    }
+    jacobi(a, v);
+    for (int i = 0; i < 9; i++) {
+        const int row = 3 * (i / 3), k = i % 3;
+        u[i] = r[row] * v[k] + r[row + 1] * v[3 + k] + r[row + 2] * v[6 + k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        pal_wide twist = mu + c * a[k], flip = mu - c * a[k];
+        for (int sign = -1; sign <= 1; sign += 2) {
+            pal_wide value = sign < 0 ? twist : flip;
+            if (!wide_any(value < 0)) continue;
+            for (int n = 0; n < 9; n++)
+                e[n] = u[n / 3 * 3 + i] * v[n % 3 * 3 + j] + sign * u[n / 3 * 3 + j] * v[n % 3 * 3 + i];
+            add_mode(h, wide_pick(value < 0, -0.5 * value, wide_of(0)), e);
+        }
+    }
+    raise_stretches(mu, c, k1, a, u, v, h);
+}
+
+/* projected Hessians of all points into h [45][point], the mean's gradient into mean; returns how many rotations took
+ * the slow way */
+static int all_hessians(const pal_hex_row *row, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
+                        pal_wide h[45][8], pal_wide mean[3][8])
+{
+    pal_wide mu, k1, kappa, g[8][9], q[4], r[9], one[45];
+    int n_slow = 0;
+    load_neo(row, block, l, &mu, &k1, &kappa);
+    pal_wide pressure = kappa * mean_dilatation(f) - mu - k1;
+    for (int p = 0; p < 8; p++) {
+        pal_wide c = cofactors(f[p], g[p]) * k1 + pressure;
+        memcpy(q, q0, sizeof q);
+        n_slow += hex_turn(f[p], mu > 0, q, r);
+        point_hessian(mu, c, k1, f[p], g[p], r, one);
+        for (int i = 0; i < 45; i++) h[i][p] = one[i];
+    }
+    gauss_sums(0.125, g, mean);
+    return n_slow;
+}
+
+void pal_hex_neo_linearise(pal_hex_row *row, pal_slots *slots)
+{
+    row->n_slow = 0;
+    for (int b = 0; b < row->n_block && row->tangent; b++) {
+        hex_view v;
+        hex_open(row, slots, b, &v);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            pal_wide u[3][8], f[8][9], r[9], q[4], mu, k1, kappa, h[45][8];
+            hex_modes(&v, l, u);
+            row->n_slow += hex_turn_block(row, b, l, u, r);
+            for (int i = 0; i < 9; i++) wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
+            for (int i = 0; i < 4; i++) q[i] = wide_load(row->q + (4 * b + i) * PAL_LANES + l);
+            gauss_gradients(1 / (4 * row->h_m), u, f);
+            load_neo(row, b, l, &mu, &k1, &kappa);
+            /* lanes without element read anything */
+            for (int i = 0; i < 72; i++) f[i / 9][i % 9] = wide_pick(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
+            row->n_slow += all_hessians(row, b, l, q, f, h, u);
+            for (int i = 0; i < 45; i++) walsh(h[i]);
+            store_tangent(row->tangent + 231 * PAL_LANES * b + l, h, kappa, u);
+        }
+    }
+}
+
+void pal_hex_neo_multiply(const pal_hex_row *row, pal_slots *slots, double k)
+{
+    for (int b = 0; b < row->n_block && row->tangent; b++) {
+        hex_view v;
+        hex_open(row, slots, b, &v);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const double *a = row->tangent + 231 * PAL_LANES * b + l;
+            pal_wide u[3][8], x[21], y[21];
+            hex_modes(&v, l, u);
+            for (int r = 0; r < 21; r++) x[r] = k * u[r / 7][r % 7 + 1];
+            for (int r = 0; r < 21; r++) {
+                pal_wide sum = wide_load(a + packed(r, r) * PAL_LANES) * x[r];
+                for (int s = 0; s < r; s++) {
+                    pal_wide k_rs = wide_load(a + packed(r, s) * PAL_LANES);
+                    sum += k_rs * x[s];
+                    y[s] += k_rs * x[r];
+                }
+                y[r] = sum;
+            }
+            for (int r = 0; r < 21; r++) u[r / 7][r % 7 + 1] = y[r];
+            hex_add(&v, l, u);
+        }
+        hex_close(row, slots, b, &v);
+    }
+}
+
+void pal_hex_neo_blocks(const pal_hex_row *row, int block, double k, double *to)
+{
+    for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+        const double *a = row->tangent + 231 * PAL_LANES * block + l;
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j <= i; j++) {
+                pal_wide t[8][8], column[8];
+                for (int m = 1; m < 8; m++) {
+                    for (int n = 1; n < 8; n++) {
+                        int r = 7 * i + m - 1, s = 7 * j + n - 1;
+                        t[m][n] = k * wide_load(a + (r >= s ? packed(r, s) : packed(s, r)) * PAL_LANES);
+                    }
+                    unwalsh(t[m]);
+                }
+                for (int d = 0; d < 8; d++) {
+                    for (int m = 1; m < 8; m++) column[m] = t[m][d];
+                    unwalsh(column);
+                    for (int c = 0; c < 8; c++) {
+                        /* K_cd(i, j) here, and K_dc(j, i) is the same number */
+                        int pair = c <= d ? pal_hex_pair(c, d) : pal_hex_pair(d, c);
+                        if (c <= d) wide_store(to + (9 * pair + 3 * i + j) * PAL_LANES + l, column[c]);
+                        if (c >= d) wide_store(to + (9 * pair + 3 * j + i) * PAL_LANES + l, column[c]);
+                    }
+                }
+            }
+    }
+}
+
+/* The largest eigenvalue of a cube's K is at most that of V/8 sum B'B, h / 2, times the largest |H| of its points, and
+ * what the mean's rank one adds, kappa V |grad Jm|^2. |H| <= mu + 2/sqrt 3 |c| |F| + k1 |dJ/dF|^2, c the factor of
+ * d2J/dF2 */
+static double largest_eigenvalue(const pal_hex_row *row, int lane, double f[8][9], double grad[8][8][3])
+{
+    const double mu = row->mu[lane], lambda = row->lambda[lane];
+    const bool bbar = row->element == PAL_HEX_BBAR;
+    const double k1 = bbar ? mu / 3 : lambda + mu, kappa = bbar ? lambda + 2 * mu / 3 : 0;
+    double cof[8][9], mean[24] = {0}, dilatation = -1, most = 0, square = 0;
+    for (int p = 0; p < 8; p++) {
+        pal_cofactor3(f[p], cof[p]);
+        dilatation += pal_det3(f[p]) / 8;
+        for (int i = 0; i < 72; i++) mean[i / 3] += cof[p][i / 3 % 3 * 3 + i % 3] * grad[p][i / 9][i % 3] / 8;
+    }
+    for (int i = 0; i < 24; i++) square += mean[i] * mean[i];
+    for (int p = 0; p < 8; p++) {
+        double f2 = 0, c2 = 0, c = -mu + k1 * (pal_det3(f[p]) - 1) + kappa * dilatation;
+        for (int i = 0; i < 9; i++) f2 += f[p][i] * f[p][i], c2 += cof[p][i] * cof[p][i];
+        most = fmax(most, mu + 2 / sqrt(3) * fabs(c) * sqrt(f2) + k1 * c2);
+    }
+    /* the constants have h / 16, gradients here lack 2 / h */
+    return 8 * most + 64 * kappa * square;
+}
+
+void pal_hex_neo_bound(pal_hex_row *row, const pal_body *body, double *bound_N_m)
+{
+    double grad[8][8][3];
+    for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
+    for (int e = 0; e < row->n_hex; e++) {
+        const int32_t *node = row->hexes->node + 8 * e;
+        double f[8][9] = {{0}};
+        for (int p = 0; p < 8; p++)
+            for (int c = 0; c < 8; c++)
+                for (int i = 0; i < 9; i++) f[p][i] += 2 / row->h_m * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
+        double most = largest_eigenvalue(row, row->strips.place[e], f, grad);
+        for (int c = 0; c < 8; c++) bound_N_m[node[c]] += most;
+    }
+}

@@ -1,0 +1,66 @@
+/* Elastic laws, point by point: what the rows tet_elastic and hex_elastic compute at a Gauss point. 3x3 matrices are
+ * row-major, F[3 r + c] = dx_r / dX_c; a 9x9 matrix H[9 i + j] has i, j running over the entries of F.
+ *
+ * Neo-Hookean: the stable form of Smith, de Goes, Kim 2018 without their term at the origin,
+ *     W(F) = mu/2 (F:F - 3) - mu (J - 1) + k1/2 (J - 1)^2,  J = det F,
+ * whose linearisation has the Lame constants mu and lambda = k1 - mu. A mean dilatation term of the caller (hex B-bar)
+ * comes in as a pressure: P += pressure dJ/dF, H += pressure d2J/dF2. Thread: any. */
+#ifndef PAL_SIM_ELASTIC_LAW_H
+#define PAL_SIM_ELASTIC_LAW_H
+#include "server/sim/core/effect.h"
+
+/* what rows of elements measure */
+enum {
+    PAL_ELASTIC_FIELDS =
+        1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN | 1 << PAL_FIELD_DISTORTION
+};
+
+typedef enum pal_elastic_law { PAL_LAW_COROTATIONAL, PAL_LAW_LINEAR, PAL_LAW_NEO_HOOKEAN } pal_elastic_law;
+
+/* key "law": corotational (default), linear or neo_hookean; REFUSED names another. [load] */
+pal_err pal_elastic_law_read(pal_item *item, pal_elastic_law *out, pal_note *note);
+void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa);
+
+/* dJ/dF: det F F^-T, for singular F too */
+void pal_cofactor3(const double f[9], double c[9]);
+/* p = mu (A + A') + lambda tr A I with A = a; stress of a displacement gradient, small strain */
+void pal_linear_stress(double mu, double lambda, const double a[9], double p[9]);
+/* P of the corotational law with rotation r (polar part of F): r (2 mu e + lambda tr e I), e = sym(r'F) - I; returns
+ * the energy mu e:e + lambda/2 (tr e)^2 */
+double pal_corotational_stress(double mu, double lambda, const double f[9], const double r[9], double p[9]);
+/* largest principal stretch of F less 1, whatever way F is turned */
+double pal_largest_strain(const double f[9]);
+/* sqrt(3/2) of the length of the deviator of a symmetric stress */
+double pal_von_mises(const double stress[9]);
+
+double pal_neo_energy(double mu, double k1, const double f[9]); /* J/m^3 */
+void pal_neo_stress(double mu, double k1, double pressure, const double f[9], double p[9]);
+/* d2W/dF2 as it is, which may be indefinite */
+void pal_neo_hessian(double mu, double k1, double pressure, const double f[9], double h[81]);
+
+/* The same projected to positive semi-definite in closed form: F = u diag(s) v'; in the frame of u and v the Hessian
+ * is a 3x3 matrix on the diagonal (stretches) and a 2x2 on each pair (twist and flip), whose eigenvalues are raised to
+ * 0 at least. */
+typedef struct pal_neo_modes {
+    double u[9], v[9]; /* rotations                                                  */
+    double stretch[6]; /* xx yy zz yz zx xy, projected                               */
+    double same[3];    /* pair (i, j) without k: dP_ij = same[k] dF_ij + cross[k] dF_ji */
+    double cross[3];
+    bool projected; /* an eigenvalue was negative                                 */
+} pal_neo_modes;
+void pal_neo_modes_take(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out);
+void pal_neo_modes_apply(const pal_neo_modes *m, const double df[9], double dp[9]);
+void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81]);
+
+/* E and nu of each element where the body's regions give them (NaN: the body's own), so that a live edit of the body's
+ * material keeps them */
+typedef struct pal_elastic_parts {
+    double *young_Pa, *poisson; /* NULL: no regions [n_element] */
+} pal_elastic_parts;
+/* regions are asked at the mean of each element's first `n_mean` corners; arena memory. [load] */
+pal_err pal_elastic_parts_make(const pal_build *build, const int32_t *element, int n_element, int n_corner, int n_mean,
+                               pal_elastic_parts *out);
+/* Lame constants of element e in a body of this material; Poisson above 0.4999 is taken as 0.4999 */
+void pal_elastic_parts_lame(const pal_elastic_parts *parts, const pal_material *material, int e, double *mu_Pa,
+                            double *lambda_Pa);
+#endif

@@ -1,0 +1,384 @@
+/* Elastic tetrahedra: constants at rest, matrices element by element, measures. The kernels are in
+ * elastic_tet_kernel.c. */
+#include "server/sim/elements/elastic_tet.h"
+
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/num/shape.h"
+
+#include <string.h>
+
+static const double least_volume_h3 = 1e-6;
+
+static double *lane_at(double *array, int width, int place, int k)
+{
+    return &array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
+                  (size_t)(place % PAL_LANES)];
+}
+
+static int entries(int n_corner)
+{
+    return n_corner * (n_corner + 1) / 2;
+}
+
+static void make_shape(pal_elastic_tets *t)
+{
+    for (int g = 0; g < 5; g++) {
+        if (t->wish.n_corner == 4) {
+            for (int c = 0; c < 3; c++) t->shape[g][c + 1][c] = 1, t->shape[g][0][c] = -1;
+            continue;
+        }
+        static const double centre[4] = {0.25, 0.25, 0.25, 0.25};
+        pal_tet10_shape(g == PAL_TET_CENTRE ? centre : pal_tet_gauss[g], NULL, t->shape[g]);
+    }
+}
+
+/* lanes: tet4 in strips, tet10 as they come */
+static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
+{
+    int n_tet = t->wish.n_tet, n_corner = t->wish.n_corner;
+    size_t n_index = (size_t)n_tet * (size_t)n_corner;
+    t->corner = PAL_NEW(build->arena, int32_t, n_index);
+    if (!t->corner) return PAL_ERR_MEMORY;
+    memcpy(t->corner, t->wish.tet, n_index * sizeof *t->corner);
+    if (n_corner == 4) {
+        pal_body *body = build->body;
+        if (!body->slots) PAL_TRY(pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots));
+        t->slots = body->slots;
+        PAL_TRY(pal_strips_make(t->slots, t->corner, n_tet, 4, build->arena, &t->strips));
+        t->place = t->strips.place;
+        t->n_block = t->strips.n_strip + t->strips.n_loose;
+    } else {
+        t->place = PAL_NEW(build->arena, int32_t, n_tet);
+        if (!t->place) return PAL_ERR_MEMORY;
+        for (int e = 0; e < n_tet; e++) t->place[e] = e;
+        t->n_block = (n_tet + PAL_LANES - 1) / PAL_LANES;
+    }
+    t->owner = PAL_NEW(build->arena, int32_t, t->n_block * PAL_LANES);
+    if (!t->owner) return PAL_ERR_MEMORY;
+    for (int l = 0; l < t->n_block * PAL_LANES; l++) t->owner[l] = -1;
+    for (int e = 0; e < n_tet; e++) t->owner[t->place[e]] = e;
+    return PAL_ERR_OK;
+}
+
+/* inverse of the edges at rest and volume; 0 where there is next to none */
+static void take_rest(pal_elastic_tets *t, double h_m)
+{
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
+        double a[3][3], inverse[3][3];
+        for (int c = 0; c < 3; c++) pal_sub3(a[c], t->x_rest + 3 * node[c + 1], t->x_rest + 3 * node[0]);
+        for (int c = 0; c < 3; c++) pal_cross3(inverse[c], a[(c + 1) % 3], a[(c + 2) % 3]);
+        double det = pal_dot3(a[0], inverse[0]);
+        if (!(fabs(det) > 6 * least_volume_h3 * h_m * h_m * h_m)) continue;
+        for (int i = 0; i < 9; i++) *lane_at(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
+        *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->wish.fill ? (double)t->wish.fill[e] : 1);
+    }
+}
+
+pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *build, pal_elastic_tets *out)
+{
+    const pal_body *body = build->body;
+    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .held = body->held};
+    out->n_point = wish->n_corner == 4 ? 1 : 4;
+    make_shape(out);
+    PAL_TRY(make_lanes(out, build));
+    size_t n_lane = (size_t)out->n_block * PAL_LANES;
+    int n_keep = wish->law == PAL_LAW_NEO_HOOKEAN ? PAL_TET_MODES * out->n_point : 9;
+    out->inverse = PAL_NEW(build->arena, double, 9 * n_lane);
+    out->volume_m3 = PAL_NEW(build->arena, double, n_lane);
+    out->stiff = PAL_NEW(build->arena, double, 2 * n_lane);
+    out->turn = PAL_NEW(build->arena, double, 4 * n_lane);
+    out->tangent = PAL_NEW(build->arena, double, (size_t)n_keep *n_lane);
+    out->bound = PAL_NEW(build->arena, double, body->n_node);
+    out->inverted = PAL_NEW(build->arena, int32_t, n_lane);
+    out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(wish->n_corner) * (size_t)wish->n_tet);
+    out->flag = PAL_NEW(build->arena, uint8_t, wish->n_tet);
+    if (wish->untangle) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
+    if (wish->untangle) out->seen = PAL_NEW(build->arena, double, 3 * body->n_node);
+    if (!out->inverse || !out->volume_m3 || !out->stiff || !out->turn || !out->tangent || !out->bound ||
+        !out->inverted || !out->entry || !out->flag || (wish->untangle && (!out->around || !out->seen)))
+        return PAL_ERR_MEMORY;
+    PAL_TRY(pal_elastic_parts_make(build, wish->tet, wish->n_tet, wish->n_corner, 4, &out->parts));
+    take_rest(out, body->h_m);
+    pal_elastic_tets_reset(out);
+    pal_elastic_tets_material(out, &build->def->material);
+    return PAL_ERR_OK;
+}
+
+void pal_elastic_tets_reset(pal_elastic_tets *t)
+{
+    memset(t->turn, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
+    for (int b = 0; b < t->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l++) t->turn[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
+    t->n_inverted = t->n_slow = t->n_look = 0;
+    t->straight = false;
+}
+
+/* gradients of the shape functions, dN_a/dX, turned by r (NULL: as at rest) */
+static void gradients(const pal_elastic_tets *t, int e, int point, const double *r, double g[][3])
+{
+    double inverse[9], turned[9];
+    for (int i = 0; i < 9; i++) inverse[i] = *lane_at(t->inverse, 9, t->place[e], i);
+    for (int c = 0; c < 3; c++)
+        if (r)
+            pal_mul33(turned + 3 * c, r, inverse + 3 * c);
+        else
+            pal_copy3(turned + 3 * c, inverse + 3 * c);
+    for (int a = 0; a < t->wish.n_corner; a++)
+        for (int m = 0; m < 3; m++) {
+            g[a][m] = 0;
+            for (int c = 0; c < 3; c++) g[a][m] += t->shape[point][a][c] * turned[3 * c + m];
+        }
+}
+
+/* |K_ab| <= mu (|g_a.g_b| + |g_a||g_b|) + lambda |g_a||g_b|, whatever the rotation */
+static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
+{
+    int n = t->wish.n_corner;
+    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
+           lambda = *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    const int32_t *node = t->corner + (size_t)n * (size_t)e;
+    for (int p = 0; p < t->n_point; p++) {
+        double g[PAL_TET10_CORNERS][3];
+        gradients(t, e, p, NULL, g);
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++) {
+                double both = pal_norm3(g[a]) * pal_norm3(g[b]);
+                bound[node[a]] += mu * (fabs(pal_dot3(g[a], g[b])) + both) + fabs(lambda) * both;
+            }
+    }
+}
+
+void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material)
+{
+    const double nu = t->wish.most_poisson;
+    memset(t->bound, 0, sizeof(double) * (size_t)t->n_node);
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        double mu, lambda, volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
+        pal_elastic_parts_lame(&t->parts, material, e, &mu, &lambda);
+        if (nu > 0) lambda = fmin(lambda, 2 * mu * nu / (1 - 2 * nu));
+        *lane_at(t->stiff, 2, t->place[e], 0) = volume * mu;
+        *lane_at(t->stiff, 2, t->place[e], 1) = volume * lambda;
+        bound_at_rest(t, e, t->bound);
+    }
+}
+
+/* K_ab = mu g_a.g_b I + s [F (g_a x g_b)]x + k1 (C g_a)(C g_b)', C = dJ/dF, s = -mu + k1 (J - 1) */
+static void bound_neo(const pal_elastic_tets *t, int e, const double *d, double *bound)
+{
+    int n = t->wish.n_corner;
+    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
+           k1 = mu + *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    const int32_t *node = t->corner + (size_t)n * (size_t)e;
+    for (int p = 0; p < t->n_point; p++) {
+        double g[PAL_TET10_CORNERS][3], cg[PAL_TET10_CORNERS][3], f[9], c[9];
+        gradients(t, e, p, NULL, g);
+        pal_elastic_tets_gradient(t, e, p, d, f);
+        pal_cofactor3(f, c);
+        double s = fabs(-mu + k1 * (pal_det3(f) - 1));
+        for (int a = 0; a < n; a++) pal_mul33(cg[a], c, g[a]);
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++) {
+                double cross[3];
+                pal_cross3(cross, g[a], g[b]);
+                pal_mul33(cross, f, cross);
+                bound[node[a]] += mu * fabs(pal_dot3(g[a], g[b])) + s * pal_norm3(cross) +
+                                  fabs(k1) * pal_norm3(cg[a]) * pal_norm3(cg[b]);
+            }
+    }
+}
+
+void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_N_m)
+{
+    if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
+        for (int e = 0; e < t->wish.n_tet; e++) bound_neo(t, e, d, bound_N_m);
+    else
+        for (int i = 0; i < t->n_node; i++) bound_N_m[i] += t->bound[i];
+}
+
+/* where the pairs of corners of every element stand in the pattern, once per pattern */
+static void find_entries(pal_elastic_tets *t, const pal_blocks *to)
+{
+    int n = t->wish.n_corner;
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        const int32_t *node = t->corner + (size_t)n * (size_t)e;
+        int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b <= a; b++, entry++)
+                *entry =
+                    pal_blocks_find(to, node[a] > node[b] ? node[a] : node[b], node[a] > node[b] ? node[b] : node[a]);
+    }
+    t->entry_row = to->row;
+    t->entry_of = to;
+}
+
+static void assemble_gradients(const pal_elastic_tets *t, int e, double k, pal_blocks *to)
+{
+    int n = t->wish.n_corner;
+    const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
+    double r[9], g[4][PAL_TET10_CORNERS][3];
+    double mu = k * *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
+           lambda = k * *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    const int32_t *node = t->corner + (size_t)n * (size_t)e;
+    /* tangent holds D R' */
+    for (int c = 0; c < 9; c++) r[c] = *lane_at(t->tangent, 9, t->place[e], c);
+    for (int p = 0; p < t->n_point; p++)
+        for (int a = 0; a < n; a++)
+            for (int m = 0; m < 3; m++) {
+                g[p][a][m] = 0;
+                for (int c = 0; c < 3; c++) g[p][a][m] += t->shape[p][a][c] * r[3 * c + m];
+            }
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b <= a; b++) {
+            int row = node[a] > node[b] ? a : b, column = a + b - row;
+            double *block = to->value + 9 * (size_t)*entry++;
+            for (int p = 0; p < t->n_point; p++) {
+                const double *gr = g[p][row], *gc = g[p][column];
+                double same = mu * pal_dot3(gr, gc);
+                for (int i = 0; i < 3; i++)
+                    for (int j = 0; j < 3; j++)
+                        block[3 * i + j] += (i == j ? same : 0) + mu * gc[i] * gr[j] + lambda * gr[i] * gc[j];
+            }
+        }
+}
+
+/* dP in the frame of u for dF = e_j g' there, contracted with h: block(i, j) = (dP h)_i */
+static void modes_block(const double *stretch, const double *same, const double *cross, const double h[3],
+                        const double g[3], double block[9])
+{
+    static const int between[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}}, other[3][3] = {{0, 2, 1}, {2, 0, 0}, {1, 0, 0}};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            /* a = dF_jm = g_m: its own entry jm gives same[.] at jm and cross[.] at mj; jj gives stretches at ii */
+            double sum = stretch[between[i][j]] * h[i] * g[j];
+            if (i == j) {
+                for (int m = 0; m < 3; m++)
+                    if (m != j) sum += same[other[j][m]] * h[m] * g[m];
+            } else
+                sum += cross[other[i][j]] * h[j] * g[i];
+            block[3 * i + j] = sum;
+        }
+}
+
+static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_blocks *to)
+{
+    int n = t->wish.n_corner, width = PAL_TET_MODES * t->n_point;
+    const int32_t *node = t->corner + (size_t)n * (size_t)e;
+    for (int p = 0; p < t->n_point; p++) {
+        double m[PAL_TET_MODES], g[PAL_TET10_CORNERS][3];
+        const double *u = m, *dv = m + 9;
+        const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
+        for (int i = 0; i < PAL_TET_MODES; i++) m[i] = *lane_at(t->tangent, width, t->place[e], PAL_TET_MODES * p + i);
+        for (int a = 0; a < n; a++)
+            for (int i = 0; i < 3; i++)
+                g[a][i] = t->shape[p][a][0] * dv[i] + t->shape[p][a][1] * dv[3 + i] + t->shape[p][a][2] * dv[6 + i];
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b <= a; b++) {
+                int row = node[a] > node[b] ? a : b, column = a + b - row;
+                double *at = to->value + 9 * (size_t)*entry++, block[9], half[9];
+                modes_block(m + 18, m + 24, m + 27, g[row], g[column], block);
+                /* u block u' */
+                for (int i = 0; i < 9; i++) half[i] = pal_dot3(block + 3 * (i / 3), u + 3 * (i % 3));
+                for (int i = 0; i < 3; i++)
+                    for (int j = 0; j < 3; j++)
+                        at[3 * i + j] +=
+                            k * (u[3 * i] * half[j] + u[3 * i + 1] * half[3 + j] + u[3 * i + 2] * half[6 + j]);
+            }
+    }
+}
+
+void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_blocks *to)
+{
+    if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
+    if (t->straight) k *= t->soft;
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        if (*lane_at(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
+        if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
+            assemble_modes(t, e, k, to);
+        else
+            assemble_gradients(t, e, k, to);
+    }
+}
+
+void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
+{
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        double r[9], weight = *lane_at(t->stiff, 2, t->place[e], 0);
+        pal_elastic_tets_rotation(t, e, r);
+        const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
+        for (int c = 0; c < t->wish.n_corner; c++)
+            for (int i = 0; i < 9; i++) turn[9 * node[c] + i] += weight * r[i];
+    }
+}
+
+/* von Mises of the Cauchy stress P F'/J (neo-Hookean) or of the small-strain stress in current axes, which has the same
+ * von Mises as that in the element's; energy density; strain and distortion. At one Gauss point */
+static double field_at(const pal_elastic_tets *t, int e, int point, const double *d, pal_field field)
+{
+    double volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
+    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / volume, lambda = *lane_at(t->stiff, 2, t->place[e], 1) / volume;
+    double f[9], r[9], p[9], s[9];
+    pal_elastic_tets_gradient(t, e, point, d, f);
+    if (field == PAL_FIELD_STRAIN) return pal_largest_strain(f);
+    if (field == PAL_FIELD_DISTORTION) return pal_det3(f) - 1;
+    if (t->wish.law == PAL_LAW_NEO_HOOKEAN) {
+        if (field == PAL_FIELD_ENERGY_J_M3) return pal_neo_energy(mu, mu + lambda, f);
+        pal_neo_stress(mu, mu + lambda, 0, f, p);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) s[3 * i + j] = pal_dot3(p + 3 * i, f + 3 * j);
+        return pal_von_mises(s) / fmax(fabs(pal_det3(f)), 1e-6);
+    }
+    pal_elastic_tets_rotation(t, e, r);
+    double energy = pal_corotational_stress(mu, lambda, f, r, p);
+    if (field == PAL_FIELD_ENERGY_J_M3) return energy;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) s[3 * i + j] = pal_dot3(p + 3 * i, r + 3 * j);
+    return pal_von_mises(s);
+}
+
+void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field field, double *sum, double *volume_m3)
+{
+    if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
+    int n = t->wish.n_corner;
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        double share = *lane_at(t->volume_m3, 1, t->place[e], 0) / n, value = 0;
+        if (share <= 0) continue;
+        for (int p = 0; p < t->n_point; p++) value += field_at(t, e, p, d, field) / t->n_point;
+        const int32_t *node = t->corner + (size_t)n * (size_t)e;
+        for (int c = 0; c < n; c++) {
+            sum[node[c]] += share * value;
+            volume_m3[node[c]] += share;
+        }
+    }
+}
+
+void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_take *take, void *user)
+{
+    static const double centre[4] = {0.25, 0.25, 0.25, 0.25};
+    int n = t->wish.n_corner;
+    double shape[4][10];
+    for (int p = 0; p < t->n_point && n == 10; p++) pal_tet10_shape(pal_tet_gauss[p], shape[p], NULL);
+    for (int e = 0; e < t->wish.n_tet; e++) {
+        double volume = *lane_at(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
+        if (volume <= 0) continue;
+        pal_stress_point to = {.element = e,
+                               .n_corner = n,
+                               .node = t->corner + (size_t)n * (size_t)e,
+                               .volume_m3 = volume / t->n_point,
+                               .mu_Pa = *lane_at(t->stiff, 2, t->place[e], 0) / volume,
+                               .lambda_Pa = *lane_at(t->stiff, 2, t->place[e], 1) / volume};
+        bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
+        pal_elastic_tets_rotation(t, e, r);
+        for (int k = 0; k < t->n_point; k++) {
+            pal_elastic_tets_gradient(t, e, k, d, f);
+            if (neo)
+                pal_neo_stress(to.mu_Pa, to.mu_Pa + to.lambda_Pa, 0, f, p);
+            else
+                pal_corotational_stress(to.mu_Pa, to.lambda_Pa, f, r, p);
+            for (int i = 0; i < 9; i++) to.stress[i] = pal_dot3(p + 3 * (i / 3), (neo ? f : r) + 3 * (i % 3));
+            to.shape = n == 10 ? shape[k] : centre;
+            take(user, &to);
+        }
+    }
+}

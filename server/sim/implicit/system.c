@@ -1,0 +1,358 @@
+/* Rows as a system of equations. */
+#include "server/sim/implicit/system.h"
+
+#include "server/base/vec3.h"
+#include "server/num/conjugate.h"
+#include "server/num/roots.h"
+#include "server/sim/subdivision/solid_mass.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+pal_err pal_system_make(const pal_build *build, pal_system *out)
+{
+    pal_body *body = build->body;
+    *out = (pal_system){.body = body, .has_energy = true, .mass = 1};
+    out->force = PAL_NEW(build->arena, pal_row, build->n_made);
+    if (!out->force) return PAL_ERR_MEMORY;
+    for (int i = 0; i < build->n_made; i++) {
+        const pal_row *row = &build->made[i];
+        if (row->effect->stage != PAL_STAGE_FORCE) continue;
+        out->force[out->n_force++] = (pal_row){.effect = row->effect, .self = row->self};
+        if (!row->effect->drag && !row->effect->energy) out->has_energy = false;
+        if (row->effect->tangent && row->effect->tangent->rotate) out->has_turn = true;
+    }
+    for (int i = 0; i < body->n_dof; i++) out->n_free += !body->held[i];
+    if (!body->embed) return PAL_ERR_OK;
+    return pal_embedded_make(body, out->force, out->n_force, build->arena, build->note, &out->embedded);
+}
+
+/* the cliques of all rows, heap [system->n_force] */
+static pal_cliques *list_cliques(const pal_system *system, int *n_list)
+{
+    pal_cliques *list = calloc((size_t)system->n_force + 1, sizeof *list);
+    *n_list = 0;
+    for (int i = 0; i < system->n_force && list; i++) {
+        const pal_row *row = &system->force[i];
+        if (row->effect->tangent && row->effect->tangent->couple &&
+            row->effect->tangent->couple(row->self, &list[*n_list]))
+            ++*n_list;
+    }
+    return list;
+}
+
+pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_blocks *out)
+{
+    int n_list;
+    if (system->embedded) {
+        *out = system->embedded->rest;
+        out->value = PAL_NEW(arena, double, 9 * (size_t)out->start[out->n]);
+        return out->value ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    }
+    pal_cliques *list = list_cliques(system, &n_list);
+    if (!list) return PAL_ERR_MEMORY;
+    pal_err err = pal_blocks_make(system->body->n_node, list, n_list, arena, out);
+    free(list);
+    return err;
+}
+
+void pal_system_linearise(const pal_system *system)
+{
+    for (int i = 0; i < system->n_force; i++) {
+        const pal_row *row = &system->force[i];
+        if (row->effect->tangent) row->effect->tangent->linearise(row->self, system->body);
+    }
+}
+
+void pal_system_touch(pal_system *system, const pal_step *step)
+{
+    system->contact = step->contact;
+    system->n_contact = step->n_contact;
+    system->has_contact = false;
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_row *row = &step->contact[i];
+        if (!row->effect->tangent) continue;
+        if (row->effect->tangent->linearise) row->effect->tangent->linearise(row->self, system->body);
+        system->has_contact |= row->effect->tangent->multiply != NULL;
+    }
+}
+
+void pal_system_linearise_rest(const pal_system *system)
+{
+    pal_body *body = system->body;
+    double *x = body->x, *d = body->d;
+    body->x = body->x_rest, body->d = body->node_rest;
+    pal_system_linearise(system);
+    body->x = x, body->d = d;
+}
+
+bool pal_system_probe(const pal_system *system, int most)
+{
+    pal_embedded *e = system->embedded;
+    if (!e || e->next == e->n_move) return true;
+    pal_system_linearise_rest(system);
+    return pal_embedded_probe(e, system, most);
+}
+
+void pal_system_place(const pal_system *system)
+{
+    if (system->embedded) pal_point_rows_place(system->body->embed, system->body->x, system->body->d);
+}
+
+void pal_system_rotate(const pal_system *system, double *turn)
+{
+    const pal_body *body = system->body;
+    double *to = system->embedded ? system->embedded->turn : turn;
+    memset(to, 0, 9 * sizeof(double) * (size_t)body->n_node);
+    for (int i = 0; i < system->n_force; i++) {
+        const pal_row *row = &system->force[i];
+        if (row->effect->tangent && row->effect->tangent->rotate) row->effect->tangent->rotate(row->self, body, to);
+    }
+    if (!system->embedded) return;
+    memset(turn, 0, 9 * sizeof(double) * (size_t)body->n_dof);
+    pal_embedded_pull9(body->embed, to, turn);
+}
+
+/* ---- products ---- */
+
+static void multiply_rows(const pal_system *system, const pal_row *row, int n_row, double k, double c, const double *p,
+                          double *out)
+{
+    const pal_body *body = system->body;
+    pal_embedded *e = system->embedded;
+    if (e) {
+        pal_point_rows_place(body->embed, p, e->p);
+        memset(e->q, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    }
+    for (int i = 0; i < n_row; i++) {
+        const pal_tangent *tangent = row[i].effect->tangent;
+        if (tangent && tangent->multiply) tangent->multiply(row[i].self, body, k, c, e ? e->p : p, e ? e->q : out);
+    }
+    if (e) pal_point_rows_pull(body->embed, e->q, out);
+}
+
+void pal_system_stiffness(const pal_system *system, double k, double c, const double *p, double *out)
+{
+    multiply_rows(system, system->force, system->n_force, k, c, p, out);
+}
+
+void pal_system_contact(const pal_system *system, double k, double c, const double *p, double *out)
+{
+    if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, c, p, out);
+}
+
+/* mass + damp times the entries' damping, row i: sum to the point */
+static void between(const pal_mass_operator *m, int i, double mass, double damp, const double *p, double sum[3])
+{
+    pal_set3(sum, 0, 0, 0);
+    for (int32_t k = m->start[i]; k < m->start[i + 1]; k++) {
+        double w = mass * m->mass_kg[k] + (m->damping_kg_s ? damp * m->damping_kg_s[k] : 0);
+        pal_axpy3(sum, w, p + 3 * (size_t)m->point[k]);
+    }
+}
+
+void pal_system_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
+{
+    const pal_body *body = system->body;
+    for (int i = 0; i < body->n_dof; i++) {
+        if (body->mass_operator) {
+            between(body->mass_operator, i, mass, damp, p, out + 3 * i);
+            continue;
+        }
+        double m = mass * body->mass_kg[i];
+        for (int c = 0; c < 3; c++) out[3 * i + c] = m * p[3 * i + c];
+    }
+}
+
+double pal_system_square(const pal_system *system, double mass, double damp, const double *p)
+{
+    const pal_body *body = system->body;
+    double sum = 0, part[3];
+    for (int i = 0; i < body->n_dof; i++) {
+        pal_scale3(part, mass * body->mass_kg[i], p + 3 * i);
+        if (body->mass_operator) between(body->mass_operator, i, mass, damp, p, part);
+        sum += pal_dot3(p + 3 * i, part);
+    }
+    return sum;
+}
+
+void pal_system_multiply(const pal_system *system, const double *p, double *out)
+{
+    const pal_body *body = system->body;
+    pal_system_inertia(system, system->mass, system->damp, p, out);
+    pal_system_stiffness(system, system->stiff, system->damp, p, out);
+    pal_system_contact(system, system->stiff, system->damp, p, out);
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->held[i]) pal_set3(out + 3 * i, 0, 0, 0);
+}
+
+double pal_system_work(const pal_system *system, const double *p)
+{
+    const pal_body *body = system->body;
+    pal_embedded *e = system->embedded;
+    if (e) pal_point_rows_place(body->embed, p, e->p);
+    return pal_sum_products(3 * body->n_node, body->load, e ? e->p : p);
+}
+
+/* forces of the internal rows at body->x, in body->f and g */
+static void find_inner_forces(const pal_system *system)
+{
+    pal_body *body = system->body;
+    pal_step step = {.body = body, .force = system->force, .n_force = system->n_force};
+    pal_system_place(system);
+    memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    for (int i = 0; i < system->n_force; i++)
+        if (system->force[i].effect->internal) (void)system->force[i].effect->run(system->force[i].self, &step);
+    if (!body->embed) return;
+    memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    pal_point_rows_pull(body->embed, body->f, body->g);
+}
+
+void pal_system_curve(const pal_system *system, const double *x, double *low, const double *p, double *out)
+{
+    pal_body *body = system->body;
+    const int n = 3 * body->n_dof;
+    double longest = 0;
+    for (int i = 0; i < n; i++) longest = fmax(longest, fabs(p[i]));
+    double part = longest > 0 ? 1e-5 * body->h_m / longest : 0;
+    for (int side = -1; side <= 1; side += 2) {
+        for (int i = 0; i < n; i++) body->x[i] = x[i] + side * part * p[i];
+        find_inner_forces(system);
+        if (side < 0) memcpy(low, body->g, sizeof(double) * (size_t)n);
+    }
+    for (int i = 0; i < n; i++) {
+        body->x[i] = x[i];
+        out[i] = body->held[i / 3] || part == 0 ? 0 : (low[i] - body->g[i]) / (2 * part);
+    }
+    pal_system_place(system);
+}
+
+/* rest and damping of an embedded body, and its masses */
+static void assemble_embedded(const pal_system *system, pal_blocks *to)
+{
+    const pal_body *body = system->body;
+    const pal_embedded *e = system->embedded;
+    for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++)
+        to->value[i] = system->stiff * e->rest.value[i] + (e->damping ? system->damp * e->damping[i] : 0);
+    const pal_mass_operator *m = body->mass_operator;
+    for (int i = 0; i < body->n_dof; i++) {
+        for (int32_t k = m ? m->start[i] : 0; m && k < m->start[i + 1]; k++) {
+            int at = m->point[k] >= i ? pal_blocks_find(to, m->point[k], i) : -1;
+            double w = system->mass * m->mass_kg[k] + (m->damping_kg_s ? system->damp * m->damping_kg_s[k] : 0);
+            for (int c = 0; c < 3 && at >= 0; c++) to->value[9 * (size_t)at + 4 * (size_t)c] += w;
+        }
+        for (int c = 0; c < 3 && !m; c++)
+            to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] += system->mass * body->mass_kg[i];
+        /* points may move so that no node does, as corners of one smooth cube by turns: there is no mass against it */
+        for (int c = 0; c < 3 && system->mass > 0; c++) to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] *= 1 + 1e-9;
+    }
+}
+
+void pal_system_assemble(const pal_system *system, pal_blocks *to)
+{
+    const pal_body *body = system->body;
+    if (system->embedded) {
+        assemble_embedded(system, to);
+        return;
+    }
+    pal_blocks_zero(to);
+    for (int i = 0; i < body->n_node; i++)
+        for (int c = 0; c < 3; c++)
+            to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] = system->mass * body->mass_kg[i];
+    for (int i = 0; i < system->n_force; i++) {
+        const pal_row *row = &system->force[i];
+        if (row->effect->tangent && row->effect->tangent->assemble)
+            row->effect->tangent->assemble(row->self, body, system->stiff, system->damp, to);
+    }
+}
+
+double pal_system_energy(const pal_system *system)
+{
+    double sum = 0;
+    for (int i = 0; i < system->n_force; i++) {
+        const pal_row *row = &system->force[i];
+        if (row->effect->energy) sum += row->effect->energy(row->self, system->body);
+    }
+    return sum;
+}
+
+double pal_system_drag(const pal_system *system)
+{
+    double rate = 0;
+    for (int i = 0; i < system->n_force; i++)
+        if (system->force[i].effect->drag) rate += system->force[i].effect->drag(system->force[i].self);
+    return rate;
+}
+
+/* ---- supports ---- */
+
+static void join_parts(const pal_cliques *list, int n_list, int32_t *parent)
+{
+    for (int l = 0; l < n_list; l++)
+        for (int e = 0; e < list[l].n_item; e++) {
+            const int32_t *node = list[l].node + (size_t)list[l].n_corner * (size_t)e;
+            for (int c = 1; c < list[l].n_corner; c++) pal_roots_join(parent, node[0], node[c]);
+        }
+}
+
+/* the held nodes of one part span a plane: three of them off a line. first, far: -1 as long as there is none */
+typedef struct span {
+    int32_t first, far;
+    double far_m, off_m; /* from first; from the line through first and far */
+} span;
+
+static void take_far(const pal_body *body, span *s, int32_t node)
+{
+    if (s->first < 0) s->first = node;
+    double way = pal_dist3(body->x_rest + 3 * s->first, body->x_rest + 3 * node);
+    if (way > s->far_m) s->far_m = way, s->far = node;
+}
+
+static void take_off(const pal_body *body, span *s, int32_t node)
+{
+    double line[3], to[3], across[3];
+    if (s->far < 0) return;
+    pal_sub3(line, body->x_rest + 3 * s->far, body->x_rest + 3 * s->first);
+    pal_sub3(to, body->x_rest + 3 * node, body->x_rest + 3 * s->first);
+    pal_cross3(across, line, to);
+    s->off_m = fmax(s->off_m, pal_norm3(across) / s->far_m);
+}
+
+static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supports *out)
+{
+    int n = body->n_dof;
+    *out = (pal_supports){.loose_node = -1};
+    for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
+    for (int i = 0; i < n; i++)
+        if (body->held[i]) take_far(body, &s[pal_root(parent, i)], i);
+    for (int i = 0; i < n; i++)
+        if (body->held[i]) take_off(body, &s[pal_root(parent, i)], i);
+    for (int i = 0; i < n; i++) {
+        if (parent[i] != i) continue;
+        out->n_part++;
+        /* a part of one node is held as soon as that node is */
+        if (s[i].off_m > 1e-9 * body->size_m || (body->held[i] && s[i].far < 0)) continue;
+        out->n_loose++;
+        if (out->loose_node < 0) out->loose_node = i;
+    }
+}
+
+pal_err pal_system_supports(const pal_system *system, pal_supports *out)
+{
+    int n_list = 0, n = system->body->n_dof;
+    pal_cliques *list = list_cliques(system, &n_list);
+    const pal_blocks *a = system->embedded ? &system->embedded->rest : NULL;
+    int32_t *parent = malloc(sizeof *parent * (size_t)n);
+    span *s = malloc(sizeof *s * (size_t)n);
+    bool all = list && parent && s;
+    if (all) {
+        for (int32_t i = 0; i < n; i++) parent[i] = i;
+        if (!a) join_parts(list, n_list, parent);
+        for (int32_t j = 0; a && j < n; j++)
+            for (int32_t k = a->start[j]; k < a->start[j + 1]; k++)
+                parent[pal_root(parent, a->row[k])] = pal_root(parent, j);
+        count_parts(system->body, parent, s, out);
+    }
+    free(list), free(parent), free(s);
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}

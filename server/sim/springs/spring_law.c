@@ -1,0 +1,199 @@
+/* Spring constants from E, nu and the mesh. */
+#include "server/sim/springs/spring_law.h"
+
+#include "server/base/vec3.h"
+#include "server/num/trilinear.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void pal_spring_factors(double poisson, bool without_area, double factor[3])
+{
+    double nu = poisson < 0.26 ? 0.26 : poisson;
+    double shear = 1 / (2 * (1 + nu)), bulk = 1 / (3 * (1 - 2 * nu));
+    double share = without_area ? 0 : fmin(0.5, (bulk / shear - 5.0 / 3) / 10);
+    factor[PAL_SPRING_DISTANCE] = (1 - share) * shear * 3 / 2;
+    factor[PAL_SPRING_AREA] = share * shear * 9 / 4;
+    factor[PAL_SPRING_VOLUME] = bulk - (5.0 / 3 + 5 * share) * shear;
+}
+
+static double derived_J(const pal_spring *spring, const pal_material *material, double h_m)
+{
+    double factor[3];
+    pal_spring_factors(material->poisson, spring->without_area, factor);
+    return factor[spring->kind] * material->young_Pa * h_m * h_m * h_m;
+}
+
+pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out)
+{
+    bool on_grid = build->def->spring_grid.k_J[kind] != NULL, given = on_grid || pal_item_has(item, "k_J");
+    const char *weights = given ? "equal" : "volume";
+    *out = (pal_spring){.kind = kind, .given = given, .on_grid = on_grid};
+    if (on_grid && pal_item_has(item, "k_J"))
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.k_J: stands beside a grid that gives the same",
+                            item->path);
+    PAL_TRY(pal_item_text(item, "weights", &weights, build->note));
+    if (strcmp(weights, "equal") != 0 && strcmp(weights, "volume") != 0)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.weights: \"%s\", wanted \"equal\" or \"volume\"",
+                            item->path, weights);
+    out->by_volume = weights[0] == 'v';
+    PAL_TRY(pal_item_bool(item, "without_area", &out->without_area, build->note));
+    out->k_J = on_grid ? 1 : derived_J(out, &build->def->material, build->body->h_m);
+    PAL_TRY(pal_item_number(item, "k_J", 0, 1e60, &out->k_J, build->note));
+    PAL_TRY(pal_item_number(item, "c_Js", 0, 1e60, &out->c_Js, build->note));
+    PAL_TRY(pal_item_done(item, build->note));
+    if (!build->body->tets || !build->body->slots)
+        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", item->path,
+                            item->name);
+    return PAL_ERR_OK;
+}
+
+void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material)
+{
+    if (!spring->given) spring->k_J = derived_J(spring, material, body->h_m);
+}
+
+static double tet_volume(const pal_tets *tets, int t)
+{
+    const int32_t *c = tets->tet + 4 * t;
+    double e[3][3], n[3];
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
+    pal_cross3(n, e[1], e[2]);
+    return fabs(pal_dot3(e[0], n)) / 6;
+}
+
+static double inside_m3(const pal_body *body, int t)
+{
+    return tet_volume(body->tets, t) * (body->fill ? (double)body->fill[t] : 1);
+}
+
+double pal_spring_volume_m3(const pal_body *body)
+{
+    double sum = 0;
+    for (int t = 0; t < body->tets->n_tet; t++) sum += inside_m3(body, t);
+    return sum;
+}
+
+/* a spring by its nodes in ascending order, to find it from the tetrahedra around it */
+typedef struct known {
+    int32_t node[4], item;
+} known;
+
+static int compare_known(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof((known *)0)->node);
+}
+
+static void set_known(known *k, const int32_t *node, int n)
+{
+    memset(k, 0, sizeof *k);
+    for (int i = 0; i < n; i++) {
+        int j = i;
+        for (; j > 0 && k->node[j - 1] > node[i]; j--) k->node[j] = k->node[j - 1];
+        k->node[j] = node[i];
+    }
+}
+
+/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) times share [n_tet] to its sides with n_corner
+ * corners */
+static void add_volumes(const pal_body *body, const double *share, const known *table, size_t n_item, int n_corner,
+                        double *out)
+{
+    const pal_tets *tets = body->tets;
+    for (int t = 0; t < tets->n_tet; t++) {
+        double volume = inside_m3(body, t) * (share ? share[t] : 1);
+        for (unsigned set = 1; set < 16; set++) {
+            if (__builtin_popcount(set) != n_corner) continue;
+            int32_t node[4];
+            int n = 0;
+            for (int c = 0; c < 4; c++)
+                if (set >> c & 1) node[n++] = tets->tet[4 * t + c];
+            known key;
+            set_known(&key, node, n_corner);
+            const known *found = bsearch(&key, table, n_item, sizeof key, compare_known);
+            if (found) out[found->item] += volume;
+        }
+    }
+}
+
+static double mean_square_edge(const double *x, const int32_t *node, int n)
+{
+    double sum = 0;
+    for (int a = 0; a < n; a++)
+        for (int b = a + 1; b < n; b++) {
+            double d = pal_dist3(x + 3 * node[a], x + 3 * node[b]);
+            sum += d * d;
+        }
+    return 2 * sum / (n * (n - 1));
+}
+
+static void clear(double *out, int n)
+{
+    for (int i = 0; i < n; i++) out[i] = 0;
+}
+
+/* volumes around springs by their share -> out, over all of it where weights are equal */
+static pal_err sum_volumes(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
+                           int n_item, int n_corner, double *out)
+{
+    known *table = calloc((size_t)n_item + 1, sizeof *table);
+    if (!table) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_item; i++) {
+        set_known(&table[i], item + n_corner * i, n_corner);
+        table[i].item = i;
+    }
+    qsort(table, (size_t)n_item, sizeof *table, compare_known);
+    clear(out, n_item);
+    add_volumes(body, share, table, (size_t)n_item, n_corner, out);
+    double *all = spring->by_volume ? NULL : calloc((size_t)n_item + 1, sizeof *all);
+    if (all) {
+        add_volumes(body, NULL, table, (size_t)n_item, n_corner, all);
+        for (int i = 0; i < n_item; i++) out[i] = all[i] > 0 ? out[i] / all[i] : 0;
+    }
+    bool made = spring->by_volume || all;
+    free(table), free(all);
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
+                           int n_item, int n_corner, double *out)
+{
+    for (int i = 0; i < n_item; i++) out[i] = 1;
+    if (!spring->by_volume && !share) return PAL_ERR_OK;
+    PAL_TRY(sum_volumes(spring, body, share, item, n_item, n_corner, out));
+    if (!spring->by_volume) return PAL_ERR_OK;
+    double h = body->h_m;
+    for (int i = 0; i < n_item; i++) {
+        double l2 = n_corner == 4 ? h * h : mean_square_edge(body->x_rest, item + n_corner * i, n_corner);
+        out[i] *= l2 / (h * h * h * h * h);
+    }
+    return PAL_ERR_OK;
+}
+
+static double node_constant(const pal_spring_grid *g, pal_spring_kind kind, const double x[3])
+{
+    const pal_grid grid = {{g->n[0], g->n[1], g->n[2]},
+                           {g->low_m[0], g->low_m[1], g->low_m[2]},
+                           {g->high_m[0], g->high_m[1], g->high_m[2]}};
+    return pal_trilinear_at(&grid, g->k_J[kind], x);
+}
+
+void pal_spring_nodes(const pal_spring_grid *grid, pal_spring_kind kind, const pal_body *body, double *out_J)
+{
+    for (int i = 0; i < body->n_node; i++) out_J[i] = node_constant(grid, kind, body->x_rest + 3 * (size_t)i);
+}
+
+void pal_spring_on_grid(pal_spring *spring, const pal_spring_grid *grid, const pal_body *body, const int32_t *item,
+                        int n_item, int n_corner, double *weight)
+{
+    if (!spring->on_grid || n_item == 0) return;
+    double mean_J = 0;
+    for (int i = 0; i < n_item; i++) {
+        double k_J = 0;
+        for (int c = 0; c < n_corner; c++)
+            k_J += node_constant(grid, spring->kind, body->x_rest + 3 * (size_t)item[n_corner * i + c]) / n_corner;
+        weight[i] *= k_J;
+        mean_J += k_J / n_item;
+    }
+    spring->c_Js /= mean_J;
+}

@@ -1,0 +1,326 @@
+/* Elements of subdivided solids in their own frames: forces, energy, and products with the tangent Q K Q'. */
+#include "server/sim/subdivision/cell_lanes.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { FORCE = 1, ENERGY = 2, LINEARISE = 4, SWELL = 8 };
+
+/* b.u, b the element's swell */
+PAL_INLINE pal_wide swelling(const double *swell, int n_node, pal_wide (*u)[PAL_CELL_NODES_MOST])
+{
+    pal_wide sum = {0};
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) sum += pal_wide_load(swell + (3 * m + i) * PAL_LANES) * u[i][m];
+    return sum;
+}
+/* u += p b */
+PAL_INLINE void add_swelling(const double *swell, int n_node, pal_wide p, pal_wide (*u)[PAL_CELL_NODES_MOST])
+{
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) u[i][m] += p * pal_wide_load(swell + (3 * m + i) * PAL_LANES);
+}
+PAL_INLINE const double *swell_at(const pal_cell_group *group, int n_node, int block, int lane)
+{
+    return group->swell + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
+}
+/* onto the sums of the control cells, and what they push with */
+PAL_INLINE void take_swelling(const pal_cells_elastic *c, const int32_t *home, int n_live, pal_wide s)
+{
+    for (int l = 0; l < n_live; l++) c->volume.sum[home[l]] += s[l];
+}
+PAL_INLINE pal_wide give_swelling(const pal_cells_elastic *c, const int32_t *home)
+{
+    pal_wide p;
+    for (int l = 0; l < PAL_WIDE; l++) p[l] = c->volume.push[home[l]];
+    return p;
+}
+static void find_push(const pal_cells_elastic *c)
+{
+    for (int i = 0; i < c->volume.n; i++) c->volume.push[i] = c->volume.share[i] * c->volume.sum[i];
+}
+
+/* g (world axes, forces with Q held) += what the turning of Q adds */
+PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
+                         const pal_wide s[9], pal_wide (*y)[PAL_CELL_NODES_MOST], pal_wide (*g)[PAL_CELL_NODES_MOST])
+{
+    const pal_wide zero = {0};
+    pal_wide world[3] = {zero, zero, zero}, t[3], frame[9], w[9];
+    for (int m = 0; m < n_node; m++) {
+        world[0] += g[1][m] * y[2][m] - g[2][m] * y[1][m];
+        world[1] += g[2][m] * y[0][m] - g[0][m] * y[2][m];
+        world[2] += g[0][m] * y[1][m] - g[1][m] * y[0][m];
+    }
+    for (int i = 0; i < 3; i++) t[i] = r[i] * world[0] + r[3 + i] * world[1] + r[6 + i] * world[2];
+    cell_load(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
+    cell_turn_stress(r, s, t, frame, w);
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) g[i][m] += w[3 * i + j] * group->middle[m][j];
+}
+
+/* one half of a block */
+PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_node, int what, int block, int lane,
+                             const double *d, double *f)
+{
+    const int n_live = cell_live(group, block, lane);
+    const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
+    pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9], energy = {0};
+    if (n_live == 0 || (!(what & LINEARISE) && cell_away(c, group, block, lane, n_live))) return 0;
+    cell_gather(node, n_node, d, y);
+    cell_rotation(group, block, lane, y, n_node, r, s);
+    if (what & LINEARISE)
+        for (int i = 0; i < 9; i++) pal_wide_store(group->turn + ((size_t)block * 9 + i) * PAL_LANES + lane, r[i]);
+    if (!(what & (FORCE | ENERGY | SWELL))) return 0;
+    cell_unturn(r, n_node, y, u);
+    cell_minus_rest(group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane, n_node, u);
+    const bool apart = c->volume.n > 0;
+    const int32_t *home = group->home + block * PAL_LANES + lane;
+    const double *swell = swell_at(group, n_node, block, lane);
+    if (what & SWELL) {
+        take_swelling(c, home, n_live, swelling(swell, n_node, u));
+        return 0;
+    }
+    pal_wide push = apart ? give_swelling(c, home) : energy;
+    if (apart && what & ENERGY) energy = 0.5 * push * swelling(swell, n_node, u);
+    cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
+    if (apart) add_swelling(swell, n_node, push, u);
+    if (what & ENERGY) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
+    if (c->tangle.n_away > 0) {
+        const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
+        energy *= here;
+        for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
+    }
+    double sum = what & ENERGY ? cell_sum(energy, n_live) : 0;
+    if (!(what & FORCE)) return sum;
+    pal_wide minus[9];
+    for (int i = 0; i < 9; i++) minus[i] = -r[i];
+    cell_turn(minus, n_node, u, u);
+    add_turn(group, block, lane, n_node, r, s, y, u);
+    cell_scatter(node, n_node, n_live, u, f);
+    return sum;
+}
+
+PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_node, int what, const double *d, double *f)
+{
+    pal_cell_group *group = &c->group[kind];
+    double sum = 0;
+    group->n_slow = 0;
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) sum += half_block(c, group, n_node, what, b, l, d, f);
+    return sum;
+}
+
+/* how much each control cell's volume has changed */
+static void swell_all(pal_cells_elastic *c, const double *d)
+{
+    if (c->volume.n == 0) return;
+    memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
+    all_blocks(c, PAL_CELL_CUBIC, 64, SWELL, d, NULL);
+    all_blocks(c, PAL_CELL_HEX, 8, SWELL, d, NULL);
+    all_blocks(c, PAL_CELL_PYRAMID, 5, SWELL, d, NULL);
+    find_push(c);
+}
+
+void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
+{
+    swell_all(c, d);
+    if (c->tangle.n_away > 0) (void)pal_cell_tangle_force(&c->tangle, c->solid, d, f);
+    if (c->op == PAL_CELL_EDGES) {
+        pal_cells_edges_force(c, d, f);
+        return;
+    }
+    all_blocks(c, PAL_CELL_CUBIC, 64, FORCE, d, f);
+    all_blocks(c, PAL_CELL_HEX, 8, FORCE, d, f);
+    all_blocks(c, PAL_CELL_PYRAMID, 5, FORCE, d, f);
+}
+
+PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
+{
+    return all_blocks(c, PAL_CELL_CUBIC, 64, what, d, f) + all_blocks(c, PAL_CELL_HEX, 8, what, d, f) +
+           all_blocks(c, PAL_CELL_PYRAMID, 5, what, d, f);
+}
+
+double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
+{
+    swell_all(c, d);
+    double patches = c->tangle.n_away > 0 && !c->tangle.weighs ? pal_cell_tangle_force(&c->tangle, c->solid, d, f) : 0;
+    if (c->op == PAL_CELL_EDGES) return patches + pal_cells_edges_energy(c, d);
+    return patches + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
+}
+
+void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)
+{
+    all_blocks(c, PAL_CELL_CUBIC, 64, LINEARISE, d, NULL);
+    all_blocks(c, PAL_CELL_HEX, 8, LINEARISE, d, NULL);
+    all_blocks(c, PAL_CELL_PYRAMID, 5, LINEARISE, d, NULL);
+}
+
+PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, double k, const double *p,
+                             double *out)
+{
+    const pal_cell_group *group = &c->group[kind];
+    const pal_wide zero = {0};
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const int n_live = cell_live(group, b, l);
+            const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
+            pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
+            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
+            cell_gather(node, n_node, p, u);
+            cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
+            cell_unturn(r, n_node, u, u);
+            cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
+            if (c->volume.n > 0)
+                add_swelling(swell_at(group, n_node, b, l), n_node, give_swelling(c, group->home + b * PAL_LANES + l),
+                             u);
+            const pal_wide by =
+                c->tangle.n_away > 0 && !c->tangle.off ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
+            for (int i = 0; i < 9; i++) r[i] *= by;
+            cell_turn(r, n_node, u, u);
+            cell_scatter(node, n_node, n_live, u, out);
+        }
+}
+
+PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *p)
+{
+    const pal_cell_group *group = &c->group[kind];
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const int n_live = cell_live(group, b, l);
+            pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
+            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
+            cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
+            cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
+            cell_unturn(r, n_node, u, u);
+            take_swelling(c, group->home + b * PAL_LANES + l, n_live,
+                          swelling(swell_at(group, n_node, b, l), n_node, u));
+        }
+}
+
+/* the same of a motion p, at the last linearisation */
+static void swell_move(const pal_cells_elastic *c, const double *p)
+{
+    if (c->volume.n == 0) return;
+    memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
+    swell_kind(c, PAL_CELL_CUBIC, 64, p);
+    swell_kind(c, PAL_CELL_HEX, 8, p);
+    swell_kind(c, PAL_CELL_PYRAMID, 5, p);
+    find_push(c);
+}
+
+void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out)
+{
+    swell_move(c, p);
+    multiply_all(c, PAL_CELL_CUBIC, 64, k, p, out);
+    multiply_all(c, PAL_CELL_HEX, 8, k, p, out);
+    multiply_all(c, PAL_CELL_PYRAMID, 5, k, p, out);
+    if (c->tangle.n_away > 0 && !c->tangle.off) pal_cell_tangle_multiply(&c->tangle, c->solid, k, p, out);
+}
+
+void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
+{
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_cell_group *group = &c->group[kind];
+        double n[PAL_CELL_NODES_MOST], middle[3] = {0.5, 0.5, 0.5}, r[9];
+        pal_cell_shape(group->n_node, middle, n, NULL);
+        for (int e = 0; e < group->n; e++) {
+            const int b = e / PAL_LANES, l = e % PAL_LANES;
+            const int32_t *node = group->node + (size_t)b * (size_t)group->n_node * PAL_LANES + l;
+            for (int i = 0; i < 9; i++) r[i] = group->turn[((size_t)b * 9 + i) * PAL_LANES + l];
+            const int patch = c->tangle.patch[c->tangle.first[kind] + e];
+            if (patch >= 0 && !c->tangle.off) memcpy(r, c->tangle.of[patch].turn, sizeof r);
+            for (int m = 0; m < group->n_node; m++) {
+                double share = n[m] * c->tangle.shear_J[c->tangle.first[kind] + e];
+                for (int i = 0; i < 9; i++) turn[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
+            }
+        }
+    }
+}
+
+/* ---- turned over ---- */
+
+/* 8 corners of the cells of half a block, in the order of num/shape.h */
+PAL_INLINE void cell_corners(const int32_t *node, int n_node, const double *d, pal_wide (*x)[8])
+{
+    static const int own[8] = {21, 37, 25, 41, 22, 38, 26, 42}, base[8] = {0, 1, 3, 2, 4, 4, 4, 4};
+    for (int k = 0; k < 8; k++) {
+        const int m = n_node == PAL_CUBIC_NODES ? own[k] : n_node == PAL_PYRAMID_NODES ? base[k] : k;
+        for (int l = 0; l < PAL_WIDE; l++) {
+            const double *at = d + 3 * (size_t)node[m * PAL_LANES + l];
+            for (int i = 0; i < 3; i++) ((double *)&x[i][k])[l] = at[i];
+        }
+    }
+}
+
+/* det d(x, y, z)/d(u, v, w) at the 2 x 2 x 2 Gauss points: edges along each direction, mixed in the other two */
+PAL_INLINE void corner_volumes(pal_wide (*x)[8], pal_wide *det)
+{
+    const double near = 0.5 + sqrt(1.0 / 12), far = 1 - near;
+    pal_wide j[3][3][4]; /* direction, component, point in the other two */
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 3; i++) {
+            const int s = 1 << a, b = 1 << (a + 1) % 3, c = 1 << (a + 2) % 3;
+            pal_wide e0 = x[i][s] - x[i][0], e1 = x[i][s | b] - x[i][b], e2 = x[i][s | c] - x[i][c],
+                     e3 = x[i][7] - x[i][b | c];
+            pal_wide f0 = near * e0 + far * e1, f1 = far * e0 + near * e1, f2 = near * e2 + far * e3,
+                     f3 = far * e2 + near * e3;
+            j[a][i][0] = near * f0 + far * f2, j[a][i][1] = near * f1 + far * f3;
+            j[a][i][2] = far * f0 + near * f2, j[a][i][3] = far * f1 + near * f3;
+        }
+    for (int p = 0; p < 8; p++) {
+        const int u = p & 1, v = p >> 1 & 1, w = p >> 2;
+        const int at[3] = {v + 2 * w, w + 2 * u, u + 2 * v};
+        pal_wide a[3], b[3], e[3];
+        for (int i = 0; i < 3; i++) a[i] = j[0][i][at[0]], b[i] = j[1][i][at[1]], e[i] = j[2][i][at[2]];
+        det[p] = a[0] * (b[1] * e[2] - b[2] * e[1]) + a[1] * (b[2] * e[0] - b[0] * e[2]) +
+                 a[2] * (b[0] * e[1] - b[1] * e[0]);
+    }
+}
+
+/* 1 / volumes at rest; 0 at a point that is flat or turned over there: nothing is asked of it */
+void pal_cells_corners_make(pal_cells_elastic *c)
+{
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_cell_group *g = &c->group[kind];
+        for (int b = 0; b < g->n_block; b++)
+            for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+                pal_wide x[3][8], det[8], mean = {0};
+                cell_corners(g->node + (size_t)b * (size_t)g->n_node * PAL_LANES + l, g->n_node, c->solid->node_rest,
+                             x);
+                corner_volumes(x, det);
+                for (int p = 0; p < 8; p++) mean += 0.125 * det[p];
+                for (int p = 0; p < 8; p++)
+                    pal_wide_store(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l,
+                                   pal_wide_pick(det[p] > 0.01 * mean, 1 / det[p], 0 * mean));
+            }
+    }
+}
+
+PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d)
+{
+    const pal_cell_group *g = &c->group[kind];
+    double *least = c->tangle.ratio[0] + c->tangle.first[kind], *most = c->tangle.ratio[1] + c->tangle.first[kind];
+    for (int b = 0; b < g->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const pal_wide one = 1 - (pal_wide){0};
+            const int n_live = cell_live(g, b, l);
+            pal_wide x[3][8], det[8], low = one, high = one;
+            cell_corners(g->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, d, x);
+            corner_volumes(x, det);
+            for (int p = 0; p < 8; p++) {
+                pal_wide inverse = pal_wide_load(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l);
+                pal_wide ratio = pal_wide_pick(inverse > 0, det[p] * inverse, one);
+                low = pal_wide_pick(ratio < low, ratio, low), high = pal_wide_pick(ratio > high, ratio, high);
+            }
+            for (int k = 0; k < n_live; k++)
+                least[b * PAL_LANES + l + k] = low[k], most[b * PAL_LANES + l + k] = high[k];
+        }
+}
+
+void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d)
+{
+    ratios_of(c, PAL_CELL_CUBIC, 64, d);
+    ratios_of(c, PAL_CELL_HEX, 8, d);
+    ratios_of(c, PAL_CELL_PYRAMID, 5, d);
+}

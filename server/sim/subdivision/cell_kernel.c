@@ -1,0 +1,310 @@
+/* Elements of subdivided solids in their own frames: arrays, rest shapes and constants. */
+#include "server/sim/subdivision/cell_kernel.h"
+
+#include "server/num/polar.h"
+#include "server/sim/elements/elastic_law.h"
+#include "server/sim/subdivision/cell_lanes.h"
+
+#include <math.h>
+#include <string.h>
+
+/* gradients of the trilinear shape functions at the Gauss points */
+typedef double point_gradients[PAL_CELL_POINTS][8][3];
+
+/* ---- tables ---- */
+
+static void make_line(pal_cell_line *line)
+{
+    const double *t = pal_gauss4_at;
+    double b[4][4], d[4][4];
+    for (int p = 0; p < 4; p++) pal_spline(t[p], b[p], NULL);
+    /* slopes at t[p] of the cubic that is 1 at t[q] and 0 at the others (Lagrange) */
+    for (int p = 0; p < 4; p++)
+        for (int q = 0; q < 4; q++) {
+            double up = 1, down = 1;
+            for (int r = 0; r < 4; r++) {
+                if (r != q) down *= t[q] - t[r];
+                if (r != q && r != p) up *= t[p] - t[r];
+            }
+            d[p][q] = up / down;
+        }
+    for (int p = 0; p < 4; p++) {
+        d[p][p] = 0;
+        for (int r = 0; r < 4; r++)
+            if (r != p) d[p][p] += 1 / (t[p] - t[r]);
+    }
+    for (int p = 0; p < 2; p++) {
+        for (int q = 0; q < 2; q++) {
+            line->even[p][q] = 0.5 * (b[p][q] + b[p][3 - q]);
+            line->odd[p][q] = 0.5 * (b[p][q] - b[p][3 - q]);
+            line->slope_odd[p][q] = 0.5 * (d[p][q] - d[p][3 - q]);
+        }
+        line->bow[p] = 0.5 * (d[p][0] + d[p][3]);
+    }
+}
+
+static void trilinear_gradients(int n_node, point_gradients g)
+{
+    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        double at[3];
+        pal_cell_point(p, at);
+        pal_cell_shape(n_node, at, NULL, g[p]);
+    }
+}
+
+/* inverse by cofactors; returns the determinant */
+static double invert3(const double a[9], double inverse[9])
+{
+    double det = pal_det3(a);
+    inverse[0] = (a[4] * a[8] - a[5] * a[7]) / det, inverse[1] = (a[2] * a[7] - a[1] * a[8]) / det;
+    inverse[2] = (a[1] * a[5] - a[2] * a[4]) / det, inverse[3] = (a[5] * a[6] - a[3] * a[8]) / det;
+    inverse[4] = (a[0] * a[8] - a[2] * a[6]) / det, inverse[5] = (a[2] * a[3] - a[0] * a[5]) / det;
+    inverse[6] = (a[3] * a[7] - a[4] * a[6]) / det, inverse[7] = (a[1] * a[6] - a[0] * a[7]) / det;
+    inverse[8] = (a[0] * a[4] - a[1] * a[3]) / det;
+    return det;
+}
+
+/* ---- arrays ---- */
+
+static pal_err allocate(pal_cell_group *g, pal_arena *arena)
+{
+    const size_t n_block = (size_t)g->n_block, n_lane = n_block * PAL_LANES, n_node = (size_t)g->n_node;
+    g->node = PAL_NEW(arena, int32_t, n_lane * n_node);
+    g->rest = PAL_NEW(arena, double, n_lane *n_node * 3);
+    g->frame = PAL_NEW(arena, double, n_lane * 9);
+    g->q = PAL_NEW(arena, double, n_lane * 4);
+    g->turn = PAL_NEW(arena, double, n_lane * 9);
+    g->volume = PAL_NEW(arena, double, n_lane);
+    g->corner = PAL_NEW(arena, double, n_lane * 8);
+    g->here = PAL_NEW(arena, double, n_lane);
+    g->energy_J = PAL_NEW(arena, double, n_lane);
+    g->middle = (double(*)[3])PAL_NEW(arena, double, 3 * n_node);
+    bool all = g->node && g->rest && g->frame && g->q && g->turn && g->volume && g->middle && g->corner && g->here &&
+               g->energy_J;
+    if (g->n_node == PAL_CUBIC_NODES) {
+        g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 9);
+        g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 2);
+        return all && g->scale && g->stiff ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    }
+    g->k = PAL_NEW(arena, float, n_lane * 9 * (size_t)pal_cell_pairs(g->n_node));
+    return all && g->k ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* element of each lane: those behind the last repeat it */
+static int element_of(const pal_cell_group *g, int block, int lane)
+{
+    int e = block * PAL_LANES + lane;
+    return e < g->n ? e : g->n - 1;
+}
+
+/* sqrt(dV) J^-1 at the points and the volume of a cubic element */
+static double take_points(const double *x, const int32_t *node, double (*g)[PAL_CELL_NODES_MOST][3], float *scale)
+{
+    double volume = 0;
+    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        double at[3], J[9], inverse[9], weight = pal_cell_point(p, at);
+        double dv = weight * pal_solid_jacobian(x, node, PAL_CUBIC_NODES, g[p], J);
+        invert3(J, inverse);
+        double root = sqrt(dv);
+        for (int i = 0; i < 9; i++) scale[(size_t)(9 * p + i) * PAL_LANES] = (float)(root * inverse[i]);
+        volume += dv;
+    }
+    return volume;
+}
+
+static double trilinear_volume(const double *x, const int32_t *node, int n_node, point_gradients g)
+{
+    double volume = 0;
+    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        double at[3], J[9], weight = pal_cell_point(p, at);
+        volume += weight * pal_solid_jacobian(x, node, n_node, g[p], J);
+    }
+    return volume;
+}
+
+/* nodes, rest shape and frame of one lane; false: folded over in its middle */
+static bool take_lane(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *g, int block, int lane)
+{
+    const int32_t *node = pal_solid_nodes(solid, kind, element_of(g, block, lane));
+    const double *from = solid->node_rest + 3 * (size_t)node[cell_reference(g->n_node)];
+    const size_t b = (size_t)block, n_node = (size_t)g->n_node, l = (size_t)lane;
+    double J[9], inverse[9];
+    for (size_t m = 0; m < n_node; m++) {
+        g->node[(b * n_node + m) * PAL_LANES + l] = node[m];
+        for (size_t i = 0; i < 3; i++)
+            g->rest[((b * n_node + m) * 3 + i) * PAL_LANES + l] = solid->node_rest[3 * (size_t)node[m] + i] - from[i];
+    }
+    pal_solid_jacobian(solid->node_rest, node, g->n_node, g->middle, J);
+    if (!(invert3(J, inverse) > 0)) return false;
+    for (size_t i = 0; i < 9; i++) g->frame[(b * 9 + i) * PAL_LANES + l] = inverse[i];
+    return true;
+}
+
+static pal_err make_group(const pal_solid *solid, pal_cell_kind kind, pal_arena *arena, pal_cell_group *g,
+                          pal_note *note)
+{
+    double middle[3] = {0.5, 0.5, 0.5}, shape[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3];
+    point_gradients trilinear;
+    g->n_node = pal_cell_kind_nodes(kind), g->n = solid->elements.n[kind];
+    g->n_block = (g->n + PAL_LANES - 1) / PAL_LANES;
+    if (g->n == 0) return PAL_ERR_OK;
+    PAL_TRY(allocate(g, arena));
+    pal_cell_shape(g->n_node, middle, NULL, g->middle);
+    if (kind != PAL_CELL_CUBIC) trilinear_gradients(g->n_node, trilinear);
+    for (int p = 0; p < PAL_CELL_POINTS && kind == PAL_CELL_CUBIC; p++) {
+        double at[3];
+        pal_cell_point(p, at);
+        pal_cell_shape(g->n_node, at, NULL, shape[p]);
+    }
+    for (int b = 0; b < g->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l++) {
+            int e = element_of(g, b, l);
+            const int32_t *node = pal_solid_nodes(solid, kind, e);
+            if (!take_lane(solid, kind, g, b, l))
+                return pal_note_set(note, PAL_ERR_REFUSED,
+                                    "cell %d of the subdivided solid is folded over in its middle",
+                                    solid->elements.cell[kind][e]);
+            g->volume[b * PAL_LANES + l] =
+                kind == PAL_CELL_CUBIC
+                    ? take_points(solid->node_rest, node, shape, g->scale + (size_t)b * 64 * 9 * PAL_LANES + l)
+                    : trilinear_volume(solid->node_rest, node, g->n_node, trilinear);
+        }
+    return PAL_ERR_OK;
+}
+
+/* ---- constants ---- */
+
+/* Lame constants of the lanes of half a block at a point; of what is not shared with the control cell (cell_volume.c)
+ */
+static void lame_lanes(const pal_solid_samples *s, const pal_cell_group *g, bool shared, int block, int lane, int point,
+                       pal_wide *mu, pal_wide *lambda)
+{
+    for (int l = 0; l < PAL_WIDE; l++) {
+        size_t at = (size_t)element_of(g, block, lane + l) * PAL_CELL_POINTS + (size_t)point;
+        double m, la;
+        pal_lame((double)s->young_Pa[at], fmin((double)s->poisson[at], 0.4999), &m, &la);
+        (*mu)[l] = m, (*lambda)[l] = shared ? pal_cell_lambda_kept(m, la) : la;
+    }
+}
+
+static void fill_cubic(const pal_solid *solid, bool shared, pal_cell_group *g)
+{
+    for (int b = 0; b < g->n_block; b++)
+        for (int p = 0; p < PAL_CELL_POINTS; p++)
+            for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+                float *to = g->stiff + ((size_t)b * PAL_CELL_POINTS + (size_t)p) * 2 * PAL_LANES + l;
+                pal_wide mu, lambda;
+                lame_lanes(&solid->samples[PAL_CELL_CUBIC], g, shared, b, l, p, &mu, &lambda);
+                cell_store_float(to, mu), cell_store_float(to + PAL_LANES, lambda);
+            }
+}
+
+/* gradients by x of nodes 1.. at a point and its volume */
+static inline pal_wide rest_gradients(const double *rest, int n_node, double (*dn)[3], double weight, pal_wide g[8][3])
+{
+    pal_wide J[9], c[9];
+    for (int i = 0; i < 9; i++) J[i] = (pal_wide){0};
+    for (int m = 1; m < n_node; m++)
+        for (int i = 0; i < 3; i++) {
+            pal_wide x = pal_wide_load(rest + (3 * m + i) * PAL_LANES);
+            for (int j = 0; j < 3; j++) J[3 * i + j] += x * dn[m][j];
+        }
+    /* cofactors: J^-T = c / det */
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
+            c[3 * i + j] = J[3 * a + p] * J[3 * b + q] - J[3 * a + q] * J[3 * b + p];
+        }
+    pal_wide det = J[0] * c[0] + J[1] * c[1] + J[2] * c[2];
+    for (int m = 1; m < n_node; m++)
+        for (int i = 0; i < 3; i++)
+            g[m][i] = (c[3 * i] * dn[m][0] + c[3 * i + 1] * dn[m][1] + c[3 * i + 2] * dn[m][2]) / det;
+    return weight * det;
+}
+
+/* K_ab = int mu (g_b g_a' + g_a.g_b I - 2/3 g_a g_b') dV + k_a k_b' / int kappa dV, k_a = int kappa g_a dV, kappa =
+ * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
+ * `mean`: K of A 3.2, int B' C B dV */
+static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn, bool mean,
+                      bool shared, int block, int lane)
+{
+    const int n_node = group->n_node, n_pair = pal_cell_pairs(n_node);
+    const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
+    float *to = group->k + (size_t)block * 9 * (size_t)n_pair * PAL_LANES + lane;
+    pal_wide k[28][9], g[8][3], swell[8][3], mu, lambda, all = {0};
+    for (int i = 0; i < 9 * n_pair; i++) k[i / 9][i % 9] = (pal_wide){0};
+    for (int i = 0; i < 3 * n_node; i++) swell[i / 3][i % 3] = (pal_wide){0};
+    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        double at[3], weight = pal_cell_point(p, at);
+        pal_wide volume = rest_gradients(rest, n_node, dn[p], weight, g);
+        lame_lanes(&solid->samples[kind], group, shared, block, lane, p, &mu, &lambda);
+        mu *= volume;
+        pal_wide kappa = lambda * volume + mu * (2.0 / 3), outer = mean ? mu * (-2.0 / 3) : lambda * volume;
+        all += kappa;
+        for (int a = 1, pair = 0; a < n_node; a++) {
+            pal_wide m[3], la[3];
+            for (int i = 0; i < 3; i++) m[i] = mu * g[a][i], la[i] = outer * g[a][i], swell[a][i] += kappa * g[a][i];
+            for (int b = 1; b <= a; b++, pair++) {
+                pal_wide dot = m[0] * g[b][0] + m[1] * g[b][1] + m[2] * g[b][2];
+                for (int i = 0; i < 3; i++)
+                    for (int j = 0; j < 3; j++) k[pair][3 * i + j] += la[i] * g[b][j] + g[b][i] * m[j];
+                for (int i = 0; i < 3; i++) k[pair][4 * i] += dot;
+            }
+        }
+    }
+    for (int a = 1, pair = 0; a < n_node && mean; a++)
+        for (int b = 1; b <= a; b++, pair++)
+            for (int i = 0; i < 9; i++) k[pair][i] += swell[a][i / 3] * swell[b][i % 3] / all;
+    for (int a = 1, pair = 0; a < n_node; pair += a++) /* the same bits on both sides of the diagonal */
+        k[pair + a - 1][3] = k[pair + a - 1][1], k[pair + a - 1][6] = k[pair + a - 1][2],
+                     k[pair + a - 1][7] = k[pair + a - 1][5];
+    for (int i = 0; i < 9 * n_pair; i++) cell_store_float(to + (size_t)i * PAL_LANES, k[i / 9][i % 9]);
+}
+
+static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean, bool shared)
+{
+    point_gradients dn;
+    trilinear_gradients(group->n_node, dn);
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, mean, shared, b, l);
+}
+
+void pal_cells_elastic_refresh(pal_cells_elastic *c)
+{
+    if (c->sampled == c->solid->sampled) return;
+    c->sampled = c->solid->sampled;
+    pal_kept_forget(&c->kept);
+    const bool shared = c->volume.n > 0, mean = c->op == PAL_CELL_POLAR;
+    fill_cubic(c->solid, shared, &c->group[PAL_CELL_CUBIC]);
+    fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, shared);
+    fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean, shared);
+    pal_cell_volume_refresh(c);
+    pal_cell_tangle_refresh(&c->tangle, c);
+}
+
+void pal_cells_elastic_reset(pal_cells_elastic *c)
+{
+    pal_kept_forget(&c->kept);
+    pal_cell_tangle_reset(&c->tangle, c);
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_cell_group *g = &c->group[kind];
+        for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;
+        for (int i = 0; i < 9 * PAL_LANES * g->n_block; i++) g->turn[i] = i / PAL_LANES % 9 % 4 == 0;
+    }
+}
+
+pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal_arena *arena, pal_cells_elastic *out,
+                               pal_note *note)
+{
+    memset(out, 0, sizeof *out);
+    out->solid = solid, out->op = op;
+    make_line(&out->line);
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        PAL_TRY(make_group(solid, kind, arena, &out->group[kind], note));
+    PAL_TRY(pal_cell_tangle_make(solid, arena, &out->tangle));
+    pal_cells_corners_make(out);
+    PAL_TRY(pal_cell_volume_make(out, arena));
+    pal_cells_elastic_reset(out);
+    pal_cells_elastic_refresh(out);
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,135 @@
+/* Elements of a subdivided solid that follow their own frames (A 3.2-3.4): forces, energy, tangent and measures.
+ *
+ * With Q the polar rotation of F at an element's middle, y = x - x_0 its nodes from one of them, X the same at rest:
+ *     d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, by 64 Gauss points,
+ * with gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. Departure: of trilinear
+ * elements and pyramids under operator polar the change of volume in K is the element's mean (B-bar). The force is the
+ * whole gradient of E: with g = K d^, the turning of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE = t.w with
+ * t = -sum (Q'y) x g, and (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF bears Q [z], z = (tr S I - S)^-1 t, at
+ * the middle. E does not change when the body is turned, and so the forces have no net force and no net torque.
+ * Near a flat or collapsed middle, where det(tr S I - S) is below 1e-3 of (tr)^3, z fades to 0 with it.
+ *
+ * Eight elements of a kind stand side by side (a block). Cubic ones have no stored K: it is applied by sum
+ * factorisation over the 4 x 4 x 4 points. Trilinear ones have K without their node 0, which takes minus the sum.
+ * K is rounded to float where it is stored; sums are double.
+ * All memory from the arena. Thread: make [load], else [sim]; energy and force move the rotations' warm start. */
+#ifndef PAL_SIM_CELL_KERNEL_H
+#define PAL_SIM_CELL_KERNEL_H
+#include "server/num/blocks.h"
+#include "server/sim/core/kept.h"
+#include "server/sim/subdivision/cell_tangle.h"
+#include "server/sim/subdivision/solid.h"
+
+typedef enum pal_cell_operator {
+    PAL_CELL_POLAR, /* d^ = Q'y - X                                                            */
+    PAL_CELL_EDGES, /* d^ = R d of A 3.2.2 with errata A5 to A8 (cell_operator.c); no gradient */
+} pal_cell_operator;
+
+/* the line of four: coefficients of even and odd parts (cell_lanes.h) */
+typedef struct pal_cell_line {
+    double even[2][2], odd[2][2];   /* B at the points: half sums and differences of its columns      */
+    double slope_odd[2][2], bow[2]; /* derivative at the points of a cubic from its values there      */
+} pal_cell_line;
+
+/* elements of one kind; lanes behind the last element repeat it and give nothing */
+typedef struct pal_cell_group {
+    int n_node, n, n_block;
+    int32_t *node;       /* [n_block][n_node][8]                                  */
+    double *rest;        /* X, m                          [n_block][n_node][3][8] */
+    double *frame;       /* J^-1 in the middle, 1/m               [n_block][9][8] */
+    double *q;           /* rotation, w x y z                     [n_block][4][8] */
+    double *turn;        /* Q of the last linearise               [n_block][9][8] */
+    double *volume;      /* m^3                                      [n_block][8] */
+    double (*middle)[3]; /* grad N in the middle, d/d(u, v, w)           [n_node] */
+    float *scale;        /* cubic: sqrt(dV) J^-1, row = u, v, w [n_block][64][9][8] */
+    float *stiff;        /* cubic: mu, lambda, Pa             [n_block][64][2][8] */
+    float *k;            /* others: blocks K_ab, b <= a, of nodes 1.., N/m
+                                                  [n_block][pairs][9][8] */
+    double *corner;      /* 1 / volume at rest at the 8 points that look for turned over elements [n_block][8][8] */
+    double *here;        /* 1: an element, 0: part of a patch (cell_tangle.h)      [n_block][8] */
+    double *energy_J;    /* of each element when energy was asked for last         [n_block][8] */
+    int32_t *home;       /* control cell of each element, where changes of volume have theirs [n_block][8] */
+    double *swell;       /* int kappa grad N dV, J/m, kappa of what they share          [n_block][n_node][3][8] */
+    int n_slow;          /* rotations of the last call that vectors did not settle */
+} pal_cell_group;
+
+/* changes of volume that control cells share (cell_volume.c); n 0: each element has its own */
+typedef struct pal_cell_volume {
+    int n;         /* control cells */
+    double *sum;   /* int kappa tr(strain) dV, J            [n] */
+    double *share; /* 1 / int kappa dV, 1/J                 [n] */
+    double *push;  /* sum times share: mean strain of the cell [n] */
+    pal_cliques couple;
+} pal_cell_volume;
+
+typedef struct pal_cells_elastic {
+    const pal_solid *solid;
+    pal_cell_operator op;
+    uint64_t sampled; /* of the solid, what the constants were made for */
+    pal_kept kept;    /* made by the row, of PAL_CELL_POLAR under an implicit solver */
+    pal_cell_tangle tangle;
+    pal_cell_volume volume;
+    pal_cell_line line;
+    pal_cell_group group[PAL_CELL_KINDS];
+} pal_cells_elastic;
+
+/* lambda of an element's own where its control cell has the rest */
+static inline double pal_cell_lambda_kept(double mu, double lambda)
+{
+    return lambda < mu ? lambda : mu;
+}
+static inline int pal_cell_pairs(int n_node)
+{
+    return (n_node - 1) * n_node / 2;
+}
+
+/* REFUSED: an element that is folded over in its middle, with its cell; MEMORY. The solid is borrowed */
+pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal_arena *arena, pal_cells_elastic *out,
+                               pal_note *note);
+/* constants anew where the solid has other samples than they were made for; no heap */
+void pal_cells_elastic_refresh(pal_cells_elastic *c);
+void pal_cells_elastic_reset(pal_cells_elastic *c); /* rotations are none again */
+
+/* cell_volume.c: arrays where the solid's largest Poisson ratio asks for it, and their constants; MEMORY */
+pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena);
+void pal_cell_volume_refresh(pal_cells_elastic *c);
+
+/* f [n][3] += forces at nodes d [n][3] */
+void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f);
+/* E, J; of PAL_CELL_EDGES 1/2 d^' K d^ of its own d^, of which the forces are no gradient. f: forces of PAL_CELL_POLAR
+ * are added too; NULL: none */
+double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f);
+/* takes Q at d, then out += k sum Q K Q' p: the tangent with rotations held (of both operators) */
+void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d);
+void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out);
+/* least and largest volume of every element over that at rest, at the 2 x 2 x 2 Gauss points of its cell, to
+ * tangle.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
+void pal_cells_corners_make(pal_cells_elastic *c);
+void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
+/* turn [n][9] += Q by the elements' stiffness, mu V, at their nodes */
+void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn);
+
+/* forces and energy of PAL_CELL_EDGES (cell_operator.c) */
+void pal_cells_edges_force(pal_cells_elastic *c, const double *d, double *f);
+double pal_cells_edges_energy(pal_cells_elastic *c, const double *d);
+/* d^ of one element in its own axes, as the operator of c has it [n_node][3]: for tests and views */
+void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out);
+
+/* what stands at the Gauss points of one element; strain and stress small, in the element's axes */
+typedef struct pal_cell_points {
+    double volume_m3[PAL_CELL_POINTS]; /* at rest; their sum is the element's */
+    double strain[PAL_CELL_POINTS][6]; /* xx yy zz yz zx xy, not doubled      */
+    double von_mises_Pa[PAL_CELL_POINTS], energy_J_m3[PAL_CELL_POINTS];
+    double det_f[PAL_CELL_POINTS];   /* volume now over volume at rest      */
+    double stretch[PAL_CELL_POINTS]; /* largest principal stretch less 1 */
+    double turn[9];                  /* Q                                   */
+} pal_cell_points;
+/* the same for both operators */
+void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,
+                              pal_cell_points *out);
+/* one number of a Gauss point: what a view shows */
+typedef double pal_cell_value(const pal_cell_points *points, int p);
+/* sum [n] += value times volume at the nodes by their shape functions, volume_m3 [n] += volume; all elements */
+void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_cell_value *value, double *sum,
+                               double *volume_m3);
+#endif

@@ -1,0 +1,141 @@
+/* Changes of volume of nearly incompressible solids, one for a whole control cell.
+ *
+ * A subdivided solid has few control points for its many elements (125 for 512 in a cube of 4 cells a side): keeping
+ * the volume of each is more than they can, and they lock: by 8 % where a beam bends that is two cells across at nu
+ * 0.45. Above nu = 0.3 a part of what a change of volume takes is therefore that of the mean over all elements of a
+ * control cell, as the mean dilatation of one element is for its points (Hughes 1980), each element's strain in its own
+ * frame:
+ *
+ *     E_c = 1/2 (sum_e b_e.d^_e)^2 / int kappa dV,   b_e = int kappa grad N dV,   kappa = lambda - min(lambda, mu),
+ *
+ * and elements keep K of min(lambda, mu), as at nu = 0.25. Were all of it the cell's (kappa = lambda + 2/3 mu), one
+ * side of a cell could swell for nothing while the other one shrinks: a beam of one cell across bends twice as far as
+ * it should, with mu kept 5 to 9 % farther, and two or three cells across are 2 to 3 and 1 to 1.6 % too stiff at any
+ * nu. E is a function of the d^ as before, and so are forces, momentum and tangent (cell_kernel.h). It takes a second
+ * pass over the elements. */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/sim/elements/elastic_law.h"
+#include "server/sim/subdivision/cell_kernel.h"
+
+#include <math.h>
+#include <string.h>
+
+static const float from_poisson = 0.3f; /* as samples are */
+
+static bool asked(const pal_cells_elastic *c)
+{
+    float most = 0;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (size_t i = 0; i < (size_t)c->solid->elements.n[kind] * PAL_CELL_POINTS; i++)
+            most = fmaxf(most, c->solid->samples[kind].poisson[i]);
+    return c->op == PAL_CELL_POLAR && most > from_poisson;
+}
+
+static int32_t home_of(const pal_solid *solid, pal_cell_kind kind, int element)
+{
+    return solid->subdivision.cell_origin[solid->elements.cell[kind][element]];
+}
+
+/* all nodes of each control cell's elements, for those who want to know what moves what */
+static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
+{
+    const pal_solid *solid = c->solid;
+    const int n = c->volume.n;
+    int32_t *count = PAL_NEW(arena, int32_t, n), *node;
+    int most = 1;
+    if (!count) return PAL_ERR_MEMORY;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (int e = 0; e < solid->elements.n[kind]; e++) {
+            int32_t *to = &count[home_of(solid, kind, e)];
+            *to += pal_cell_kind_nodes(kind);
+            most = *to > most ? *to : most;
+        }
+    node = PAL_NEW(arena, int32_t, (size_t)n * (size_t)most);
+    if (!node) return PAL_ERR_MEMORY;
+    memset(count, 0, sizeof *count * (size_t)n);
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (int e = 0; e < solid->elements.n[kind]; e++) {
+            const int32_t home = home_of(solid, kind, e);
+            const int n_node = pal_cell_kind_nodes(kind);
+            memcpy(node + (size_t)home * (size_t)most + count[home], pal_solid_nodes(solid, kind, e),
+                   sizeof *node * (size_t)n_node);
+            count[home] += n_node;
+        }
+    for (int i = 0; i < n; i++)
+        for (int k = count[i]; k < most; k++)
+            node[(size_t)i * (size_t)most + (size_t)k] = node[(size_t)i * (size_t)most];
+    c->volume.couple = (pal_cliques){.n_item = n, .n_corner = most, .node = node};
+    return PAL_ERR_OK;
+}
+
+pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena)
+{
+    const pal_solid *solid = c->solid;
+    c->volume = (pal_cell_volume){.n = 0};
+    if (!asked(c)) return PAL_ERR_OK;
+    int n = 0;
+    for (int i = 0; i < solid->subdivision.cells.n_cell; i++)
+        n = solid->subdivision.cell_origin[i] >= n ? solid->subdivision.cell_origin[i] + 1 : n;
+    c->volume.sum = PAL_NEW(arena, double, n);
+    c->volume.share = PAL_NEW(arena, double, n);
+    c->volume.push = PAL_NEW(arena, double, n);
+    if (!c->volume.sum || !c->volume.share || !c->volume.push) return PAL_ERR_MEMORY;
+    c->volume.n = n;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        pal_cell_group *g = &c->group[kind];
+        const size_t n_lane = (size_t)g->n_block * PAL_LANES;
+        if (n_lane == 0) continue;
+        g->home = PAL_NEW(arena, int32_t, n_lane);
+        g->swell = PAL_NEW(arena, double, n_lane *(size_t)g->n_node * 3);
+        if (!g->home || !g->swell) return PAL_ERR_MEMORY;
+        for (int i = 0; i < (int)n_lane; i++) g->home[i] = home_of(solid, kind, i < g->n ? i : g->n - 1);
+    }
+    return couple(c, arena);
+}
+
+/* b of one element; returns int kappa dV */
+static double swell_of(const pal_solid *solid, pal_cell_kind kind, int element, double (*dn)[PAL_CELL_NODES_MOST][3],
+                       double b[PAL_CELL_NODES_MOST][3])
+{
+    const int32_t *node = pal_solid_nodes(solid, kind, element);
+    const int n_node = pal_cell_kind_nodes(kind);
+    const size_t first = (size_t)element * PAL_CELL_POINTS;
+    double all = 0;
+    memset(b, 0, sizeof *b * PAL_CELL_NODES_MOST);
+    for (size_t p = 0; p < PAL_CELL_POINTS; p++) {
+        const pal_solid_samples *s = &solid->samples[kind];
+        double J[9], cofactor[9], mu, lambda;
+        const double det = pal_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
+        pal_cofactor3(J, cofactor);
+        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], 0.4999), &mu, &lambda);
+        const double kappa_J = (lambda - pal_cell_lambda_kept(mu, lambda)) * s->volume_m3[first + p];
+        all += kappa_J;
+        /* J^-T = cofactor / det */
+        for (int m = 0; m < n_node; m++)
+            for (int i = 0; i < 3; i++) b[m][i] += kappa_J / det * pal_dot3(cofactor + 3 * i, dn[p][m]);
+    }
+    return all;
+}
+
+void pal_cell_volume_refresh(pal_cells_elastic *c)
+{
+    if (c->volume.n == 0) return;
+    memset(c->volume.share, 0, sizeof(double) * (size_t)c->volume.n);
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_cell_group *g = &c->group[kind];
+        double dn[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3], b[PAL_CELL_NODES_MOST][3];
+        for (int p = 0; p < PAL_CELL_POINTS && g->n > 0; p++) {
+            double at[3];
+            pal_cell_point(p, at);
+            pal_cell_shape(g->n_node, at, NULL, dn[p]);
+        }
+        for (int i = 0; i < g->n_block * PAL_LANES; i++) {
+            const double all = swell_of(c->solid, kind, i < g->n ? i : g->n - 1, dn, b);
+            double *to = g->swell + (size_t)(i / PAL_LANES) * (size_t)g->n_node * 3 * PAL_LANES + i % PAL_LANES;
+            for (int k = 0; k < 3 * g->n_node; k++) to[(size_t)k * PAL_LANES] = b[k / 3][k % 3];
+            if (i < g->n) c->volume.share[g->home[i]] += all;
+        }
+    }
+    for (int i = 0; i < c->volume.n; i++) c->volume.share[i] = c->volume.share[i] > 0 ? 1 / c->volume.share[i] : 0;
+}

@@ -1,0 +1,69 @@
+/* What the row refine decides on: external force, speed and change of curvature at the active nodes of a shell, and
+ * what is kept at a switch of level (C, criterion for refinement and simplification). Private to sim.
+ * Thread: [sim], make [load]; no heap in [sim]. */
+#ifndef PAL_SIM_REFINE_MEASURE_H
+#define PAL_SIM_REFINE_MEASURE_H
+#include "server/sim/core/effect.h"
+#include "server/sim/surface/shell.h"
+
+/* thresholds at a node of level 0; 0: the criterion is off. A node asks for finer faces beyond a threshold, and is
+ * quiet below half of what would be the threshold on the level above */
+typedef struct pal_refine_limits {
+    double force_N; /* of the loads of tools and of lasting ones; force_N m/m_0 at a node of mass m, so that nodes that
+                     * share a load after a split stay on the same side of it                             */
+    double speed_m_s;     /* relative to the body's best-fit rigid motion; the same on all levels               */
+    double curvature_1_m; /* change against rest of the mean over a node's springs of 2 n.d/d.d, n the normal of its
+                           * triangles, d the way along the spring: the mean normal curvature, 1/radius.
+                           * curvature_1_m sqrt(m_0/m) at a node of mass m, which is in proportion to 1/edge: what
+                           * counts is how far the surface turns from one node to the next */
+} pal_refine_limits;
+
+/* a node whose numbers are not finite is BETWEEN: it asks for nothing and nothing is taken from it */
+typedef enum pal_refine_mark {
+    PAL_REFINE_QUIET,   /* of every criterion */
+    PAL_REFINE_BETWEEN, /* neither            */
+    PAL_REFINE_STRONG   /* beyond a threshold */
+} pal_refine_mark;
+
+typedef struct pal_refine_measure {
+    double *sum;            /* of a node: normals of triangles 3, d/d.d of springs 3, springs, free [n_vertex][8] */
+    double *rest_curvature; /* 1/m, at the present nodes                                            [n_vertex]    */
+    uint8_t *mark;          /* pal_refine_mark of the nodes of the last call                        [n_vertex]    */
+    pal_shell_frame frame;
+    uint64_t revision; /* of the shell that rest_curvature belongs to */
+    bool known;
+} pal_refine_measure;
+
+/* MEMORY */
+pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_shell *shell, pal_arena *arena);
+/* marks every active node; about 60 ns a node with all criteria on */
+void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_shell *shell, const pal_body *body,
+                           const pal_refine_limits *limits);
+/* curvature in places x [n_vertex][3] at the nodes, 1/m; NaN where the triangles have no area together. out is
+ * [n_vertex], written at nodes only, and may be measure->rest_curvature */
+void pal_refine_curvature(pal_refine_measure *measure, const pal_shell *shell, const double *x, double *out);
+
+/* one side of a switch of level */
+typedef struct pal_switch_side {
+    double mass_kg;
+    double momentum_kg_m_s[3], turn_kg_m2_s[3]; /* of the free nodes; angular momentum about the body frame's origin */
+    double kinetic_J, spring_J, shape_J;        /* springs and anchors with their ramps                              */
+    double other_J;                             /* FORCE rows beside edge_spring and shape_spring                    */
+} pal_switch_side;
+static inline double pal_switch_total_J(const pal_switch_side *s)
+{
+    return s->kinetic_J + s->spring_J + s->shape_J + s->other_J;
+}
+/* sums at the body's present state */
+void pal_switch_take(pal_switch_side *side, const pal_step *step);
+
+/* all that one evaluation changed is one switch */
+typedef struct pal_switch_report {
+    uint64_t n_switch;                  /* since reset                                   */
+    uint64_t n_split, n_join;           /* faces, since reset                          */
+    double time_s;                      /* of the last switch, simulated since reset     */
+    pal_switch_side before, raw, after; /* raw: before anything was corrected */
+} pal_switch_report;
+/* of a row refine (pal_row.self), for tests and tools; lives as long as the row */
+const pal_switch_report *pal_refine_report(const void *self);
+#endif

@@ -1,0 +1,239 @@
+/* Where the nodes of one body lie in the elements of another (transfer.h). */
+#include "server/sim/transfer/transfer_parts.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/volume/locate.h"
+#include "server/num/shape.h"
+#include "server/sim/core/effect_list.h"
+#include "server/sim/subdivision/solid.h"
+#include "server/sim/surface/shell.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define MOST_ENTRY ((int64_t)1 << 28)
+
+/* a body by its model alone, without rows and supports */
+typedef struct bare {
+    pal_arena *arena;
+    pal_body body;
+    double origin_m[3];
+    pal_tets tets; /* a solid's elements as tetrahedra; x is the body's */
+    pal_locate *locate;
+} bare;
+
+static void free_bare(bare *b)
+{
+    pal_locate_destroy(b->locate);
+    free(b->tets.tet);
+    pal_solid_free(b->body.solid);
+    pal_arena_destroy(b->arena);
+}
+
+static pal_err make_bare(const pal_scene *scene, int index, pal_note *note, bare *out)
+{
+    const pal_body_def *def = &scene->body[index];
+    const pal_model *model = pal_model_find(def->model.name);
+    if (!model)
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", def->name, def->model.name);
+    out->arena = pal_arena_create(1 << 16, true);
+    pal_recipe *recipe = malloc(sizeof *recipe);
+    pal_item item = def->model;
+    pal_build build = {.scene = scene, .def = def, .body = &out->body, .arena = out->arena, .note = note};
+    out->body.name = def->name;
+    pal_err err = out->arena && recipe ? model->build(&item, &build, recipe) : PAL_ERR_MEMORY;
+    free(recipe);
+    pal_copy3(out->origin_m, def->mesh->tets.n_node > 0 ? def->mesh->tets.origin_m : def->mesh->surface.origin_m);
+    return err;
+}
+
+/* ---- elements to look in ---- */
+
+static double six_volumes(const double *x, const int32_t *c)
+{
+    double e[3][3], n[3];
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], x + 3 * (size_t)c[k + 1], x + 3 * (size_t)c[0]);
+    pal_cross3(n, e[1], e[2]);
+    return pal_dot3(e[0], n);
+}
+
+/* one more tetrahedron, turned the right way; a flat one holds no point */
+static void add_tet(bare *b, const int32_t *node, const int corner[4])
+{
+    int32_t *c = b->tets.tet + 4 * (size_t)b->tets.n_tet;
+    for (int k = 0; k < 4; k++) c[k] = node[corner[k]];
+    double six = six_volumes(b->tets.x, c), h = b->body.h_m;
+    if (!(fabs(six) > 1e-9 * h * h * h)) return;
+    if (six < 0) {
+        int32_t swap = c[2];
+        c[2] = c[3], c[3] = swap;
+    }
+    b->tets.n_tet++;
+}
+
+/* hexahedra as five tetrahedra each, a cubic element by the corners of its cell, pyramids as two */
+static pal_err cut_solid(bare *b)
+{
+    static const int hex[5][4] = {{0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}, {1, 2, 4, 7}};
+    static const int pyramid[2][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}};
+    const pal_solid *s = b->body.solid;
+    size_t most = 5 * ((size_t)s->elements.n[PAL_CELL_CUBIC] + (size_t)s->elements.n[PAL_CELL_HEX]) +
+                  2 * (size_t)s->elements.n[PAL_CELL_PYRAMID];
+    b->tets = (pal_tets){.n_node = b->body.n_node, .x = b->body.node_rest, .h_m = b->body.h_m};
+    b->tets.tet = malloc(4 * sizeof(int32_t) * (most + 1));
+    if (!b->tets.tet) return PAL_ERR_MEMORY;
+    for (int kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (int e = 0; e < s->elements.n[kind]; e++) {
+            const int32_t *node = pal_solid_nodes(s, (pal_cell_kind)kind, e);
+            int32_t corner[8];
+            for (int c = 0; c < 8 && kind == PAL_CELL_CUBIC; c++)
+                corner[c] = node[16 * (1 + (c & 1)) + 4 * (1 + (c >> 1 & 1)) + 1 + (c >> 2)];
+            if (kind == PAL_CELL_CUBIC) node = corner;
+            for (int k = 0; k < 5 && kind != PAL_CELL_PYRAMID; k++) add_tet(b, node, hex[k]);
+            for (int k = 0; k < 2 && kind == PAL_CELL_PYRAMID; k++) add_tet(b, node, pyramid[k]);
+        }
+    return PAL_ERR_OK;
+}
+
+static pal_err make_locate(bare *b, pal_note *note)
+{
+    const pal_body *body = &b->body;
+    const pal_tets *tets = body->tets;
+    if (body->solid) {
+        PAL_TRY(cut_solid(b));
+        tets = &b->tets;
+    }
+    pal_err err =
+        tets ? pal_locate_create(tets, body->n_corner == 8 ? body->hexes : NULL, &b->locate) : PAL_ERR_REFUSED;
+    if (err == PAL_ERR_REFUSED)
+        return pal_note_set(note, err, "body \"%s\": it has no elements to be switched from or to", body->name);
+    return err;
+}
+
+/* ---- rows ---- */
+
+/* local coordinates that go beyond an element by as much as it is wide at most */
+static void hold_near(int n_corner, double local[4])
+{
+    double share = 1;
+    if (n_corner == 8) {
+        for (int k = 0; k < 3; k++)
+            if (fabs(local[k]) * share > 3) share = 3 / fabs(local[k]);
+        for (int k = 0; k < 3; k++) local[k] *= share;
+        return;
+    }
+    for (int k = 0; k < 4; k++)
+        if (0.25 + share * (local[k] - 0.25) < -1) share = 1.25 / (0.25 - local[k]);
+    for (int k = 0; k < 4; k++) local[k] = 0.25 + share * (local[k] - 0.25);
+}
+
+/* the row of a point that is in no one's rows yet */
+static void add_point(const bare *in, const double x[3], pal_row_build *rows)
+{
+    const pal_body *body = &in->body;
+    double local[4], weight[PAL_CORNERS_MOST];
+    int n = body->n_corner == 8 || body->n_corner == 10 ? body->n_corner : 4;
+    int e = pal_locate_point(in->locate, x, local, NULL);
+    hold_near(n, local);
+    if (n == 8)
+        pal_hex_shape(local, weight, NULL);
+    else if (n == 10)
+        pal_tet10_shape(local, weight, NULL);
+    else
+        memcpy(weight, local, sizeof local);
+    const int32_t *node = n == 4 ? (body->solid ? in->tets.tet : body->tets->tet) : body->element;
+    for (int c = 0; c < n; c++)
+        if (fabs(weight[c]) > 1e-12) pal_row_add(rows, node[(size_t)n * (size_t)e + (size_t)c], weight[c]);
+    pal_row_end(rows);
+}
+
+/* nodes of `of` by those of `in` */
+static pal_err make_rows(const bare *of, const bare *in, pal_point_rows *out)
+{
+    pal_row_build rows;
+    pal_row_build_begin(&rows, of->body.n_node, in->body.n_node, MOST_ENTRY);
+    for (int i = 0; i < of->body.n_node && !rows.err; i++) {
+        double x[3];
+        for (int c = 0; c < 3; c++) x[c] = of->body.node_rest[3 * i + c] + of->origin_m[c] - in->origin_m[c];
+        add_point(in, x, &rows);
+    }
+    return pal_row_build_finish(&rows, out);
+}
+
+static bool same_cells(const pal_scene *a, const pal_scene *b, int body)
+{
+    const pal_cells *p = a->body[body].cells, *q = b->body[body].cells;
+    return p && q && p->n_vertex == q->n_vertex && p->n_cell == q->n_cell &&
+           !memcmp(p->x, q->x, 3 * sizeof *p->x * (size_t)p->n_vertex);
+}
+
+/* the same coarse triangles: then all that the coarser of both has is in the finer one under the same numbers */
+static bool same_surface(const pal_surface *a, const pal_surface *b)
+{
+    return a->n_vertex == b->n_vertex && a->n_tri == b->n_tri &&
+           !memcmp(a->x, b->x, 3 * sizeof *a->x * (size_t)a->n_vertex) &&
+           !memcmp(a->tri, b->tri, 3 * sizeof *a->tri * (size_t)a->n_tri);
+}
+
+static pal_err take_room(pal_transfer *t)
+{
+    size_t dof = 3 * (size_t)t->n_dof + 1, to = 3 * (size_t)t->n_to + 1, from = 3 * (size_t)t->n_from + 1;
+    bool all = (t->x = calloc(dof, sizeof(double))) && (t->v = calloc(dof, sizeof(double))) &&
+               (t->place = calloc(to, sizeof(double))) && (t->rate = calloc(to, sizeof(double))) &&
+               (t->pull = calloc(to, sizeof(double))) && (t->bound = calloc(to, sizeof(double))) &&
+               (t->old = calloc(from, sizeof(double))) && (t->load = calloc(from, sizeof(double))) &&
+               (t->moving = calloc(from, sizeof(double)));
+    for (int k = 0; k < 5; k++) all = (t->work[k] = calloc(dof, sizeof(double))) && all;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, bare *a, bare *b,
+                    pal_transfer *t)
+{
+    PAL_TRY(make_bare(from, body, note, a));
+    PAL_TRY(make_bare(to, body, note, b));
+    t->body = body;
+    t->shell = a->body.shell != NULL;
+    t->same_points = a->body.solid && b->body.solid && same_cells(from, to, body);
+    t->n_from = a->body.n_node, t->n_to = b->body.n_node, t->n_dof = b->body.n_dof;
+    if (!a->body.shell != !b->body.shell)
+        return pal_note_set(note, PAL_ERR_REFUSED,
+                            "body \"%s\": a surface that adapts and a full body are no one thing",
+                            from->body[body].name);
+    if (t->shell && !same_surface(&from->body[body].mesh->surface, &to->body[body].mesh->surface))
+        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": another surface", from->body[body].name);
+    PAL_TRY(take_room(t));
+    if (t->shell) return PAL_ERR_OK;
+    PAL_TRY(make_locate(a, note));
+    PAL_TRY(make_locate(b, note));
+    PAL_TRY(make_rows(b, a, &t->in));
+    return make_rows(a, b, &t->back);
+}
+
+pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, pal_transfer **out)
+{
+    bare *two = calloc(2, sizeof *two);
+    pal_transfer *t = calloc(1, sizeof *t);
+    pal_err err = two && t ? make(from, to, body, note, &two[0], &two[1], t) : PAL_ERR_MEMORY;
+    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "no memory to switch body \"%s\"", from->body[body].name);
+    for (int k = 0; k < 2 && two; k++) free_bare(&two[k]);
+    free(two);
+    if (err)
+        pal_transfer_free(t);
+    else
+        *out = t;
+    return err;
+}
+
+void pal_transfer_free(pal_transfer *t)
+{
+    if (!t) return;
+    pal_point_rows_free(&t->in);
+    pal_point_rows_free(&t->back);
+    for (int k = 0; k < 5; k++) free(t->work[k]);
+    free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old), free(t->load),
+        free(t->moving);
+    free(t->fix), free(t->seen_room);
+    pal_point_rows_free(&t->spread);
+    free(t);
+}

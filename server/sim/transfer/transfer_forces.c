@@ -1,0 +1,148 @@
+/* Forces of a carry (transfer.h): from the nodes of the old body to those of the new one. */
+#include "server/sim/transfer/transfer_parts.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* of an old node's mass: new nodes that look to it with less take as much less of its force */
+#define LEAST_SHARE 0.25
+/* times a new node's mass that old ones may weigh which accelerate it by their whole force */
+#define HEAVIER 2.0
+
+/* entries of t->in by old nodes: new nodes that look to old node i and by how much, who[first[i]..first[i+1]-1] */
+typedef struct lookers {
+    int32_t *first, *who;
+    double *weight;
+} lookers;
+
+static bool find_lookers(const pal_point_rows *in, int n_from, lookers *out)
+{
+    int32_t n = in->start[in->n_row];
+    out->first = calloc((size_t)n_from + 2, sizeof *out->first);
+    out->who = malloc(sizeof *out->who * (size_t)(n + 1));
+    out->weight = malloc(sizeof *out->weight * (size_t)(n + 1));
+    if (!out->first || !out->who || !out->weight) return false;
+    /* first[i + 1] is where the next entry of i goes, until all are there */
+    for (int32_t k = 0; k < n; k++) out->first[in->point[k] + 2]++;
+    for (int i = 0; i < n_from; i++) out->first[i + 2] += out->first[i + 1];
+    for (int32_t j = 0; j < in->n_row; j++)
+        for (int32_t k = in->start[j]; k < in->start[j + 1]; k++) {
+            int32_t at = out->first[in->point[k] + 1]++;
+            out->who[at] = j, out->weight[at] = in->weight[k];
+        }
+    return true;
+}
+
+/* old node i's force goes to the new nodes that look to it, over their masses as they do; the remainder (of nodes that
+ * no new one, or next to none, looks to) by place */
+static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const lookers *l, int i,
+                       pal_row_build *rows)
+{
+    double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
+    for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
+    double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
+    for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
+        pal_row_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
+    for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)
+        pal_row_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
+    pal_row_end(rows);
+}
+
+/* old node i's force to the new nodes around it, by their masses as well: light ones, at the rim of cut elements, would
+ * be thrown by what their heavy neighbours bear with ease */
+static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_row_build *rows)
+{
+    const pal_point_rows *back = &t->back;
+    double sum = 0;
+    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++)
+        sum += fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
+    for (int32_t k = back->start[i]; k < back->start[i + 1]; k++) {
+        double share = fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
+        pal_row_add(rows, back->point[k], sum > 0 ? share / sum : back->weight[k]);
+    }
+    pal_row_end(rows);
+}
+
+/* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
+ * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
+ * look to the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
+void pal_transfer_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
+{
+    bool lumped = !from->embed && from->n_node >= to->n_node;
+    lookers l = {0};
+    pal_row_build rows;
+    if (t->shell || t->spread.n_row > 0) return;
+    if (lumped || find_lookers(&t->in, from->n_node, &l)) {
+        pal_row_build_begin(&rows, from->n_node, to->n_node, INT32_MAX);
+        for (int i = 0; i < from->n_node && !rows.err; i++) {
+            if (lumped)
+                add_by_mass(t, to, i, &rows);
+            else
+                add_spread(t, from, to, &l, i, &rows);
+        }
+        (void)pal_row_build_finish(&rows, &t->spread);
+    }
+    free(l.first), free(l.who), free(l.weight);
+}
+
+/* how forces at old nodes go to new ones; without memory for a better way by place */
+const pal_point_rows *pal_transfer_rows(const pal_transfer *t)
+{
+    return t->spread.n_row > 0 ? &t->spread : &t->back;
+}
+
+/* What accelerates old nodes goes over as (twice the) acceleration where the new ones weigh less than half (springs
+ * count voxels at the rim whole, finite elements by their share of material): as a force it would throw them. What
+ * holds a load goes whole. Old bodies of an explicit solver only: of others loads are not known as they were at the end
+ * of the step */
+static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
+{
+    const pal_point_rows *rows = pal_transfer_rows(t);
+    double *mass = t->bound, *moving = t->rate;
+    if (from->embed || from->implicit || t->shell) return;
+    memset(mass, 0, sizeof *mass * (size_t)to->n_node);
+    memset(moving, 0, 3 * sizeof *moving * (size_t)to->n_node);
+    for (int i = 0; i < from->n_node; i++)
+        if (from->held[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
+    pal_point_rows_pull(rows, t->moving, moving);
+    for (int i = 0; i < from->n_node; i++)
+        for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
+            mass[rows->point[k]] += rows->weight[k] * from->node_mass_kg[i];
+    for (int j = 0; j < to->n_node; j++) {
+        double part = HEAVIER * to->node_mass_kg[j] / mass[j];
+        if (part < 1) pal_axpy3(t->pull + 3 * (size_t)j, part - 1, moving + 3 * (size_t)j);
+    }
+}
+
+/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
+ * before as it stands, whose g goes */
+void pal_transfer_pull(pal_transfer *t, const pal_body *from, const pal_body *to)
+{
+    size_t n = 3 * (size_t)from->n_node;
+    memset(t->pull, 0, 3 * sizeof(double) * (size_t)to->n_node);
+    if (from->embed) {
+        double *a = from->g;
+        for (int i = 0; i < from->n_dof; i++)
+            pal_scale3(a + 3 * i, from->held[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
+        pal_point_rows_place(from->embed, a, t->old);
+        for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
+    } else {
+        memcpy(t->old, from->f, n * sizeof *t->old);
+        for (int i = 0; i < from->n_node; i++)
+            if (from->held[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
+    }
+    pal_point_rows_pull(pal_transfer_rows(t), t->old, t->pull);
+    lighten(t, from, to);
+}
+
+/* lasting loads */
+void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena)
+{
+    if (!from->outer) return;
+    if (!to->outer) to->outer = PAL_NEW(arena, double, 3 * (size_t)to->n_node);
+    if (!to->outer) return;
+    memset(to->outer, 0, 3 * sizeof(double) * (size_t)to->n_node);
+    pal_point_rows_pull(&t->back, from->outer, to->outer);
+}

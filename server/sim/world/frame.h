@@ -1,0 +1,76 @@
+/* What a step shows: copied out of the world, float metres in the scene frame, safe to read on another thread.
+ * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. Room for fields comes and
+ * goes with pal_frame_fit, so their pointers hold while nobody fills the frame again. */
+#ifndef PAL_SIM_FRAME_H
+#define PAL_SIM_FRAME_H
+#include "server/sim/core/body.h"
+#include "server/sim/core/def.h"
+#include "server/sim/core/tools.h"
+
+enum { PAL_FRAME_ROWS = 64 };
+
+/* a field in colour; value NULL: not shown */
+typedef struct pal_frame_field {
+    float *value;      /* SI [n_vertex]                                      */
+    uint64_t revision; /* another number for every set of values, never twice */
+    double time_s;     /* simulated, when they were taken                     */
+} pal_frame_field;
+
+typedef struct pal_frame_part {
+    int n_vertex;
+    float *position_m; /* [n_vertex][3] */
+    uint64_t revision; /* of the topology these positions belong to */
+    bool frozen;
+    char why[PAL_WHY]; /* one sentence while frozen, else empty */
+    /* since the body's reset: what kept it within its bounds (rescue.h), how many in all, and their time */
+    pal_rescues rescue;
+    uint64_t n_rescue, rescue_ns;
+    bool asleep;       /* at rest: its rows are not run until something comes near (row sleep)      */
+    uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
+    pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
+    /* bodies that adapt (sim/shell.h): the table of drawn triangles at this revision, 0 0 0 in empty places. Vertices
+     * of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
+    int n_slot;
+    int32_t *slot;           /* [n_slot][3]                                      */
+    uint64_t slot_log;       /* changes taken in so far, of pal_shell.n_log      */
+    int n_active, n_spring;  /* nodes and springs now                            */
+    int n_all, n_all_spring; /* and if all of the body were of its finest level  */
+    /* bodies whose nodes are carried by control points (body.embed): those, body frame, for sculpting */
+    int n_point;     /* 0: another body */
+    double *point_m; /* [n_point][3]    */
+} pal_frame_part;
+
+typedef struct pal_frame_tool {
+    bool present, touching, holding;
+    pal_pose pose;     /* newest used, with its seq and stamp            */
+    uint64_t pose_ns;  /* pal_clock_ns when that pose came in            */
+    double force_N[3]; /* on the tool, mean over the step                */
+    double radius_m;
+    int n_patch;
+    pal_patch patch[PAL_PATCH_MAX];
+    bool has_grip;
+    double grip_x0_m[3], grip_f0_N[3], grip_k_N_m[6], grip_b_Ns_m;
+} pal_frame_tool;
+
+typedef struct pal_frame {
+    uint64_t tick;    /* steps since create or reset; equal ticks may differ in tools or status */
+    double time_s;    /* simulated                                                              */
+    uint64_t end_ns;  /* pal_clock_ns at the end of the step                                     */
+    uint64_t step_ns; /* processor time of the step                                              */
+    int n_substep;
+    bool watched; /* positions are of this tick; false: nobody looks, they may be older */
+    /* filled by the session */
+    bool paused;
+    double slowdown;    /* real over simulated time, 1: in time (mean over the last second)        */
+    uint64_t n_late;    /* steps that began late                                                   */
+    uint64_t n_refused; /* poses and commands refused                                              */
+    int n_part;
+    pal_frame_part part[PAL_BODY_MAX];
+    int n_tool;
+    pal_frame_tool tool[PAL_TOOL_MAX];
+    int n_row;
+    uint32_t row_ns[PAL_FRAME_ROWS];      /* of the last step, in the plan's order           */
+    const char *row_name[PAL_FRAME_ROWS]; /* constants; more than at load while fields are shown */
+    int row_body[PAL_FRAME_ROWS];         /* whose row it is                                     */
+} pal_frame;
+#endif

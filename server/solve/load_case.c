@@ -1,0 +1,234 @@
+/* Voxels, supports and nodal loads of a case.
+ *
+ * Voxels that the surface cuts count by their filled share, spread over the whole voxel. That is right in volume and
+ * too stiff in bending, since the spread reaches beyond the surface. Dropping the voxels that are less than a quarter
+ * full takes most of it back (gear of ../shared/reference, linear, 20, 30, 40 voxels: RMS 1.95, 1.63, 1.09 % against
+ * 5.05, 3.53, 2.28 % with all of them). Where a flat side lies so that more than 2.5 % of the volume would go, they are
+ * kept (a beam that loses a layer of 0.24 voxels of 4 bends by a fifth more).
+ *
+ * Dead loads stand at nodes as the consistent forces of the shape functions, integrated over the surface that the
+ * region selects (not over the voxels' faces), so that their sum is exact whatever the mesh. */
+#include "server/solve/load_case.h"
+
+#include "server/base/vec3.h"
+#include "server/num/shape.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* cut voxels with less are dropped; as long as no more of the volume goes than ...; else; and without fill */
+static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
+
+pal_box_text pal_box_show(const pal_box *box)
+{
+    pal_box_text out;
+    if (box->all)
+        snprintf(out.text, sizeof out.text, "the whole body");
+    else
+        snprintf(out.text, sizeof out.text, "(%g, %g, %g) .. (%g, %g, %g)", box->low_m[0], box->low_m[1], box->low_m[2],
+                 box->high_m[0], box->high_m[1], box->high_m[2]);
+    return out;
+}
+
+bool pal_box_holds(const pal_box *box, const double x[3], double slack)
+{
+    for (int c = 0; c < 3; c++)
+        if (x[c] < box->low_m[c] - slack || x[c] > box->high_m[c] + slack) return false;
+    return true;
+}
+
+double pal_case_slack(const pal_tets *tets)
+{
+    return 1e-6 * tets->h_m;
+}
+
+/* ---- voxels ---- */
+
+/* Planes of the grid go through the border of the first support (else material) that cuts the body on an axis: where
+ * what is held ends within a voxel, the error is that of a support moved by up to a voxel. */
+static void align(const pal_problem *p, int resolution, const pal_surface *surface, double ahead[3])
+{
+    double low[3], high[3], longest = 0;
+    pal_surface_box(surface, low, high);
+    for (int c = 0; c < 3; c++) longest = fmax(longest, high[c] - low[c]);
+    double h = longest / resolution;
+    for (int c = 0; c < 3; c++) {
+        bool found = false;
+        ahead[c] = 0;
+        for (int k = 0; k < p->n_support + p->n_material && !found; k++) {
+            const pal_box *box = k < p->n_support ? &p->support[k].region : &p->material[k - p->n_support].region;
+            const double plane[2] = {box->low_m[c], box->high_m[c]};
+            for (int side = 0; side < 2 && !found; side++) {
+                double x = plane[side] - surface->origin_m[c], t = (x - low[c]) / h;
+                found = x > low[c] + 0.01 * h && x < high[c] - 0.01 * h;
+                if (found) ahead[c] = fabs(t - round(t)) < 1e-6 ? 0 : ceil(t) - t;
+            }
+        }
+    }
+}
+
+/* share of the surface's volume that the filled voxels miss */
+static double missing(const pal_prepared *mesh)
+{
+    double sum = 0, cube = mesh->tets.h_m * mesh->tets.h_m * mesh->tets.h_m;
+    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
+    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
+}
+
+pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_voxel_wish *wish,
+                        pal_prepared *out, pal_note *note)
+{
+    pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .least_fill = wish->least_fill};
+    bool chosen = !(wish->least_fill > 0);
+    if (chosen) voxel.least_fill = wish->fill ? drop_fill : whole_fill;
+    if (wish->align) align(problem, wish->resolution, surface, voxel.ahead);
+    PAL_TRY(pal_prepared_make(surface, &voxel, out, NULL, note));
+    if (!chosen || !wish->fill || !(missing(out) > most_missing)) return PAL_ERR_OK;
+    pal_prepared_free(out);
+    voxel.least_fill = keep_fill;
+    return pal_prepared_make(surface, &voxel, out, NULL, note);
+}
+
+pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support out[PAL_PROBLEM_REGIONS],
+                          pal_note *note)
+{
+    double slack = pal_case_slack(tets);
+    for (int k = 0; k < problem->n_support; k++) {
+        const pal_box *box = &problem->support[k].region;
+        bool found = false;
+        for (int i = 0; i < tets->n_node && !found; i++) {
+            double x[3];
+            pal_add3(x, tets->x + 3 * i, tets->origin_m);
+            found = pal_box_holds(box, x, slack);
+        }
+        if (!found)
+            return pal_note_set(note, PAL_ERR_REFUSED, "supports[%d]: no node of the body lies in %s (voxels of %g m)",
+                                k, pal_box_show(box).text, tets->h_m);
+        out[k] = (pal_support){.lowest = false};
+        pal_sub3(out[k].low_m, box->low_m, tets->origin_m);
+        pal_sub3(out[k].high_m, box->high_m, tets->origin_m);
+        for (int c = 0; c < 3; c++) out[k].low_m[c] -= slack, out[k].high_m[c] += slack;
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- loads ---- */
+
+int pal_case_shape(const pal_body *body, int element, const double local[4], double shape[10], const int32_t **node)
+{
+    int n_corner = body->element ? body->n_corner : PAL_TET_CORNERS;
+    *node = (body->element ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)element;
+    if (n_corner == PAL_HEX_CORNERS)
+        pal_hex_shape(local, shape, NULL);
+    else if (n_corner == PAL_TET10_CORNERS)
+        pal_tet10_shape(local, shape, NULL);
+    else
+        memcpy(shape, local, 4 * sizeof *shape);
+    return n_corner;
+}
+
+/* one load on its way to the nodes */
+typedef struct job {
+    const pal_problem *problem;
+    const pal_problem_case *load_case;
+    int index;
+    const pal_body *body;
+    const pal_locate *locate;
+    const pal_surface *surface;
+    double *f;
+    pal_note *note;
+} job;
+
+static void spread(const job *j, int element, const double local[4], const double force_N[3])
+{
+    double n[PAL_CORNERS_MOST];
+    const int32_t *node;
+    int n_corner = pal_case_shape(j->body, element, local, n, &node);
+    for (int k = 0; k < n_corner; k++) pal_axpy3(j->f + 3 * node[k], n[k], force_N);
+}
+
+/* "load_cases[0].loads[1]" */
+typedef struct load_path {
+    char text[64];
+} load_path;
+
+static load_path path_of(const job *j)
+{
+    load_path out;
+    snprintf(out.text, sizeof out.text, "load_cases[%d].loads[%d]", (int)(j->load_case - j->problem->load_case),
+             j->index);
+    return out;
+}
+
+static pal_err add_traction(const job *j, double *area_m2)
+{
+    const pal_problem_load *load = &j->load_case->load[j->index];
+    const double *origin = j->body->tets->origin_m;
+    double low[3], high[3], area = 0, per_area[3];
+    pal_piece *piece = NULL;
+    int n_piece = 0;
+    char facing[96] = "";
+    pal_sub3(low, load->region.low_m, origin);
+    pal_sub3(high, load->region.high_m, origin);
+    pal_err err =
+        pal_locate_surface(j->locate, j->surface, low, high, load->has_normal ? load->normal : NULL, &piece, &n_piece);
+    if (err) return pal_note_set(j->note, err, "%s: no memory for its surface", path_of(j).text);
+    for (int k = 0; k < n_piece; k++) area += piece[k].area_m2;
+    if (area_m2) area_m2[j->index] = area;
+    if (!(area > 0)) {
+        free(piece);
+        if (load->has_normal)
+            snprintf(facing, sizeof facing, " that faces (%g, %g, %g)", load->normal[0], load->normal[1],
+                     load->normal[2]);
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", path_of(j).text,
+                            pal_box_show(&load->region).text, facing);
+    }
+    if (load->has_traction)
+        pal_copy3(per_area, load->traction_Pa);
+    else
+        pal_scale3(per_area, 1 / area, load->total_N);
+    for (int k = 0; k < n_piece; k++) {
+        double force[3];
+        pal_scale3(force, piece[k].area_m2, per_area);
+        spread(j, piece[k].element, piece[k].local, force);
+    }
+    free(piece);
+    return PAL_ERR_OK;
+}
+
+static pal_err add_point(const job *j)
+{
+    const pal_problem_load *load = &j->load_case->load[j->index];
+    double x[3], local[4], outside;
+    pal_sub3(x, load->point_m, j->body->tets->origin_m);
+    int element = pal_locate_point(j->locate, x, local, &outside);
+    if (outside > j->body->h_m)
+        return pal_note_set(
+            j->note, PAL_ERR_REFUSED, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
+            path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside, j->body->h_m);
+    spread(j, element, local, load->force_N);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_case_force(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
+                       const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
+                       pal_note *note)
+{
+    const pal_problem_load *l = &load_case->load[load];
+    job j = {problem, load_case, load, body, locate, surface, force_N, note};
+    if (l->kind == PAL_LOAD_TRACTION) return add_traction(&j, area_m2);
+    if (l->kind == PAL_LOAD_POINT) return add_point(&j);
+    for (int i = 0; i < body->n_node; i++) pal_axpy3(force_N + 3 * i, body->mass_kg[i], l->gravity_m_s2);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, const pal_body *body,
+                        const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
+                        pal_note *note)
+{
+    for (int k = 0; k < load_case->n_load; k++)
+        PAL_TRY(pal_case_force(problem, load_case, k, body, locate, surface, force_N, area_m2, note));
+    return PAL_ERR_OK;
+}

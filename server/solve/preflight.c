@@ -1,0 +1,420 @@
+/* Limits, weak places, conditioning and cost of a scene at rest. K is applied by differences of the forces, so that any
+ * row counts, whatever it is made of. */
+#include "server/solve/preflight.h"
+
+#include "server/base/vec3.h"
+#include "server/num/conjugate.h"
+#include "server/num/lanczos.h"
+#include "server/sim/springs/spring_shape.h"
+#include "server/sim/subdivision/solid.h"
+#include "server/sim/surface/shell.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double least_shape = 0.1, least_edge_S = 1e-6, least_fill = 0.05, least_mass = 1e-3;
+enum { MOST_LANCZOS = 24 };
+
+typedef struct probe {
+    pal_world *world;
+    pal_body *body;
+    pal_row force[32];
+    int n_force;
+    double way_m; /* of the differences */
+    double *x, *low;
+    bool failed;
+    int most_cg; /* iterations for each axis of the slowest motion */
+} probe;
+
+/* ---- places ---- */
+
+static void weak(pal_weak *w, int index, double value, const double at[3], const pal_body *body)
+{
+    if (w->n++ > 0 && !(value < w->value)) return;
+    w->worst = index, w->value = value;
+    pal_add3(w->at_m, at, body->offset_m);
+}
+
+static void middle(const double *x, const int32_t *corner, int n, double at[3])
+{
+    pal_set3(at, 0, 0, 0);
+    for (int c = 0; c < n; c++) pal_axpy3(at, 1.0 / n, x + 3 * (size_t)corner[c]);
+}
+
+/* edges of an element of n corners that all hang together */
+static void look_at_edges(const pal_body *body, const double *x, const int32_t *corner, int n, pal_preflight_body *out,
+                          double *mean2)
+{
+    int n_edge = 0;
+    *mean2 = 0;
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b < a; b++, n_edge++) {
+            double length = pal_dist3(x + 3 * (size_t)corner[a], x + 3 * (size_t)corner[b]);
+            *mean2 += length * length;
+            if (length < least_edge_S * body->size_m)
+                weak(&out->edge, corner[a], length, x + 3 * (size_t)corner[a], body);
+            if (corner[a] == out->limit_node || corner[b] == out->limit_node)
+                out->limit_edge_m = fmin(out->limit_edge_m, length);
+        }
+    *mean2 /= n_edge;
+}
+
+/* 1 for a regular tetrahedron or triangle, 0 for a flat one */
+static double shape_of(const double *x, const int32_t *corner, int n, double mean2)
+{
+    double a[3], b[3], c[3], g[3];
+    if (!(mean2 > 0)) return 0;
+    pal_sub3(a, x + 3 * (size_t)corner[1], x + 3 * (size_t)corner[0]);
+    pal_sub3(b, x + 3 * (size_t)corner[2], x + 3 * (size_t)corner[0]);
+    pal_cross3(g, a, b);
+    if (n == 3) return 2 / sqrt(3) * pal_norm3(g) / mean2;
+    pal_sub3(c, x + 3 * (size_t)corner[3], x + 3 * (size_t)corner[0]);
+    return sqrt(2) * fabs(pal_dot3(g, c)) / (mean2 * sqrt(mean2));
+}
+
+/* volumes: springs keep the volumes of tetrahedra */
+static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
+{
+    const pal_tets *tets = body->embed ? NULL : body->tets;
+    const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->shell ? body->shell->levels.first_face[1] : 0;
+    const int32_t *simplex = tets ? tets->tet : body->shell ? body->shell->levels.face : NULL;
+    for (int e = 0; e < n_simplex; e++) {
+        const int32_t *corner = simplex + (size_t)n * (size_t)e;
+        double mean2, at[3];
+        look_at_edges(body, body->x_rest, corner, n, out, &mean2);
+        double shape = shape_of(body->x_rest, corner, n, mean2);
+        middle(body->x_rest, corner, n, at);
+        if (shape < least_shape) weak(&out->flat, e, shape, at, body);
+        if (tets && volumes) out->n_sliver += shape < PAL_SPRING_SLIVER;
+    }
+    int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
+    const int32_t *element = body->element ? body->element : simplex;
+    for (int e = 0; body->fill && element && !body->embed && e < n_fill; e++) {
+        double at[3];
+        middle(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
+        if ((double)body->fill[e] < least_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
+    }
+    out->n_element = body->element ? body->n_element
+                     : body->solid ? pal_cell_elements_count(&body->solid->elements)
+                                   : n_simplex;
+}
+
+static void look_at_masses(const pal_body *body, pal_preflight_body *out)
+{
+    double mass = 0;
+    for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        out->n_held += body->held[i] != 0;
+        if (!body->held[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+            weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
+    }
+}
+
+/* the node whose stiffness asks for the shortest sub-step, by the rows' own bounds */
+static bool find_limit_node(const probe *p, pal_preflight_body *out)
+{
+    const pal_body *body = p->body;
+    double *bound = calloc((size_t)body->n_dof + 1, sizeof *bound), most = 0;
+    if (!bound) return false;
+    for (int i = 0; i < p->n_force && !body->embed; i++)
+        if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        if (body->held[i] || !(bound[i] > most * body->mass_kg[i])) continue;
+        most = bound[i] / body->mass_kg[i];
+        out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
+        pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
+    }
+    free(bound);
+    return true;
+}
+
+/* ---- conditioning ---- */
+
+/* forces of the rows at rest + way v, pulled back to the points */
+static void force_at(probe *p, const double *v, double way_m, double *out)
+{
+    pal_body *body = p->body;
+    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = p->x[i] + way_m * v[i];
+    pal_body_place(body);
+    memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    pal_step step = {.body = body, .force = p->force, .n_force = p->n_force, .dt_s = 1e-3, .n_sub = 1};
+    for (int i = 0; i < p->n_force; i++) p->failed |= p->force[i].effect->run(p->force[i].self, &step) != PAL_ERR_OK;
+    if (body->embed) {
+        memset(out, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_point_rows_pull(body->embed, body->f, out);
+    } else {
+        memcpy(out, body->f, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+}
+
+/* out = K v at the free points */
+static void apply(void *user, const double *v, double *out)
+{
+    probe *p = user;
+    const pal_body *body = p->body;
+    double most = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) most = fmax(most, fabs(v[i]));
+    double way = most > 0 ? p->way_m / most : 0;
+    force_at(p, v, -way, p->low);
+    force_at(p, v, way, out);
+    for (int i = 0; i < 3 * body->n_dof; i++) {
+        bool moves = body->mass_kg[i / 3] > 0 && !body->held[i / 3];
+        out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
+    }
+}
+
+static bool apply_lanczos(void *user, const double *v, double *out)
+{
+    apply(user, v, out);
+    return !((probe *)user)->failed;
+}
+
+static bool over_mass(void *user, const double *b, double *out)
+{
+    const pal_body *body = ((const probe *)user)->body;
+    for (int i = 0; i < 3 * body->n_dof; i++)
+        out[i] = body->mass_kg[i / 3] > 0 && !body->held[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
+    return true;
+}
+
+static void precondition(void *user, const double *r, double *out)
+{
+    (void)over_mass(user, r, out);
+}
+
+static double fast(probe *p, double *room)
+{
+    const pal_body *body = p->body;
+    int n = 3 * body->n_dof;
+    double *basis = calloc((size_t)MOST_LANCZOS * (size_t)n, sizeof *basis);
+    if (!basis) return NAN;
+    pal_lanczos l = {.n = n,
+                     .multiply = apply_lanczos,
+                     .solve = over_mass,
+                     .user = p,
+                     .z = room,
+                     .basis = basis,
+                     .w = room + n,
+                     .u = room + 2 * (size_t)n};
+    uint64_t seed = 7;
+    for (int i = 0; i < n; i++) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        l.z[i] = body->held[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
+    }
+    (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
+    free(basis);
+    return sqrt(l.ritz);
+}
+
+/* Rayleigh quotient of the shape under a weight along each axis: the lowest */
+static double slow(probe *p, double *room)
+{
+    const pal_body *body = p->body;
+    size_t n = 3 * (size_t)body->n_dof;
+    double least = INFINITY, *u = room, *b = room + n;
+    for (size_t axis = 0; axis < 3; axis++) {
+        pal_conjugate cg = {.n = (int)n,
+                            .multiply = apply,
+                            .precondition = precondition,
+                            .user = p,
+                            .r = room + 2 * n,
+                            .z = room + 3 * n,
+                            .p = room + 4 * n,
+                            .q = room + 5 * n};
+        double uf = 0, uu = 0;
+        for (size_t i = 0; i < n; i++) {
+            u[i] = 0;
+            b[i] = cg.r[i] = i % 3 == axis && !body->held[i / 3] ? body->mass_kg[i / 3] : 0;
+        }
+        (void)pal_conjugate_run(&cg, u, 0.03 * sqrt(pal_sum_products((int)n, b, b)), 1, p->most_cg);
+        /* u'Ku = u'(b - r) */
+        for (size_t i = 0; i < n; i++) uf += u[i] * (b[i] - cg.r[i]), uu += body->mass_kg[i / 3] * u[i] * u[i];
+        if (uu > 0 && uf / uu < least) least = uf / uu;
+    }
+    return sqrt(least);
+}
+
+static bool look_at_modes(probe *p, pal_preflight_body *out)
+{
+    pal_body *body = p->body;
+    size_t n = 3 * (size_t)body->n_dof;
+    double *room = calloc(8 * n + 1, sizeof *room);
+    if (!room) return false;
+    p->x = room + 6 * n, p->low = room + 7 * n;
+    p->way_m = 1e-5 * body->h_m;
+    memcpy(p->x, body->x, n * sizeof(double));
+    out->fast_1_s = out->n_held < body->n_active ? fast(p, room) : (double)NAN;
+    out->slow_1_s = out->n_held > 0 && out->n_held < body->n_active ? slow(p, room) : (double)NAN;
+    /* anchors hold a body too, but its own weight says so only when it is there */
+    out->condition = out->fast_1_s * out->fast_1_s / (out->slow_1_s * out->slow_1_s);
+    out->slow_s = 2 * M_PI / out->slow_1_s;
+    memcpy(body->x, p->x, n * sizeof(double));
+    pal_body_place(body);
+    free(room);
+    return true;
+}
+
+/* ---- cost ---- */
+
+/* ns of a row for one evaluation, from what `palpate bench` measured on the machine of README's tables; NaN: not known
+ */
+static double row_ns(const pal_body *body, const char *name)
+{
+    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->shell ? body->shell->n_spring : 0;
+    const double n_cell = body->solid ? pal_cell_elements_count(&body->solid->elements) : 0;
+    const struct {
+        const char *name;
+        double ns;
+    } cost[] = {{"edge_distance", 3.1 * n_tet},  {"face_area", 7.7 * n_tet},
+                {"tet_volume", 3.1 * n_tet},     {"edge_spring", 3.5 * n_spring},
+                {"shape_spring", 1 * n_spring},  {"hex_elastic", 90.0 * body->n_element},
+                {"tet_elastic", 20 * n_tet},     {"cell_elastic", 170 * n_cell},
+                {"viscous", 0.5 * body->n_node}, {"gravity", 1.0 * body->n_node}};
+    for (size_t k = 0; k < sizeof cost / sizeof cost[0]; k++)
+        if (!strcmp(name, cost[k].name)) return cost[k].ns;
+    return NAN;
+}
+
+/* A step under load. Explicit: forces and one pass over the points for every sub-step, four of each with rk4, the
+ * masses' conjugate gradients with central_cg. Implicit: four iterations, each an application of the rows and two
+ * passes through the factor, and forces, stiffness and energy around them */
+static double foresee_ms(const probe *p, const pal_body *body, int n_sub, int b)
+{
+    double forces = 0, solve = 0;
+    const char *solver = "";
+    pal_solve_report report;
+    for (int i = 0; i < p->n_force; i++) forces += row_ns(body, p->force[i].effect->name);
+    for (int i = 0; i < pal_world_rows(p->world); i++) {
+        pal_row_info info;
+        pal_world_row(p->world, i, &info);
+        if (info.body == body->name && !strcmp(info.stage, "solve")) solver = info.name;
+    }
+    if (!(forces > 0) || !strcmp(solver, "static_newton")) return NAN;
+    (void)pal_world_solve_report(p->world, b, &report);
+    double shown = (body->skin ? 11.6 : 1.0) * body->n_shown, least = 1500;
+    if (body->implicit) {
+        const double iterations = 4, factor = 0.9 * (double)report.factor_nonzeros;
+        return 1e-6 * (forces * (5 + iterations) + iterations * (factor + 30.0 * body->n_dof) + shown);
+    }
+    int evaluations = !strcmp(solver, "rk4") ? 4 : 1;
+    solve = (!strcmp(solver, "central_cg") ? 200.0 : 12.0) * body->n_active;
+    return 1e-6 * (n_sub * (evaluations * (forces + solve) + least) + shown + 2 * least);
+}
+
+/* ---- elements that lock ---- */
+
+/* tests/stability, case poisson_static; below it full integration is within some percent */
+static const double locks_above = 0.47;
+
+static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
+{
+    if (strcmp(def->model.name, "fem")) return;
+    const char *element = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4";
+    for (int i = 0; i < def->model.n_value; i++)
+        if (!strcmp(def->model.value[i].key, "element")) element = def->model.value[i].text;
+    out->poisson = def->material.poisson;
+    for (int r = 0; r < def->n_region; r++) {
+        const pal_region *region = &def->region[r];
+        const int n =
+            region->kind == PAL_REGION_GRID && region->grid_poisson ? region->n[0] * region->n[1] * region->n[2] : 0;
+        if (region->poisson > out->poisson) out->poisson = region->poisson;
+        for (int i = 0; i < n; i++)
+            if (region->grid_poisson[i] > out->poisson) out->poisson = region->grid_poisson[i];
+    }
+    const bool hex = !strcmp(element, "hex8"), tet = !strcmp(element, "tet4");
+    if ((!hex && !tet) || !(out->poisson > locks_above)) return;
+    out->locks = hex ? "hex8" : "tet4";
+    out->instead = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet10";
+}
+
+/* ---- all ---- */
+
+static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int most_cg, pal_preflight_body *out)
+{
+    pal_body *body = pal_world_body(world, b);
+    probe p = {.world = world, .body = body, .most_cg = most_cg};
+    bool volumes = false;
+    for (int i = 0; i < pal_world_rows(world); i++) {
+        const pal_row *row = pal_world_effect(world, i);
+        pal_row_info info;
+        pal_world_row(world, i, &info);
+        if (info.body != body->name || row->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
+        p.force[p.n_force++] = *row;
+        volumes = volumes || !strcmp(info.name, "tet_volume");
+    }
+    *out = (pal_preflight_body){.name = scene->body[b].name,
+                                .n_point = body->n_dof,
+                                .n_node = body->n_node,
+                                .limit_s = body->dt_limit_s,
+                                .limit_node = -1,
+                                .limit_edge_m = INFINITY};
+    out->n_sub = isfinite(out->limit_s) ? (int)ceil(scene->step_s / out->limit_s * (1 - 1e-12)) : 1;
+    if (!find_limit_node(&p, out)) return PAL_ERR_MEMORY;
+    look_at_elements(body, volumes, out);
+    look_at_masses(body, out);
+    look_for_locking(&scene->body[b], out);
+    if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
+    out->foreseen_ms = foresee_ms(&p, body, out->n_sub, b);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_preflight_look(const pal_scene *scene, int most_cg, pal_preflight *out, pal_note *note)
+{
+    pal_world *world = NULL;
+    *out = (pal_preflight){.n_body = scene->n_body};
+    PAL_TRY(pal_world_create(scene, note, &world));
+    out->n_byte = pal_world_bytes(world);
+    pal_err err = PAL_ERR_OK;
+    for (int b = 0; b < scene->n_body && !err; b++) {
+        err = look_at_body(world, scene, b, most_cg, &out->body[b]);
+        out->foreseen_ms += out->body[b].foreseen_ms;
+    }
+    pal_world_destroy(world);
+    return err;
+}
+
+/* ---- sentences ---- */
+
+static void say_weak(const pal_weak *w, const char *what, double scale, const char *unit, int *n,
+                     char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
+{
+    if (w->n == 0) return;
+    snprintf(line[(*n)++], PAL_PREFLIGHT_LINE, "%d %s: the worst is %d at (%.4g, %.4g, %.4g) mm, %.2g%s", w->n, what,
+             w->worst, 1e3 * w->at_m[0], 1e3 * w->at_m[1], 1e3 * w->at_m[2], scale * w->value, unit);
+}
+
+int pal_preflight_say(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
+{
+    int n = 0;
+    if (b->locks)
+        snprintf(line[n++], PAL_PREFLIGHT_LINE,
+                 "element %s locks at Poisson's ratio %.4g: it rests stiffer than the material is; element %s does not",
+                 b->locks, b->poisson, b->instead);
+    if (isfinite(b->limit_s) && b->limit_node >= 0) {
+        int used = snprintf(line[n], PAL_PREFLIGHT_LINE, "node %d at (%.4g, %.4g, %.4g) mm sets the limit of %.3g ms",
+                            b->limit_node, 1e3 * b->limit_at_m[0], 1e3 * b->limit_at_m[1], 1e3 * b->limit_at_m[2],
+                            1e3 * b->limit_s);
+        if (isfinite(b->limit_edge_m))
+            snprintf(line[n] + used, PAL_PREFLIGHT_LINE - (size_t)used, ": an edge of %.3g mm, %.2g g",
+                     1e3 * b->limit_edge_m, 1e3 * b->limit_mass_kg);
+        n++;
+    }
+    say_weak(&b->edge, "edges have next to no length", 1e3, " mm", &n, line);
+    say_weak(&b->flat, "elements are badly shaped", 1, " of a regular one", &n, line);
+    if (b->n_sliver > 0)
+        snprintf(line[n++], PAL_PREFLIGHT_LINE, "%d of them %s: springs leave the volume out", b->n_sliver,
+                 b->n_sliver == 1 ? "is a sliver" : "are slivers");
+    say_weak(&b->thin, "elements are hardly filled", 100, " %", &n, line);
+    say_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
+    if (isfinite(b->condition))
+        snprintf(line[n++], PAL_PREFLIGHT_LINE, "condition %.2g: its slowest motion takes %.3g s, its fastest %.3g ms",
+                 b->condition, b->slow_s, 2e3 * M_PI / b->fast_1_s);
+    else if (isfinite(b->fast_1_s) && b->n_held == 0)
+        snprintf(line[n++], PAL_PREFLIGHT_LINE, "no support holds it; its fastest motion takes %.3g ms",
+                 2e3 * M_PI / b->fast_1_s);
+    return n;
+}

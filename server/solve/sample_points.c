@@ -1,0 +1,196 @@
+/* CSV of sample points, read line by line: six columns whose names are checked, so that a file with its columns in
+ * another order is refused and not compared. Numbers by strtod in the C locale, which the commands never leave. */
+#include "server/solve/sample_points.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/files/mesh_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { COLUMNS = 6, WORD = 64, ROW = 6 * 32 };
+static const char *const column_name[COLUMNS] = {"x", "y", "z", "ux", "uy", "uz"};
+
+typedef struct csv {
+    const char *name;
+    const char *at, *end; /* of this line, without its end */
+    int line;
+    pal_note *note;
+} csv;
+
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+/* takes the next line; false: none */
+static bool next_line(csv *c, const char **rest, const char *last)
+{
+    const char *from = *rest;
+    if (from >= last) return false;
+    const char *end = memchr(from, '\n', (size_t)(last - from));
+    *rest = end ? end + 1 : last;
+    c->at = from;
+    c->end = end ? end : last;
+    while (c->end > c->at && (c->end[-1] == '\r' || is_blank(c->end[-1]))) c->end--;
+    while (c->at < c->end && is_blank(*c->at)) c->at++;
+    c->line++;
+    return true;
+}
+
+/* takes a cell of the line into word, without blanks around it and cut; false: the line has no further cell */
+static bool next_cell(csv *c, char word[WORD])
+{
+    if (!c->at) return false;
+    const char *comma = memchr(c->at, ',', (size_t)(c->end - c->at));
+    const char *from = c->at, *end = comma ? comma : c->end;
+    c->at = comma ? comma + 1 : NULL;
+    while (from < end && is_blank(*from)) from++;
+    while (end > from && is_blank(end[-1])) end--;
+    size_t n = 0;
+    for (; from < end && n < WORD - 1; from++) word[n++] = *from;
+    word[n] = 0;
+    return true;
+}
+
+/* a cell as it may be printed */
+static const char *shown(char word[WORD])
+{
+    size_t n = 0;
+    for (; word[n] && n < 24; n++)
+        if ((unsigned char)word[n] < 0x20 || (unsigned char)word[n] > 0x7e) word[n] = '?';
+    word[n] = 0;
+    return word;
+}
+
+static pal_err read_header(csv *c)
+{
+    char word[WORD];
+    for (int k = 0; k < COLUMNS; k++) {
+        if (!next_cell(c, word))
+            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz", c->name,
+                                c->line, k);
+        if (strcmp(word, column_name[k]))
+            return pal_note_set(c->note, PAL_ERR_REFUSED,
+                                "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name, c->line,
+                                k + 1, shown(word), column_name[k]);
+    }
+    if (next_cell(c, word))
+        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
+                            c->line, shown(word));
+    return PAL_ERR_OK;
+}
+
+static pal_err read_row(csv *c, double out[COLUMNS])
+{
+    char word[WORD], *end;
+    for (int k = 0; k < COLUMNS; k++) {
+        if (!next_cell(c, word))
+            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6", c->name, c->line, k);
+        out[k] = strtod(word, &end);
+        if (end == word || *end || !isfinite(out[k]))
+            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
+                                c->name, c->line, k + 1, column_name[k], shown(word));
+    }
+    if (next_cell(c, word))
+        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
+                            c->line, shown(word));
+    return PAL_ERR_OK;
+}
+
+static pal_err read_all(csv *c, const char *text, const char *last, pal_samples *out)
+{
+    size_t cap = 0;
+    bool header = false;
+    while (next_line(c, &text, last)) {
+        double row[COLUMNS];
+        if (c->at == c->end) continue;
+        if (!header) {
+            PAL_TRY(read_header(c));
+            header = true;
+            continue;
+        }
+        PAL_TRY(read_row(c, row));
+        if ((size_t)out->n == cap) {
+            cap = cap ? 2 * cap : 256;
+            double *x = realloc(out->x, 3 * cap * sizeof *x);
+            if (x) out->x = x;
+            double *u = realloc(out->u, 3 * cap * sizeof *u);
+            if (u) out->u = u;
+            if (!x || !u) return pal_note_set(c->note, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
+        }
+        pal_copy3(out->x + 3 * out->n, row);
+        pal_copy3(out->u + 3 * out->n, row + 3);
+        out->n++;
+    }
+    if (!header)
+        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz", c->name,
+                            c->line ? c->line : 1);
+    if (out->n == 0)
+        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: no row below the header", c->name, c->line);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_samples *out, pal_note *note)
+{
+    csv c = {.name = name, .note = note};
+    pal_samples made = {0};
+    const char *text = (const char *)bytes;
+    /* a mark that spreadsheets put in front */
+    if (n_byte >= 3 && !memcmp(text, "\xef\xbb\xbf", 3)) text += 3;
+    pal_err err = read_all(&c, text, (const char *)bytes + n_byte, &made);
+    if (err)
+        pal_samples_free(&made);
+    else
+        *out = made;
+    return err;
+}
+
+pal_err pal_samples_read(const char *path, pal_samples *out, pal_note *note)
+{
+    uint8_t *bytes;
+    size_t n_byte;
+    PAL_TRY(pal_file_read(path, (size_t)256 << 20, &bytes, &n_byte, note));
+    pal_err err = pal_samples_parse(path, bytes, n_byte, out, note);
+    free(bytes);
+    return err;
+}
+
+pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_note *note)
+{
+    size_t most = 32 + (size_t)samples->n * ROW, n = 0;
+    char *text = malloc(most);
+    if (!text) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d samples", path, samples->n);
+    n += (size_t)snprintf(text, most, "x,y,z,ux,uy,uz\n");
+    for (int i = 0; i < samples->n; i++) {
+        const double *x = samples->x + 3 * i, *u = samples->u + 3 * i;
+        n += (size_t)snprintf(text + n, most - n, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1],
+                              u[2]);
+    }
+    pal_err err = pal_file_write(path, text, n, note);
+    free(text);
+    return err;
+}
+
+void pal_samples_free(pal_samples *samples)
+{
+    free(samples->x);
+    free(samples->u);
+    *samples = (pal_samples){0};
+}
+
+void pal_samples_error(const pal_samples *reference, const double *u, double *rms_percent, double *max_percent)
+{
+    double sum = 0, most_off = 0, most = 0;
+    for (int i = 0; i < reference->n; i++) {
+        double off = pal_dist3(u + 3 * i, reference->u + 3 * i);
+        sum += off * off;
+        most_off = fmax(most_off, off);
+        most = fmax(most, pal_norm3(reference->u + 3 * i));
+    }
+    double rms = reference->n ? sqrt(sum / reference->n) : 0;
+    *rms_percent = rms == 0 ? 0 : 100 * rms / most;
+    *max_percent = most_off == 0 ? 0 : 100 * most_off / most;
+}

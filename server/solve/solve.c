@@ -1,0 +1,422 @@
+/* A load case through the product's own pipeline: the same voxels, model and world that a live scene has, with the
+ * solver static_newton.
+ *
+ * Moved supports: their nodes are set to rest + move in steps of at most half a voxel, each of them solved, so that no
+ * element is turned inside out on the way. */
+#include "server/solve/solve.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/mesh/files/vtk_file.h"
+#include "server/mesh/volume/locate.h"
+#include "server/num/shape.h"
+#include "server/sim/world/world.h"
+#include "server/solve/load_case.h"
+#include "server/solve/smaller_voxels.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NEWTON_A_STEP = 4, MOST_NEWTON = 400, MOST_RAMP = 40 };
+static const double lab_step_s = 1.0 / 60; /* a static solver has no use for it */
+
+struct pal_solution {
+    pal_prepared mesh;
+    pal_world *world;
+    pal_locate *locate;
+    pal_body *body;
+    bool hex;
+    const char *element;
+};
+
+/* what every function of one solve reads */
+typedef struct job {
+    const pal_problem *problem;
+    const pal_problem_case *load_case;
+    const pal_solve_options *options;
+    pal_solution *s;
+    pal_solve_result *result;
+    pal_note *note;
+} job;
+
+static bool say(const job *j, const char *what, double fraction)
+{
+    return !j->options->progress || j->options->progress(what, fraction, j->options->user);
+}
+
+/* ---- scene ---- */
+
+/* material `index` with what the options say in its place */
+static pal_err material_of(const job *j, int index, pal_material *out)
+{
+    const pal_problem_material *m = &j->problem->material[index];
+    const pal_solve_options *o = j->options;
+    *out = (pal_material){.young_Pa = isnan(o->young_Pa) ? m->young_Pa : o->young_Pa,
+                          .poisson = isnan(o->poisson) ? m->poisson : o->poisson,
+                          .density_kg_m3 = m->density_kg_m3};
+    pal_note why = {""};
+    double asked = out->poisson;
+    if (!(asked > -1 && asked < 0.5))
+        return pal_note_set(j->note, PAL_ERR_REFUSED,
+                            "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5",
+                            m->id, asked);
+    if (!(out->young_Pa > 0))
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "material \"%s\": E %g Pa is not a stiffness: wanted more than 0",
+                            m->id, out->young_Pa);
+    pal_err err = pal_material_check(out, &why);
+    j->result->clamped |= out->poisson != asked;
+    return err ? pal_note_set(j->note, err, "material \"%s\": %s", m->id, why.text) : PAL_ERR_OK;
+}
+
+/* the first material is the body's own; all others, and the first unless it is everywhere, are regions */
+static pal_err set_materials(const job *j, pal_body_def *body)
+{
+    const pal_problem *p = j->problem;
+    const double *origin = j->s->mesh.tets.origin_m;
+    if (p->n_material > 1 && (!isnan(j->options->young_Pa) || !isnan(j->options->poisson)))
+        return pal_note_set(j->note, PAL_ERR_REFUSED, "E or nu is given, but the problem has %d materials",
+                            p->n_material);
+    PAL_TRY(material_of(j, 0, &body->material));
+    for (int k = 1; k < p->n_material; k++) {
+        pal_material m;
+        PAL_TRY(material_of(j, k, &m));
+        pal_region *r = &body->region[body->n_region++];
+        *r = (pal_region){
+            .kind = PAL_REGION_BOX, .young_Pa = m.young_Pa, .poisson = m.poisson, .density_kg_m3 = m.density_kg_m3};
+        pal_sub3(r->low_m, p->material[k].region.low_m, origin);
+        pal_sub3(r->high_m, p->material[k].region.high_m, origin);
+    }
+    return PAL_ERR_OK;
+}
+
+/* no voxel may be without material */
+static pal_err check_covered(const job *j)
+{
+    const pal_problem *p = j->problem;
+    const pal_tets *t = &j->s->mesh.tets;
+    if (p->material[0].region.all) return PAL_ERR_OK;
+    for (int e = 0; e < t->n_tet; e++) {
+        double middle[3] = {t->origin_m[0], t->origin_m[1], t->origin_m[2]};
+        bool found = false;
+        for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
+        for (int k = 0; k < p->n_material && !found; k++) found = pal_box_holds(&p->material[k].region, middle, 0);
+        if (!found)
+            return pal_note_set(j->note, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
+                                p->n_material, middle[0], middle[1], middle[2]);
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err set_supports(const job *j, pal_body_def *body)
+{
+    const pal_problem *p = j->problem;
+    body->n_support = 0;
+    if (p->n_support == 0 && !j->options->inertia_relief)
+        return pal_note_set(
+            j->note, PAL_ERR_REFUSED,
+            "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
+            "balances them by its mass)");
+    body->n_support = p->n_support;
+    return pal_case_supports(p, &j->s->mesh.tets, body->support, j->note);
+}
+
+static pal_err set_items(const job *j, pal_body_def *body)
+{
+    const pal_solve_options *o = j->options;
+    pal_item_init(&body->model, "model", "fem");
+    PAL_TRY(pal_item_put_text(&body->model, "element", o->element, j->note));
+    PAL_TRY(pal_item_put_text(&body->model, "law", o->law, j->note));
+    PAL_TRY(pal_item_put_bool(&body->model, "fill", o->fill, j->note));
+    pal_item_init(&body->solver, "solver", "static_newton");
+    PAL_TRY(pal_item_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->note));
+    PAL_TRY(pal_item_put_number(&body->solver, "newton", NEWTON_A_STEP, j->note));
+    if (o->linear) PAL_TRY(pal_item_put_text(&body->solver, "linear", o->linear, j->note));
+    if (o->inertia_relief && j->problem->n_support == 0)
+        PAL_TRY(pal_item_put_text(&body->solver, "free", "inertia_relief", j->note));
+    return PAL_ERR_OK;
+}
+
+static pal_err make_world(const job *j)
+{
+    pal_scene *scene = calloc(1, sizeof *scene);
+    if (!scene) return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the scene");
+    pal_scene_default(scene);
+    pal_body_def *body = &scene->body[0];
+    scene->step_s = lab_step_s;
+    scene->n_tool = 0;
+    scene->n_body = 1;
+    pal_body_default(body, "body", &j->s->mesh);
+    body->n_effect = 0;
+    body->output.name[0] = 0;
+    pal_err err = set_materials(j, body);
+    body->material.damping_1_s = 0;
+    if (!err) err = check_covered(j);
+    if (!err) err = set_supports(j, body);
+    if (!err) err = set_items(j, body);
+    if (!err) err = pal_world_create(scene, j->note, &j->s->world);
+    free(scene);
+    if (err) return err;
+    j->s->body = pal_world_body(j->s->world, 0);
+    j->s->body->load_cap_N = INFINITY;
+    return PAL_ERR_OK;
+}
+
+static pal_err set_loads(const job *j)
+{
+    pal_solution *s = j->s;
+    const pal_body *b = s->body;
+    double *f = calloc(3 * (size_t)b->n_node, sizeof *f);
+    if (!f) return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the loads");
+    pal_err err =
+        pal_case_forces(j->problem, j->load_case, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->note);
+    for (int i = 0; i < b->n_node && !err; i++) {
+        pal_add3(j->result->load_N, j->result->load_N, f + 3 * i);
+        err = pal_world_load(s->world, 0, i, f + 3 * i);
+        if (err) pal_note_set(j->note, err, "loads: node %d takes no load of %g N", i, pal_norm3(f + 3 * i));
+    }
+    free(f);
+    return err;
+}
+
+/* ---- solving ---- */
+
+/* nodes of moved supports at rest + share * move; later supports win */
+static void move_supports(const job *j, double share)
+{
+    pal_body *b = j->s->body;
+    for (int i = 0; i < b->n_node; i++) {
+        double x[3];
+        if (!b->held[i]) continue;
+        pal_add3(x, b->x_rest + 3 * i, j->s->mesh.tets.origin_m);
+        for (int k = 0; k < j->problem->n_support; k++)
+            if (pal_box_holds(&j->problem->support[k].region, x, pal_case_slack(&j->s->mesh.tets))) {
+                pal_copy3(b->x + 3 * i, b->x_rest + 3 * i);
+                pal_axpy3(b->x + 3 * i, share, j->problem->support[k].move_m);
+            }
+    }
+    pal_world_moved(j->s->world, 0);
+}
+
+static int count_ramp(const job *j)
+{
+    double most = 0;
+    for (int k = 0; k < j->problem->n_support; k++) most = fmax(most, pal_norm3(j->problem->support[k].move_m));
+    double n = ceil(most / (0.5 * j->s->body->h_m));
+    return n > MOST_RAMP ? MOST_RAMP : (int)n;
+}
+
+/* steps the world until its solver has met the tolerance */
+static pal_err converge(const job *j, double fraction)
+{
+    int most = j->options->most_newton > 0 ? j->options->most_newton : MOST_NEWTON;
+    for (;;) {
+        char what[80];
+        pal_solve_report report;
+        pal_err err = pal_world_step(j->s->world, lab_step_s);
+        pal_world_solve_report(j->s->world, 0, &report);
+        j->result->n_newton += report.n_newton;
+        j->result->n_cg += report.n_cg;
+        j->result->residual = report.residual;
+        if (err || j->s->body->frozen)
+            return pal_note_set(j->note, PAL_ERR_NUMERIC,
+                                "no solution: the body froze after %d iterations at a residual of %g",
+                                j->result->n_newton, report.residual);
+        if (report.converged) return PAL_ERR_OK;
+        if (j->result->n_newton >= most || report.n_newton == 0)
+            return pal_note_set(j->note, PAL_ERR_NUMERIC, "no solution after %d iterations: residual %g, step size %g",
+                                j->result->n_newton, report.residual, report.step_size);
+        snprintf(what, sizeof what, "solve: iteration %d, residual %.2g", j->result->n_newton, report.residual);
+        if (!say(j, what, fraction))
+            return pal_note_set(j->note, PAL_ERR_STATE, "stopped after %d iterations", j->result->n_newton);
+    }
+}
+
+static pal_err solve(const job *j)
+{
+    int ramp = count_ramp(j);
+    if (ramp == 0) return converge(j, 0);
+    for (int k = 1; k <= ramp; k++) {
+        move_supports(j, (double)k / ramp);
+        PAL_TRY(converge(j, (double)k / ramp));
+    }
+    return PAL_ERR_OK;
+}
+
+/* what the solver says it spent on assembling and factoring since load, into the result; returns the sum */
+static double factored(const job *j)
+{
+    pal_solve_report report;
+    if (!j->s->world || !pal_world_solve_report(j->s->world, 0, &report)) return 0;
+    j->result->assemble_s = report.assemble_s;
+    j->result->factor_s = report.analyse_s + report.factor_s;
+    return j->result->assemble_s + j->result->factor_s;
+}
+
+static void sum_up(const job *j)
+{
+    const pal_body *b = j->s->body;
+    pal_solve_result *r = j->result;
+    for (int i = 0; i < b->n_node; i++) {
+        double u[3];
+        pal_sub3(u, b->x + 3 * i, b->x_rest + 3 * i);
+        r->most_m = fmax(r->most_m, pal_norm3(u));
+        r->work_J += b->outer ? pal_dot3(b->outer + 3 * i, u) : 0;
+        if (b->held[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
+    }
+    r->energy_J = pal_world_energy_J(j->s->world);
+}
+
+/* ---- doors ---- */
+
+/* of the material: each element's by its filled share */
+static double volume_of(const pal_solution *s)
+{
+    const pal_body *b = s->body;
+    double sum = 0, cube = b->h_m * b->h_m * b->h_m;
+    for (int e = 0; e < b->n_element; e++) {
+        const int32_t *node = b->element + (size_t)b->n_corner * (size_t)e;
+        double edge[3][3], normal[3];
+        for (int k = 0; k < 3; k++) pal_sub3(edge[k], b->x_rest + 3 * node[k + 1], b->x_rest + 3 * node[0]);
+        pal_cross3(normal, edge[0], edge[1]);
+        sum += (b->fill ? (double)b->fill[e] : 1) * (s->hex ? cube : pal_dot3(normal, edge[2]) / 6);
+    }
+    return sum;
+}
+
+static pal_err prepare(const job *j, const pal_surface *surface)
+{
+    const pal_solve_options *o = j->options;
+    pal_solution *s = j->s;
+    pal_voxel_wish wish = {o->resolution, o->fill, o->least_fill, o->align};
+    PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->note));
+    if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->note));
+    PAL_TRY(make_world(j));
+    const pal_body *b = s->body;
+    s->hex = b->n_corner == 8;
+    s->element = o->element;
+    j->result->n_node = b->n_node;
+    j->result->n_element = b->n_element;
+    j->result->h_m = b->h_m;
+    j->result->volume_m3 = volume_of(s);
+    for (int i = 0; i < b->n_node; i++) j->result->n_held += b->held[i] != 0;
+    j->result->n_dof = 3 * (b->n_node - j->result->n_held);
+    pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
+    return err ? pal_note_set(j->note, err, "no memory to find points in the mesh") : PAL_ERR_OK;
+}
+
+pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
+                  const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_note *note)
+{
+    pal_note own = {""};
+    double start = pal_clock_s();
+    *result = (pal_solve_result){0};
+    job j = {.problem = problem,
+             .load_case = load_case,
+             .options = options,
+             .s = calloc(1, sizeof *j.s),
+             .result = result,
+             .note = note ? note : &own};
+    if (!j.s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a solution");
+    say(&j, "prepare", 0);
+    pal_err err = prepare(&j, surface);
+    if (!err) err = set_loads(&j);
+    double ready = pal_clock_s(), early_s = factored(&j);
+    result->prepare_s = ready - start - early_s;
+    if (!err && !say(&j, "solve", 0)) err = pal_note_set(note, PAL_ERR_STATE, "stopped before the first iteration");
+    if (!err) err = solve(&j);
+    if (!err) sum_up(&j);
+    double end = pal_clock_s();
+    result->total_s = end - start;
+    result->solve_s = fmax(0, end - ready + early_s - factored(&j));
+    if (err)
+        pal_solution_free(j.s);
+    else
+        *out = j.s;
+    return err;
+}
+
+void pal_solution_free(pal_solution *solution)
+{
+    if (!solution) return;
+    pal_locate_destroy(solution->locate);
+    pal_world_destroy(solution->world);
+    pal_prepared_free(&solution->mesh);
+    free(solution);
+}
+
+void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
+{
+    double at[3], local[4], n[10];
+    const pal_body *b = s->body;
+    const int32_t *node;
+    pal_sub3(at, x, s->mesh.tets.origin_m);
+    int element = pal_locate_point(s->locate, at, local, NULL), n_corner = pal_case_shape(b, element, local, n, &node);
+    pal_set3(u, 0, 0, 0);
+    for (int k = 0; k < n_corner; k++) {
+        pal_axpy3(u, n[k], b->x + 3 * node[k]);
+        pal_axpy3(u, -n[k], b->x_rest + 3 * node[k]);
+    }
+}
+
+pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_note *note)
+{
+    const pal_body *b = s->body;
+    size_t n = 3 * (size_t)b->n_node;
+    pal_samples all = {.n = b->n_node, .x = malloc(n * sizeof(double)), .u = malloc(n * sizeof(double))};
+    pal_err err =
+        all.x && all.u ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    for (int i = 0; i < b->n_node && !err; i++) {
+        pal_add3(all.x + 3 * i, b->x_rest + 3 * i, s->mesh.tets.origin_m);
+        pal_sub3(all.u + 3 * i, b->x + 3 * i, b->x_rest + 3 * i);
+    }
+    if (!err) err = pal_samples_write(&all, path, note);
+    pal_samples_free(&all);
+    return err;
+}
+
+/* von Mises stress at the nodes: what the elements around a node measure, by volume */
+static void measure(const pal_solution *s, double *stress_Pa, double *volume_m3)
+{
+    const pal_body *b = s->body;
+    for (int r = 0; r < pal_world_rows(s->world); r++) {
+        const pal_row *row = pal_world_effect(s->world, r);
+        if (row->effect->measure) row->effect->measure(row->self, b, PAL_FIELD_VON_MISES_PA, stress_Pa, volume_m3);
+    }
+    for (int i = 0; i < b->n_node; i++) stress_Pa[i] = volume_m3[i] > 0 ? stress_Pa[i] / volume_m3[i] : 0;
+}
+
+static pal_err write_vtk(const pal_solution *s, const char *path, const double *moved, const double *stress,
+                         pal_note *note)
+{
+    const pal_body *b = s->body;
+    const pal_vtk_field field[2] = {{"displacement_m", 3, moved}, {"von_mises_Pa", 1, stress}};
+    const pal_vtk_grid grid = {.title = "palpate solve",
+                               .n_node = b->n_node,
+                               .n_element = b->n_element,
+                               .n_corner = b->n_corner,
+                               .x = b->x_rest,
+                               .origin_m = s->mesh.tets.origin_m,
+                               .node = b->element,
+                               .n_point = 2,
+                               .point = field};
+    return pal_mesh_write_vtk(path, &grid, note);
+}
+
+pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_note *note)
+{
+    const pal_body *b = s->body;
+    size_t n = (size_t)b->n_node;
+    double *stress = calloc(n, sizeof *stress), *volume = calloc(n, sizeof *volume), *moved = calloc(3 * n, 8);
+    pal_err err = stress && volume && moved
+                      ? PAL_ERR_OK
+                      : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    if (!err) measure(s, stress, volume);
+    for (size_t k = 0; k < 3 * n && !err; k++) moved[k] = b->x[k] - b->x_rest[k];
+    if (!err) err = write_vtk(s, path, moved, stress, note);
+    free(moved);
+    free(stress);
+    free(volume);
+    return err;
+}

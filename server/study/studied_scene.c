@@ -1,0 +1,192 @@
+/* Picking from a study that is kept beside a scene. */
+#include "server/study/studied_scene.h"
+
+#include "server/base/machine.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80])
+{
+    bool within = wish->within_m > 0, budget = wish->budget_ms > 0;
+    int n = within ? snprintf(out, 80, "within %g mm", 1e3 * wish->within_m) : 0;
+    if (budget) snprintf(out + n, 80 - (size_t)n, "%sin at most %g ms", n ? " " : "", wish->budget_ms);
+    if (!within && !budget) out[0] = 0;
+    return out;
+}
+
+const char *pal_study_off_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_OFF])
+{
+    const pal_study *s = &file->study;
+    char own[64] = "";
+    if (s->reference_m > 0) snprintf(own, sizeof own, ", +- %.2g mm of the reference,", 1e3 * s->reference_m);
+    snprintf(out, PAL_STUDY_OFF, "%.3g mm off%s under %s, that move it by up to %.3g mm", 1e3 * error_m, own,
+             file->loads, 1e3 * s->most_m);
+    return out;
+}
+
+void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, size_t n_byte)
+{
+    char reference[sizeof study->reference];
+    int n = snprintf(out, n_byte, "within %.3g mm, %.2g %% of the largest displacement", 1e3 * error_m,
+                     1e2 * error_m / study->most_m);
+    static const char of[] = ", of ";
+    size_t left = n > 0 && (size_t)n + sizeof of < n_byte ? n_byte - (size_t)n - sizeof of : 0;
+    snprintf(reference, sizeof reference, "%s", study->reference);
+    for (char *comma; strlen(reference) > left && (comma = strrchr(reference, ',')); *comma = 0) continue;
+    if (reference[0] && strlen(reference) <= left) snprintf(out + n, n_byte - (size_t)n, "%s%s", of, reference);
+}
+
+static bool is_measured(const pal_study_point *p)
+{
+    return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
+}
+
+/* the study with the points of other methods not measured; indices stay. NULL: no memory */
+static pal_study *only(const pal_study *study, const char *methods)
+{
+    pal_study *out = malloc(sizeof *out);
+    if (!out) return NULL;
+    *out = *study;
+    for (int k = 0; k < out->n_point; k++) {
+        pal_study_point *p = &out->point[k];
+        if (is_measured(p) && pal_study_method_in(methods, p->priced.setting.model)) continue;
+        p->priced.ms = p->priced.error_m = NAN;
+        p->priced.front = false;
+    }
+    return out;
+}
+
+int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish)
+{
+    pal_study *some = only(study, methods);
+    if (!some) return -1;
+    int picked =
+        pal_study_pick(some, wish->within_m > 0 ? wish->within_m : NAN, wish->budget_ms > 0 ? wish->budget_ms : NAN);
+    if (picked >= 0 && isnan(some->point[picked].priced.ms)) picked = -1;
+    free(some);
+    return picked;
+}
+
+/* is a nearer to the wish than b? Within the budget by error, else by time */
+static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_setting_wish *wish)
+{
+    if (wish->within_m > 0 && wish->budget_ms > 0) {
+        bool a_in = a->priced.ms <= wish->budget_ms, b_in = b->priced.ms <= wish->budget_ms;
+        if (a_in != b_in) return a_in;
+        return a_in ? a->priced.error_m < b->priced.error_m : a->priced.ms < b->priced.ms;
+    }
+    return wish->within_m > 0 ? a->priced.error_m < b->priced.error_m : a->priced.ms < b->priced.ms;
+}
+
+void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out, size_t n_byte)
+{
+    char asked[80], text[PAL_SETTING_TEXT], own[48] = "";
+    const pal_study_point *best = NULL;
+    int n = 0;
+    for (int k = 0; k < study->n_point; k++) {
+        const pal_study_point *p = &study->point[k];
+        if (!is_measured(p) || !pal_study_method_in(methods, p->priced.setting.model)) continue;
+        n++;
+        if (!best || is_nearer(p, best, wish)) best = p;
+    }
+    if (!pal_study_trusted(study)) {
+        snprintf(out, n_byte,
+                 "none of the settings is named, since the reference itself is only within %.3g mm where %.3g mm move: "
+                 "hold more of the body (palpate prepare --hold 20, with --up as it lies), study it without --quick",
+                 1e3 * study->reference_m, 1e3 * study->most_m);
+        return;
+    }
+    pal_setting_wish_text(wish, asked);
+    if (wish->within_m > 0 && study->reference_m > 0)
+        snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
+    if (!best)
+        snprintf(out, n_byte, "none of the settings was measured, so none is %s", asked);
+    else
+        snprintf(out, n_byte, "none of the %d settings is %s: the nearest is %s, %.3g mm%s in %.3g ms", n, asked,
+                 pal_setting_text(&best->priced.setting, text), 1e3 * best->priced.error_m, own, best->priced.ms);
+}
+
+/* ---- a scene and its study ---- */
+
+/* reads and checks; *out NULL and OK: there is none. The sentence is about the study */
+static pal_err find(const char *path, const pal_scene *scene, pal_study_file **out, pal_note *note)
+{
+    char shape[PAL_STUDY_SHAPE];
+    *out = NULL;
+    if (access(path, F_OK)) return PAL_ERR_OK;
+    PAL_TRY(pal_study_file_read(path, out, note));
+    pal_study_front(&(*out)->study);
+    int body = (*out)->index;
+    if (body < scene->n_body && !strcmp(pal_study_shape(&scene->body[body], shape), (*out)->shape)) return PAL_ERR_OK;
+    free(*out);
+    *out = NULL;
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: is of another body than this scene's, or of other material", path);
+}
+
+static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_setting_wish *wish,
+                    pal_studied *out, pal_note *note)
+{
+    char asked[80], text[PAL_SETTING_TEXT], none[360], off[PAL_STUDY_OFF];
+    const pal_study *study = &out->file->study;
+    pal_setting_wish_text(wish, asked);
+    out->picked = pal_study_serving(study, "", wish);
+    if (out->picked < 0) {
+        pal_study_none(study, "", wish, none, sizeof none);
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none, word);
+    }
+    const pal_priced_setting *p = &study->point[out->picked].priced;
+    pal_setting setting = p->setting;
+    pal_note why = {""};
+    if (setting.step_s == 0) setting.step_s = study->step_s;
+    pal_err err = pal_setting_make(scene, out->file->index, &setting, &why, &out->set);
+    if (err) return pal_note_set(note, err, "%s: %s: %s", path, pal_setting_text(&p->setting, text), why.text);
+    out->scene = &out->set->scene;
+    snprintf(out->said, sizeof out->said, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
+             scene->body[out->file->index].name, pal_setting_text(&p->setting, text),
+             pal_study_off_text(out->file, p->error_m, off), p->ms, out->n_setting, path, asked);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_note *note)
+{
+    char stem[PAL_STUDY_PATH], path[PAL_STUDY_PATH + 8], machine[PAL_MACHINE_TEXT], asked[80];
+    const pal_setting_wish wish = {scene->max_error_m, scene->budget_ms};
+    bool wanted = wish.within_m > 0 || wish.budget_ms > 0;
+    pal_note why = {""};
+    *out = (pal_studied){.scene = scene, .picked = -1};
+    PAL_TRY(pal_study_stem(word, NULL, stem, note));
+    snprintf(path, sizeof path, "%s.json", stem);
+    pal_err err = find(path, scene, &out->file, &why);
+    if (!out->file && wanted)
+        return pal_note_set(note, err ? err : PAL_ERR_REFUSED,
+                            "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
+                            pal_setting_wish_text(&wish, asked), err ? "and " : "but there is no ",
+                            err ? why.text : path, word, err ? " --again" : "");
+    if (!out->file) {
+        if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", why.text);
+        return PAL_ERR_OK;
+    }
+    out->body = out->file->index;
+    out->setting = malloc(PAL_STUDY_POINTS * sizeof *out->setting);
+    if (!out->setting) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    out->n_setting = pal_study_settings(&out->file->study, out->setting);
+    if (strcmp(pal_machine_name(machine), out->file->study.machine) != 0)
+        snprintf(out->warn, sizeof out->warn, "%.150s: its milliseconds are of %.100s, this is %.100s", path,
+                 out->file->study.machine, machine);
+    else if (!out->file->whole)
+        snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d settings", path,
+                 out->file->study.n_point, out->file->n_all);
+    return wanted ? pick(word, path, scene, &wish, out, note) : PAL_ERR_OK;
+}
+
+void pal_studied_close(pal_studied *studied)
+{
+    pal_set_scene_free(studied->set);
+    free(studied->file);
+    free(studied->setting);
+    *studied = (pal_studied){0};
+}

@@ -1,0 +1,291 @@
+/* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
+ * it runs.
+ *
+ * A step of its own takes a + sub-steps (elements (e + t) + c q) r: a is what a step takes whatever is solved (the skin
+ * above all), e what an element takes beside others, t what is added where the law has an exact tangent (neo_hookean:
+ * matrices of all elements are made in every step), q the time of reading its solver's factor on this machine (what no
+ * longer fits into caches is read slower), r what an element takes in a sub-step, whose logarithm is a sum of what each
+ * knob adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to an
+ * element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
+ * least squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
+#include "server/study/study_parts.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LEAST = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
+/* weight of "no effect" for each knob of as many settings as are enough; of "off by nothing" beside settings that are
+ * near */
+static const double ridge = 3e-2, enough = 30, trust = 0.1;
+/* so many knobs that stand otherwise are as far as e times the nodes */
+static const double knobs_per_e = 4, whole_nodes = 1000;
+
+typedef struct seen {
+    const pal_setting *setting;
+    double n_node, n_element, n_substep, ms; /* of a step of its own */
+    double read_ms;
+    double f[FEATURES];
+} seen;
+
+enum { TANGENT = 11 }; /* feature whose weight is t's logarithm */
+typedef struct cost_law {
+    double a, c, w[FEATURES], misfit; /* c: elements a ms of reading */
+} cost_law;
+
+static void features(const pal_setting *s, double n_node, double f[FEATURES])
+{
+    static const char *const word[] = {"hex8",        "tet4",   "tet10",      "refined",       "linear",
+                                       "neo_hookean", "sdirk2", "central_cg", "implicit_euler"};
+    double n = log(n_node / whole_nodes), step = log(fmax(s->step_s, 1e-4) * 60);
+    double tolerance = s->tolerance > 0 ? log(s->tolerance / 1e-2) : 0;
+    memset(f, 0, FEATURES * sizeof *f);
+    f[0] = 1, f[1] = n, f[2] = 0.3 * n * n, f[3] = step, f[4] = tolerance, f[5] = s->k_distance_J > 0;
+    for (int k = 0; k < 9; k++)
+        f[6 + k] =
+            pal_study_is(s->element, word[k]) || pal_study_is(s->law, word[k]) || pal_study_is(s->solver, word[k]);
+    f[15] = 0.3 * step * n, f[16] = 0.3 * tolerance * n;
+    /* the second stage grows otherwise with the nodes */
+    f[17] = 0.5 * f[12] * n;
+}
+
+/* few settings tell little of each knob: elements times sub-steps alone tell most */
+static double hold_of(int n)
+{
+    return ridge * fmax(1, pow(enough / n, 2));
+}
+
+/* (F'F + hold) w = F'y by elimination; the constant is not held back */
+static void solve(double A[FEATURES][FEATURES + 1], double hold, double w[FEATURES])
+{
+    for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : hold;
+    for (int i = 0; i < FEATURES; i++)
+        for (int r = i + 1; r < FEATURES; r++) {
+            double share = A[r][i] / A[i][i];
+            for (int c = i; c <= FEATURES && share != 0; c++) A[r][c] -= share * A[i][c];
+        }
+    for (int i = FEATURES - 1; i >= 0; i--) {
+        double sum = A[i][FEATURES];
+        for (int c = i + 1; c < FEATURES; c++) sum -= A[i][c] * w[c];
+        w[i] = sum / A[i][i];
+    }
+}
+
+/* elements are nothing to a factor but its entries, which are counted; nor is a law that turns nothing */
+static bool is_of_elements(int feature)
+{
+    return feature == 6 || feature == 7 || feature == 8 || feature == 10;
+}
+
+/* what all sub-steps of a step take; slope (may be NULL): its logarithm's by each weight */
+static double work_ms(const cost_law *law, const seen *p, double slope[FEATURES])
+{
+    double sum = 0, own = 0;
+    for (int r = 0; r < FEATURES; r++)
+        if (r != TANGENT) *(is_of_elements(r) ? &own : &sum) += law->w[r] * p->f[r];
+    double through = p->n_element * exp(own), tangent = p->f[TANGENT] * p->n_element * exp(law->w[TANGENT]),
+           all = through + tangent + law->c * p->read_ms;
+    for (int r = 0; r < FEATURES && slope; r++)
+        slope[r] = p->f[r] * (r == TANGENT ? tangent / all : is_of_elements(r) ? through / all : 1);
+    return p->n_substep * all * exp(sum);
+}
+
+/* the best sum for an a below all costs and a rate */
+static cost_law fit(const seen *p, int n, double a, double c)
+{
+    cost_law law = {.a = a, .c = c};
+    bool sums = c > 0;
+    for (int i = 0; i < n; i++) sums |= p[i].f[TANGENT] > 0;
+    /* of one product it is linear in the logarithm; of sums Gauss and Newton's way there is short */
+    for (int round = 0; round < (sums ? ROUNDS : 1); round++) {
+        double A[FEATURES][FEATURES + 1] = {{0}};
+        for (int i = 0; i < n; i++) {
+            double slope[FEATURES], y = log((p[i].ms - a) / work_ms(&law, &p[i], slope));
+            for (int r = 0; r < FEATURES; r++) y += slope[r] * law.w[r];
+            for (int r = 0; r < FEATURES; r++) {
+                for (int k = 0; k < FEATURES; k++) A[r][k] += slope[r] * slope[k];
+                A[r][FEATURES] += slope[r] * y;
+            }
+        }
+        solve(A, hold_of(n), law.w);
+    }
+    for (int i = 0; i < n; i++) {
+        double off = log((a + work_ms(&law, &p[i], NULL)) / p[i].ms);
+        law.misfit += off * off;
+    }
+    for (int r = 1; r < FEATURES; r++) law.misfit += hold_of(n) * law.w[r] * law.w[r];
+    return law;
+}
+
+static double cheapest(const seen *p, int n)
+{
+    double least = INFINITY;
+    for (int i = 0; i < n; i++) least = fmin(least, p[i].ms);
+    return 0.999 * least;
+}
+
+/* a between nothing and what the cheapest step took: the best of a grid */
+static cost_law on_grid(const seen *p, int n, double c, int grid)
+{
+    double most = cheapest(p, n);
+    cost_law best = fit(p, n, 0, c);
+    for (int k = 1; k <= grid; k++) {
+        cost_law next = fit(p, n, most * k / grid, c);
+        if (next.misfit < best.misfit) best = next;
+    }
+    return best;
+}
+
+/* c of nothing, or up to where reading weighs more than all else in the body that is read slowest; then a by golden
+ * section */
+static cost_law best_fit(const seen *p, int n)
+{
+    const double g = 0.6180339887498949;
+    double slowest = 0, most = cheapest(p, n);
+    for (int i = 0; i < n; i++) slowest = fmax(slowest, p[i].read_ms / p[i].n_node);
+    cost_law best = on_grid(p, n, 0, GRID);
+    for (int k = 0; k < RATES && slowest > 0; k++) {
+        cost_law next = on_grid(p, n, exp2(k - RATES / 2) / slowest, ROUGH);
+        if (next.misfit < best.misfit) best = next;
+    }
+    if (best.c > 0) best = on_grid(p, n, best.c, GRID);
+    double low = fmax(best.a - most / GRID, 0), high = fmin(best.a + most / GRID, most);
+    for (int k = 0; k < GOLDEN; k++) {
+        double p_at = high - g * (high - low), q_at = low + g * (high - low);
+        cost_law at = fit(p, n, p_at, best.c), other = fit(p, n, q_at, best.c);
+        if (at.misfit < other.misfit)
+            high = q_at;
+        else
+            low = p_at;
+        if (at.misfit < best.misfit) best = at;
+        if (other.misfit < best.misfit) best = other;
+    }
+    return best;
+}
+
+/* ---- counts ---- */
+
+static bool adapts(const pal_setting *s)
+{
+    return pal_study_is(s->model, "adaptive_springs") && !pal_study_is(s->element, "refined") && s->size > 1;
+}
+
+static bool counts(const pal_study *study, int i, int leave_out, const pal_setting *s)
+{
+    const pal_study_point *p = &study->point[i];
+    return i != leave_out && !p->err && p->priced.ms > 0 && isfinite(p->priced.ms) && p->n_node > 0 &&
+           p->n_substep > 0 && p->priced.setting.step_s > 0 && pal_study_is(p->priced.setting.model, s->model);
+}
+
+/* nodes of a body that adapts, wholly refined: as counted of that setting, else four times as many with each level */
+static double refined_nodes(const pal_study *study, int leave_out, const pal_setting *s, double coarse)
+{
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_setting *q = &study->point[i].priced.setting;
+        if (counts(study, i, leave_out, s) && pal_study_is(q->element, "refined") && q->size == s->size)
+            return study->point[i].n_node;
+    }
+    return coarse * exp2(2 * (s->size - 1));
+}
+
+/* sub-steps on its finest level, which one refined face is enough for: counted where it is wholly refined, else twice
+ * as many with each level */
+static double finest_substeps(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    double coarse = NAN;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *p = &study->point[i];
+        const pal_setting *q = &p->priced.setting;
+        if (!counts(study, i, leave_out, s)) continue;
+        /* of steps of their own */
+        double n = p->n_substep * s->step_s / q->step_s;
+        if (pal_study_is(q->element, "refined") && q->size == s->size) return n;
+        if (q->size == 1) coarse = n * exp2(s->size - 1);
+    }
+    return coarse;
+}
+
+/* how many of its nodes will be in use is seen of other levels: the same share of what refining could add; NaN: there
+ * are none */
+static double nodes_in_use(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    double coarse = NAN, share = 0;
+    int n = 0;
+    for (int i = 0; i < study->n_point; i++)
+        if (counts(study, i, leave_out, s) && study->point[i].priced.setting.size == 1) coarse = study->point[i].n_node;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *p = &study->point[i];
+        if (!counts(study, i, leave_out, s) || !adapts(&p->priced.setting)) continue;
+        double full = refined_nodes(study, leave_out, &p->priced.setting, coarse);
+        share += (p->n_node - coarse) / (full - coarse);
+        n++;
+    }
+    return n > 0 ? coarse + share / n * (refined_nodes(study, leave_out, s, coarse) - coarse) : (double)NAN;
+}
+
+/* ---- foreseen ---- */
+
+static double distance(const seen *p, const pal_setting *s, double n_node)
+{
+    const pal_setting *q = p->setting;
+    int knobs = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
+                !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
+                ((q->k_distance_J > 0) != (s->k_distance_J > 0));
+    return knobs + knobs_per_e * fabs(log(p->n_node / n_node));
+}
+
+static bool has_words(const seen *p, int n, const pal_setting *s)
+{
+    bool element = false, law = false, solver = false;
+    for (int i = 0; i < n; i++) {
+        element |= pal_study_is(p[i].setting->element, s->element), law |= pal_study_is(p[i].setting->law, s->law);
+        solver |= pal_study_is(p[i].setting->solver, s->solver);
+    }
+    return element && law && solver;
+}
+
+/* are the elements of all that count known? Else nodes stand for them: springs, studies kept before they were counted
+ */
+static bool are_counted(const pal_study *study, int leave_out, const pal_setting *s)
+{
+    for (int i = 0; i < study->n_point; i++)
+        if (counts(study, i, leave_out, s) && !(study->point[i].n_element > 0)) return false;
+    return true;
+}
+
+bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, double n_element, int n_substep,
+                            double read_ms, int leave_out, double *ms)
+{
+    seen p[PAL_STUDY_POINTS];
+    int n = 0;
+    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
+    double substeps = adapts(s) ? finest_substeps(study, leave_out, s) : n_substep;
+    const bool by_element = n_element > 0 && are_counted(study, leave_out, s);
+    if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
+    for (int i = 0; i < study->n_point; i++) {
+        const pal_study_point *q = &study->point[i];
+        if (!counts(study, i, leave_out, s)) continue;
+        p[n] = (seen){.setting = &q->priced.setting,
+                      .n_node = q->n_node,
+                      .n_element = by_element ? q->n_element : q->n_node,
+                      .n_substep = q->n_substep,
+                      .read_ms = q->read_ms};
+        p[n].ms = q->priced.ms * q->priced.setting.step_s / study->step_s;
+        features(p[n].setting, p[n].n_node, p[n].f);
+        n++;
+    }
+    if (n < LEAST || !has_words(p, n, s)) return false;
+    cost_law law = best_fit(p, n);
+    for (int i = 0; i < n; i++) {
+        double near = exp2(-2 * distance(&p[i], s, nodes));
+        off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], NULL));
+        weight += near;
+    }
+    seen own = {.setting = s,
+                .n_node = nodes,
+                .n_element = by_element ? n_element : nodes,
+                .n_substep = substeps,
+                .read_ms = read_ms};
+    features(s, nodes, own.f);
+    *ms = (law.a + work_ms(&law, &own, NULL) * exp(off / weight)) * study->step_s / s->step_s;
+    return true;
+}

@@ -1,0 +1,77 @@
+/* Springs fitted to the study's reference: homogeneous constants of edges and volumes, by the adjoint. Where there are
+ * several loads the last one is not fitted to, so that the point is judged by a load it has never seen as well. */
+#include "server/base/vec3.h"
+#include "server/calibrate/calibrate.h"
+#include "server/study/study_parts.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_EVALUATIONS = 60 };
+/* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate torture) */
+static const double least_volume = 0.1;
+
+/* the reference's rest under a load, in the problem's frame */
+static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
+{
+    const pal_prepared *mesh = job->scene->body[0].mesh;
+    size_t n = 3 * (size_t)job->n_probe;
+    *out = (pal_samples){job->n_probe, malloc(n * sizeof(double)), malloc(n * sizeof(double))};
+    if (!out->x || !out->u) return PAL_ERR_MEMORY;
+    for (int i = 0; i < job->n_probe; i++) pal_add3(out->x + 3 * i, job->probe + 3 * i, mesh->surface.origin_m);
+    memcpy(out->u, job->still[load], n * sizeof(double));
+    return PAL_ERR_OK;
+}
+
+static bool look(void *user, const pal_fit_step *step)
+{
+    (void)step;
+    return pal_study_goes_on(user);
+}
+
+static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_setting *setting, pal_note *note)
+{
+    pal_calibration_info info;
+    pal_fit_result result;
+    const pal_fit_options options = {.most_evaluation = MOST_EVALUATIONS, .step = look, .user = job};
+    pal_calibration_info_of(calibration, &info);
+    double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
+    if (!theta) return PAL_ERR_MEMORY;
+    memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
+    pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, note);
+    for (int k = 0; k < info.n_kind && !err; k++) {
+        if (info.kind[k] == PAL_SPRING_DISTANCE) setting->k_distance_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_AREA) setting->k_area_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_VOLUME) setting->k_volume_J = exp(theta[k]);
+    }
+    free(theta);
+    return err;
+}
+
+pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
+{
+    pal_samples samples[PAL_STUDY_LOADS] = {{0}};
+    pal_calibrate_case cases[PAL_STUDY_LOADS];
+    pal_calibrate_options options;
+    pal_calibration *calibration = NULL;
+    pal_err err = PAL_ERR_OK;
+    pal_calibrate_default(&options);
+    options.voxel.resolution = setting->size;
+    options.without_area = true, options.least_volume = least_volume;
+    int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
+    for (int k = 0; k < n_fit && !err; k++) {
+        err = take_samples(job, k, &samples[k]);
+        cases[k] = (pal_calibrate_case){
+            .load_case = job->load[k], .samples = &samples[k], .truth_name = "reference", .fit = true};
+    }
+    if (job->problem->n_support == 0)
+        err = pal_note_set(note, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
+    if (!err)
+        err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
+                                     &calibration, note);
+    if (!err) err = fit(job, calibration, setting, note);
+    pal_calibration_destroy(calibration);
+    for (int k = 0; k < n_fit; k++) pal_samples_free(&samples[k]);
+    return err;
+}

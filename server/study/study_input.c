@@ -1,0 +1,147 @@
+/* A word of the command line -> body and loads of a study. */
+#include "server/study/study_input.h"
+
+#include "server/mesh/files/mesh_file.h"
+#include "server/scene/json_reader.h"
+#include "server/scene/problem_file.h"
+#include "server/scene/scene_arg.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* a JSON file whose root has a "format" is a problem; what cannot be read is told later, by the scene's reader */
+static bool is_problem(const char *word)
+{
+    uint8_t *bytes;
+    size_t n_byte, n = strlen(word);
+    cJSON *root = NULL;
+    if (n <= 5 || strcmp(word + n - 5, ".json") != 0 || pal_file_read(word, PAL_JSON_MOST, &bytes, &n_byte, NULL))
+        return false;
+    const pal_json json = {word, NULL};
+    bool found = !pal_json_parse(&json, (const char *)bytes, n_byte, &root) &&
+                 cJSON_GetObjectItemCaseSensitive(root, "format") != NULL;
+    cJSON_Delete(root);
+    free(bytes);
+    return found;
+}
+
+static pal_err no_case(const pal_problem *p, const char *id, pal_note *note)
+{
+    char list[320] = "";
+    size_t n = 0;
+    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
+        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
+                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case: there is no load case or reference \"%.40s\"; known are %s",
+                        p->path, id, list);
+}
+
+static pal_err open_problem(const pal_study_question *q, pal_study_input *out, const char **samples, pal_note *note)
+{
+    pal_surface_report report = {0};
+    if (q->body) return pal_note_set(note, PAL_ERR_REFUSED, "%s: --body: a problem has one body", q->word);
+    PAL_TRY(pal_problem_read(q->word, &out->problem, note));
+    pal_problem *p = out->problem;
+    const pal_problem_reference *named = q->load_case ? pal_problem_reference_find(p, q->load_case) : NULL;
+    out->load_case = named          ? pal_problem_case_find(p, named->load_case)
+                     : q->load_case ? pal_problem_case_find(p, q->load_case)
+                                    : &p->load_case[0];
+    if (!out->load_case) return no_case(p, q->load_case, note);
+    if (named && !*samples) *samples = named->file;
+    pal_mesh_file_options file = {.unit_m = p->unit_m, .weld = PAL_MESH_WELD};
+    PAL_TRY(pal_mesh_file_read(p->surface, &file, &out->surface, &report, NULL, NULL, note));
+    pal_note why = {""};
+    pal_err err = pal_study_problem_scene(p, &out->surface, &why, &out->made);
+    if (err) return pal_note_set(note, err, "%s: %s", q->word, why.text);
+    out->scene = &out->made->scene;
+    return PAL_ERR_OK;
+}
+
+static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal_note *note)
+{
+    if (q->load_case && !q->kept_case)
+        return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has", q->word);
+    PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, note));
+    const pal_scene *scene = out->scene = &out->loaded->scene;
+    for (out->body = 0; q->body && out->body < scene->n_body; out->body++)
+        if (!strcmp(scene->body[out->body].name, q->body)) return PAL_ERR_OK;
+    if (!q->body) return PAL_ERR_OK;
+    return pal_note_set(note, PAL_ERR_REFUSED, "%s: --body: there is no \"%.40s\", the first is \"%s\"", q->word,
+                        q->body, scene->body[0].name);
+}
+
+pal_err pal_study_input_open(const pal_study_question *q, pal_study_input *out, pal_note *note)
+{
+    const char *samples = q->samples;
+    *out = (pal_study_input){0};
+    PAL_TRY(is_problem(q->word) ? open_problem(q, out, &samples, note) : open_scene(q, out, note));
+    if (!samples) return PAL_ERR_OK;
+    PAL_TRY(pal_samples_read(samples, &out->samples, note));
+    out->has_samples = true;
+    return PAL_ERR_OK;
+}
+
+void pal_study_input_close(pal_study_input *input)
+{
+    pal_set_scene_free(input->made);
+    pal_scene_free(input->loaded);
+    free(input->problem);
+    pal_surface_free(&input->surface);
+    pal_samples_free(&input->samples);
+    *input = (pal_study_input){0};
+}
+
+/* ---- what it is of ---- */
+
+static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
+{
+    return pal_study_sum(sum, value, n * sizeof *value);
+}
+
+static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
+{
+    const double kind[] = {l->kind, l->region.all, l->has_normal, l->has_traction, l->has_total};
+    sum = add_numbers(sum, kind, sizeof kind / sizeof *kind);
+    if (l->kind == PAL_LOAD_POINT) return add_numbers(add_numbers(sum, l->point_m, 3), l->force_N, 3);
+    if (l->kind == PAL_LOAD_GRAVITY) return add_numbers(sum, l->gravity_m_s2, 3);
+    if (!l->region.all) sum = add_numbers(add_numbers(sum, l->region.low_m, 3), l->region.high_m, 3);
+    if (l->has_normal) sum = add_numbers(sum, l->normal, 3);
+    if (l->has_traction) sum = add_numbers(sum, l->traction_Pa, 3);
+    return l->has_total ? add_numbers(sum, l->total_N, 3) : sum;
+}
+
+void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME])
+{
+    static const char named[] = "load case ";
+    const char *comma = strchr(loads, ',');
+    double value = comma ? strtod(comma + 1, NULL) : 0;
+    *seconds = value >= 0.01 && value <= 60 ? value : 0;
+    *quick = strstr(loads, ", quick") != NULL;
+    load_case[0] = 0;
+    if (comma && !strncmp(loads, named, sizeof named - 1))
+        snprintf(load_case, PAL_NAME, "%.*s", (int)(comma - loads) - (int)(sizeof named - 1), loads + sizeof named - 1);
+}
+
+void pal_study_input_describe(const pal_study_input *in, const pal_study_question *q, pal_study_file *file)
+{
+    const pal_scene *scene = in->scene;
+    /* whatever the reference depends on beside the body itself */
+    uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
+    pal_setting now;
+    pal_setting_of(scene, in->body, &now);
+    sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
+    char loads[80] = "three presses and a pull";
+    if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
+    for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);
+    if (in->has_samples) sum = add_numbers(sum, in->samples.x, 3 * (size_t)in->samples.n);
+    if (in->has_samples) sum = add_numbers(sum, in->samples.u, 3 * (size_t)in->samples.n);
+    snprintf(file->study.name, sizeof file->study.name, "%s", scene->name);
+    snprintf(file->body, sizeof file->body, "%s", scene->body[in->body].name);
+    file->index = in->body;
+    pal_study_shape(&scene->body[in->body], file->shape);
+    snprintf(file->loads, sizeof file->loads, "%s, %g s%s%s", loads, q->seconds,
+             in->has_samples ? ", given samples" : "", q->quick ? ", quick" : "");
+    snprintf(file->digest, sizeof file->digest, "%016" PRIx64, sum);
+}

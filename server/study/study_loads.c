@@ -1,0 +1,194 @@
+/* Presses and a pull for a scene that has no load cases: where they stand, how strong they are. */
+#include "server/base/vec3.h"
+#include "server/study/study_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PRESSES = 3, PULL = PRESSES, COARSE = 10, ROUNDS = 4 };
+static const double coarse_share = 0.6; /* of the reference's size, at least COARSE: a thin tip is stiff in fewer */
+/* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
+static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
+/* the same of the pull: as wide as a hand takes hold, no farther than this by the linear estimate, of a wall half as
+ * far, as it folds; aslant by so much */
+static const double grip_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
+/* what the reference moves by may be so many times what was wanted, or so little of it */
+static const double wide_of = 1.5;
+
+static double pull_of(const pal_study_job *job)
+{
+    return job->shell ? wall_share : pull_share;
+}
+
+static double diagonal(const pal_surface *s, double low[3])
+{
+    double high[3];
+    pal_surface_box(s, low, high);
+    return pal_dist3(low, high);
+}
+
+/* probes farthest from what is held and from each other */
+static pal_err choose_places(const pal_study_job *job, const pal_study_world *w, int out[PRESSES])
+{
+    double *far = malloc(sizeof *far * (size_t)job->n_probe);
+    if (!far) return PAL_ERR_MEMORY;
+    for (int i = 0; i < job->n_probe; i++) {
+        far[i] = INFINITY;
+        for (int k = 0; k < w->body->n_dof; k++)
+            if (w->body->held[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
+    }
+    for (int p = 0; p < PRESSES; p++) {
+        out[p] = 0;
+        for (int i = 0; i < job->n_probe; i++)
+            if (far[i] > far[out[p]]) out[p] = i;
+        for (int i = 0; i < job->n_probe; i++)
+            far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, job->probe + 3 * out[p]));
+    }
+    free(far);
+    return PAL_ERR_OK;
+}
+
+/* the way in, by the triangles that have a corner in the patch */
+static void inward(const pal_surface *s, const double at[3], double half, double out[3])
+{
+    double sum[3] = {0, 0, 0};
+    for (int t = 0; t < s->n_tri; t++) {
+        const double *x[3];
+        double e[2][3], n[3];
+        bool near = false;
+        for (int c = 0; c < 3; c++) x[c] = s->x + 3 * (size_t)s->tri[3 * t + c];
+        for (int c = 0; c < 3; c++) near = near || pal_dist3(x[c], at) < half;
+        if (!near) continue;
+        pal_sub3(e[0], x[1], x[0]);
+        pal_sub3(e[1], x[2], x[0]);
+        pal_cross3(n, e[0], e[1]);
+        pal_add3(sum, sum, n);
+    }
+    double size = pal_norm3(sum);
+    pal_set3(out, 0, 0, 0);
+    if (size > 0) pal_scale3(out, -1 / size, sum);
+}
+
+/* outward and aslant, so that no press has said it before */
+static void turn_to_pull(double n[3])
+{
+    double axis[3] = {0, 0, 0}, side[3];
+    int least = fabs(n[1]) < fabs(n[0]) ? 1 : 0;
+    if (fabs(n[2]) < fabs(n[least])) least = 2;
+    axis[least] = 1;
+    pal_cross3(side, n, axis);
+    pal_scale3(side, aslant / fmax(pal_norm3(side), 1e-30), side);
+    for (int c = 0; c < 3; c++) n[c] = side[c] - n[c];
+    pal_scale3(n, 1 / pal_norm3(n), n);
+}
+
+static void place_load(pal_study_job *job, int index, const pal_surface *s, const double at[3], double half)
+{
+    pal_problem_case *c = &job->problem->load_case[index];
+    double n[3], low[3];
+    inward(s, at, 1.5 * half, n);
+    /* a surface with a fold there: against its middle */
+    if (!(pal_norm3(n) > 0)) {
+        double size = diagonal(s, low);
+        for (int k = 0; k < 3; k++) n[k] = low[k] - at[k] + size / 2;
+        pal_scale3(n, 1 / fmax(pal_norm3(n), 1e-30), n);
+    }
+    if (index == PULL) turn_to_pull(n);
+    if (index == PULL)
+        snprintf(c->id, sizeof c->id, "pull");
+    else
+        snprintf(c->id, sizeof c->id, "press %d", index + 1);
+    c->n_load = 1;
+    c->load[0] = (pal_problem_load){.kind = PAL_LOAD_TRACTION, .has_total = true};
+    pal_copy3(c->load[0].total_N, n);
+    for (int k = 0; k < 3; k++) {
+        c->load[0].region.low_m[k] = at[k] - half + s->origin_m[k];
+        c->load[0].region.high_m[k] = at[k] + half + s->origin_m[k];
+    }
+    job->load[index] = c;
+}
+
+static pal_setting coarse(const pal_study_job *job)
+{
+    int size = (int)(coarse_share * job->reference);
+    pal_setting s = {.size = job->shell ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
+    snprintf(s.model, PAL_NAME, "%s", job->shell ? "adaptive_springs" : "fem");
+    snprintf(s.law, PAL_NAME, "%s", job->shell ? "" : "linear");
+    return s;
+}
+
+/* so that what it moves most moves by its share: by what the coarse body answers, which is linear in it or nearly so */
+static pal_err scale_load(pal_study_job *job, int index, double size_m)
+{
+    pal_setting s = coarse(job);
+    double *total = job->problem->load_case[index].load[0].total_N;
+    const double share[2] = {job->shell ? first_share : press_share, press_share};
+    /* a linear body says all at once; from a guess of what a body of that stiffness bears */
+    double guess = job->scene->body[0].material.young_Pa * first_share * size_m * size_m * (job->shell ? 1e-3 : 1);
+    pal_scale3(total, guess, total);
+    for (int round = 0; round < (job->shell ? 2 : 1); round++) {
+        int n_node;
+        PAL_TRY(pal_study_kept_static(job, &s, job->load[index], job->now, &n_node, job->note));
+        double moved = 0;
+        for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
+        if (!(moved > 0) || !isfinite(moved))
+            return pal_note_set(job->note, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
+                                pal_norm3(total));
+        double wanted = share[round] * size_m / moved, size_N = pal_norm3(total);
+        /* a hand pulls with what the tool may, and no farther than a body can be said to bear */
+        double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
+        if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * size_m / moved);
+        pal_scale3(total, wanted, total);
+    }
+    return PAL_ERR_OK;
+}
+
+bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
+{
+    if (index >= job->n_press || job->round[index] >= ROUNDS) return false;
+    double *total = job->problem->load_case[index].load[0].total_N, moved = 0, times = 1;
+    bool none = err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
+    for (int i = 0; i < job->n_probe && !err; i++) moved = fmax(moved, pal_norm3(job->still[index] + 3 * i));
+    if (none) times = 0.5;
+    if (!err && moved > 0) times = press_share * job->out->size_m / moved;
+    if (!err && index == PULL) times = moved > 0 ? fmin(wide_of * pull_of(job) * job->out->size_m / moved, 1) : 1;
+    if (!none && times <= wide_of && times >= (index == PULL ? 1 : 1 / wide_of)) return false;
+    job->round[index]++;
+    pal_scale3(total, times, total);
+    return true;
+}
+
+pal_err pal_study_presses(pal_study_job *job)
+{
+    pal_study_world w;
+    pal_setting s = coarse(job);
+    int place[PRESSES], n_held = 0;
+    double low[3];
+    PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
+    for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->held[i] != 0;
+    pal_err err = PAL_ERR_OK;
+    if (n_held == 0 && !job->shell)
+        err = pal_note_set(job->note, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
+                           job->scene->body[0].name);
+    if (!err) err = choose_places(job, &w, place);
+    const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
+    double size_m = diagonal(surface, low);
+    for (int k = 0; k < PRESSES && !err; k++)
+        place_load(job, k, surface, job->probe + 3 * place[k], patch_share * size_m);
+    /* where it moves most: at the place that is farthest from what holds it */
+    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * size_m);
+    pal_study_close(&w);
+    job->n_load = job->n_press = job->problem->n_case = PULL + 1;
+    for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, size_m);
+    return err;
+}
+
+void pal_study_press_less(pal_study_job *job)
+{
+    for (int k = 0; k < job->n_load; k++) {
+        double *total = job->problem->load_case[k].load[0].total_N;
+        pal_scale3(total, 0.5, total);
+    }
+}

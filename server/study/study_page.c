@@ -1,0 +1,441 @@
+/* Studies as table, drawing and page. */
+#include "server/study/study_page.h"
+
+#include "server/figure/plot.h"
+#include "server/mesh/files/mesh_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_SETTING_TEXT };
+
+const char *pal_study_method(const pal_setting *setting, char out[PAL_SETTING_TEXT])
+{
+    bool calibrated = setting->k_distance_J > 0;
+    snprintf(out, PAL_SETTING_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
+             calibrated ? " calibrated" : "");
+    return out;
+}
+
+static bool is_measured(const pal_study_point *p)
+{
+    return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
+}
+
+static double step_of(const pal_study *study, const pal_study_point *p)
+{
+    return p->priced.setting.step_s > 0 ? p->priced.setting.step_s : study->step_s;
+}
+
+bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
+{
+    return is_measured(p) && 1e-3 * p->priced.ms <= study->step_s;
+}
+
+/* as the command has written its loads (study_input.c) */
+static bool is_quick(const pal_study_file *file)
+{
+    return strstr(file->loads, ", quick") != NULL;
+}
+
+/* ---- table ---- */
+
+/* a cell of the table; "-" when the number is not known */
+static void print_cell(FILE *to, int width, const char *format, double value)
+{
+    char text[32] = "-";
+    if (isfinite(value)) snprintf(text, sizeof text, format, value);
+    fprintf(to, " %*s", width, text);
+}
+
+void pal_study_print(const pal_study_file *file, FILE *to)
+{
+    const pal_study *s = &file->study;
+    int order[PAL_STUDY_POINTS], n_bad = 0;
+    char text[PAL_SETTING_TEXT];
+    fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
+    fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
+            1e3 * s->most_m);
+    if (!pal_study_trusted(s))
+        fprintf(to,
+                "So much that no setting is named: hold more of the body (palpate prepare --hold 20, with --up as "
+                "it lies)%s.\n",
+                is_quick(file) ? ", or study it without --quick" : "");
+    if (is_quick(file))
+        fprintf(to,
+                "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
+                "used run it without --quick.\n");
+    fprintf(to, "%1s %3s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "row", "ms", "p95", "live", "rest RMS",
+            "most mm", "RMS %", "most %", "way mm", "nodes", "steps", "setting");
+    pal_study_order(s, order);
+    for (int k = 0; k < s->n_point; k++) {
+        const pal_study_point *p = &s->point[order[k]];
+        if (!is_measured(p)) {
+            n_bad++;
+            continue;
+        }
+        fprintf(to, "%1s %3d", p->priced.front ? "*" : "", k + 1);
+        print_cell(to, 8, "%.3f", p->priced.ms);
+        print_cell(to, 8, "%.3f", p->ms_p95);
+        fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
+        print_cell(to, 9, "%.4f", 1e3 * p->static_rms_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->static_most_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->most_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->most_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->way_most_m);
+        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text),
+                p->why[0] ? "; " : "", p->why);
+    }
+    fprintf(to,
+            "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that. "
+            "ms: for %.3g ms of the body's time, with shorter "
+            "steps so "
+            "many of them.\nLive: no more than that. Steps: sub-steps of one.\n",
+            1e3 * s->step_s);
+    for (int k = 0; k < s->n_point && n_bad > 0; k++) {
+        const pal_study_point *p = &s->point[order[k]];
+        if (!is_measured(p))
+            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_setting_text(&p->priced.setting, text),
+                    p->why[0] ? p->why : pal_err_text(p->err));
+    }
+}
+
+/* ---- drawing ---- */
+
+/* the knobs of a point on the front, as short as its mark allows */
+static void knobs_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
+{
+    const pal_setting *s = &p->priced.setting;
+    bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
+    int n = s->size > 0 ? snprintf(out, n_byte, "%d %s", s->size,
+                                   voxels         ? "voxels"
+                                   : s->size == 1 ? "level"
+                                                  : "levels")
+                        : snprintf(out, n_byte, "as it is");
+    bool refined = !strcmp(s->element, "refined");
+    if (refined) n += snprintf(out + n, n_byte - (size_t)n, " refined");
+    bool law = s->law[0] && strcmp(s->law, "corotational") != 0, other = !strcmp(s->solver, "sdirk2");
+    n += snprintf(out + n, n_byte - (size_t)n, "%s%s%s", law ? " " : "", law ? s->law : "", other ? " sdirk2" : "");
+    double step = step_of(study, p);
+    if ((size_t)n < n_byte && fabs(step - study->step_s) > 1e-9 && step > 0)
+        n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
+    if (s->tolerance > 0 && s->tolerance != usual && (size_t)n < n_byte)
+        snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
+}
+
+/* the tolerance that most settings have; 0: none has one */
+static double usual_tolerance(const pal_study *study)
+{
+    double usual = 0;
+    int most = 0;
+    for (int k = 0; k < study->n_point; k++) {
+        double t = study->point[k].priced.setting.tolerance;
+        int n = 0;
+        for (int i = 0; i < study->n_point; i++) n += study->point[i].priced.setting.tolerance == t;
+        if (t > 0 && n > most) most = n, usual = t;
+    }
+    return usual;
+}
+
+/* what a drawing of a study borrows */
+typedef struct series {
+    char name[METHODS][PAL_SETTING_TEXT];
+    int n_method, n[METHODS], n_front;
+    bool apart[METHODS]; /* not for the front, as their `why` says */
+    double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
+    const char *tip[METHODS][PAL_STUDY_POINTS];
+    char tip_text[PAL_STUDY_POINTS][TIP];
+    int n_tip;
+    double front_x[PAL_STUDY_POINTS], front_y[PAL_STUDY_POINTS];
+    char knobs[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
+    pal_plot_label label[FRONT_LABELS];
+    int n_label;
+    double usual; /* tolerance that goes without saying */
+} series;
+
+static void add_point(series *s, const pal_study *study, const pal_study_point *p)
+{
+    char name[PAL_SETTING_TEXT];
+    int k = 0;
+    bool apart = p->why[0] != 0;
+    pal_study_method(&p->priced.setting, name);
+    while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
+    if (k == s->n_method) {
+        if (s->n_method == METHODS) return;
+        s->apart[k] = apart;
+        memcpy(s->name[s->n_method++], name, sizeof name);
+    }
+    char *tip = s->tip_text[s->n_tip++], text[PAL_SETTING_TEXT];
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_setting_text(&p->priced.setting, text), p->priced.ms,
+             1e3 * p->priced.error_m, apart ? "; " : "", p->why);
+    s->tip[k][s->n[k]] = tip;
+    s->x[k][s->n[k]] = p->priced.ms;
+    s->y[k][s->n[k]++] = 1e3 * p->priced.error_m;
+    if (!p->priced.front) return;
+    s->front_x[s->n_front] = p->priced.ms;
+    s->front_y[s->n_front++] = 1e3 * p->priced.error_m;
+    if (s->n_label == FRONT_LABELS) return;
+    knobs_of(study, p, s->usual, s->knobs[s->n_label], sizeof *s->knobs);
+    s->label[s->n_label] = (pal_plot_label){p->priced.ms, 1e3 * p->priced.error_m, s->knobs[s->n_label]};
+    s->n_label++;
+}
+
+pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_note *note)
+{
+    const pal_study *study = &file->study;
+    int order[PAL_STUDY_POINTS];
+    series *s = calloc(1, sizeof *s);
+    if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    pal_study_order(study, order);
+    s->usual = usual_tolerance(study);
+    for (int k = 0; k < study->n_point; k++)
+        if (is_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
+    snprintf(s->title, sizeof s->title, "%s: what accuracy costs", study->name);
+    snprintf(s->live, sizeof s->live, "real time, %.3g ms", 1e3 * study->step_s);
+    snprintf(s->x_label, sizeof s->x_label, "milliseconds of computing for %.3g ms of the body's time, median",
+             1e3 * study->step_s);
+    snprintf(s->own, sizeof s->own, "the reference itself, %.2g mm", 1e3 * study->reference_m);
+    pal_plot plot = {.title = s->title,
+                     .x_label = s->x_label,
+                     .y_label = "largest error, mm",
+                     .log_x = true,
+                     .log_y = true,
+                     .wide = 980,
+                     .high = 560,
+                     .n_guide = 2,
+                     .n_label = s->n_label,
+                     .label = s->label};
+    plot.guide[0] = (pal_plot_guide){.vertical = true, .at = 1e3 * study->step_s, .text = s->live};
+    plot.guide[1] = (pal_plot_guide){.at = 1e3 * study->reference_m, .text = s->own};
+    plot.curve[plot.n_curve++] =
+        (pal_curve){.name = "the front", .n = s->n_front, .x = s->front_x, .y = s->front_y, .bare = true, .ink = true};
+    bool any_apart = false;
+    for (int k = 0; k < s->n_method; k++) {
+        any_apart = any_apart || s->apart[k];
+        plot.curve[plot.n_curve++] = (pal_curve){.name = s->name[k],
+                                                 .n = s->n[k],
+                                                 .x = s->x[k],
+                                                 .y = s->y[k],
+                                                 .tip = s->tip[k],
+                                                 .hollow = s->apart[k],
+                                                 .dots = true};
+    }
+    if (any_apart)
+        plot.y_label = "largest error, mm (hollow: fitted to this load or failed a torture, so not on the front)";
+    pal_err err = pal_plot_text(&plot, svg, n_byte, note);
+    free(s);
+    return err;
+}
+
+/* ---- page ---- */
+
+static void put_text(FILE *to, const char *text)
+{
+    for (; *text; text++)
+        if (*text == '<')
+            fputs("&lt;", to);
+        else if (*text == '>')
+            fputs("&gt;", to);
+        else if (*text == '&')
+            fputs("&amp;", to);
+        else if (*text == '"')
+            fputs("&quot;", to);
+        else
+            fputc(*text, to);
+}
+
+static void put_fact(FILE *to, const char *name, const char *text)
+{
+    fprintf(to, "<dt>%s</dt><dd>", name);
+    put_text(to, text);
+    fputs("</dd>\n", to);
+}
+
+static void put_number(FILE *to, const char *form, double value)
+{
+    fputs("<td class=\"n\">", to);
+    if (isfinite(value)) fprintf(to, form, value);
+    fputs("</td>", to);
+}
+
+/* a word of a command, which may stand in quotes; returns what follows it and the blanks behind it */
+static const char *word_end(const char *at)
+{
+    for (bool quoted = false; *at && (quoted || *at != ' '); at++)
+        if (*at == '\'') quoted = !quoted;
+    while (*at == ' ') at++;
+    return at;
+}
+
+/* the command of a study without what asks for a setting, for starting over or for another kind of output */
+static void put_study(FILE *to, const pal_study_file *file)
+{
+    static const char *const apart[] = {"--within", "--budget", "--pick", "-o", "--again", "--json", "--quiet"};
+    char text[sizeof file->command + 2];
+    for (const char *at = file->command, *next; *at; at = next) {
+        next = word_end(at);
+        bool left = false;
+        for (int k = 0; k < 7 && !left; k++) {
+            size_t n = strlen(apart[k]);
+            left = !strncmp(at, apart[k], n) && (at[n] == 0 || at[n] == ' ' || at[n] == '=');
+            /* with its value */
+            if (left && k < 4 && at[n] == ' ') next = word_end(next);
+        }
+        if (left) continue;
+        snprintf(text, sizeof text, "%.*s%s", (int)(next - at), at, *next || next[-1] == ' ' ? "" : " ");
+        put_text(to, text);
+    }
+}
+
+/* the command that writes the scene of a row */
+static void put_order(FILE *to, const pal_study_file *file, int row)
+{
+    fputs("<br><code>", to);
+    put_study(to, file);
+    fprintf(to, "--pick %d -o NEW</code>", row);
+}
+
+static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p, int row)
+{
+    const pal_study *s = &file->study;
+    char text[PAL_SETTING_TEXT];
+    bool measured = is_measured(p);
+    fprintf(to, "<tr%s><td>%s</td><td class=\"n\">",
+            p->priced.front ? " class=\"front\""
+            : measured      ? ""
+                            : " class=\"bad\"",
+            p->priced.front ? "&#9733;" : "");
+    fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
+    put_text(to, pal_setting_text(&p->priced.setting, text));
+    if (p->priced.front) put_order(to, file, row);
+    if (!measured || p->why[0]) {
+        fputs("<br>", to);
+        put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
+    }
+    fputs("</td>", to);
+    put_number(to, "%.3f", p->priced.ms);
+    put_number(to, "%.3f", p->ms_p95);
+    fprintf(to, "<td>%s</td>", !measured ? "" : pal_study_is_live(s, p) ? "yes" : "no");
+    put_number(to, "%.4f", 1e3 * p->priced.error_m);
+    put_number(to, "%.4f", 1e3 * p->static_rms_m);
+    put_number(to, "%.4f", 1e3 * p->static_most_m);
+    put_number(to, "%.2f", 1e2 * p->static_rms_m / s->most_m);
+    put_number(to, "%.2f", 1e2 * p->static_most_m / s->most_m);
+    put_number(to, "%.4f", 1e3 * p->way_rms_m);
+    put_number(to, "%.4f", 1e3 * p->way_most_m);
+    fprintf(to, "<td class=\"n\">%d</td><td class=\"n\">%d</td>", p->n_node, p->n_substep);
+    put_number(to, "%.2f", p->prepare_s);
+    put_number(to, "%.3f", p->predicted_ms);
+    put_number(to, "%.4f", 1e3 * p->predicted_m);
+    fputs("</tr>\n", to);
+}
+
+static const char head[] =
+    "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
+    "body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:1180px;margin:1.5em auto;padding:0 1em}\n"
+    "h1{font-size:1.5em;margin:0 0 "
+    ".5em}svg{max-width:100%;min-width:760px;height:auto}code{font-size:12px;color:#555;user-select:all}\n"
+    "dl{display:grid;grid-template-columns:max-content 1fr;gap:.15em 1em;margin:0 0 1em}dt{color:#666}dd{margin:0}\n"
+    ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px}\n"
+    "th,td{padding:.2em .6em;text-align:left;border-bottom:1px solid #ddd;vertical-align:top}\n"
+    "th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:#fff}td{white-space:nowrap}\n"
+    "th:nth-child(n+4),td:nth-child(n+4){text-align:right}button{font:inherit;min-width:2.6em;cursor:pointer}\n"
+    "#copied{position:sticky;top:0;z-index:1;background:#fff;min-height:1.45em;margin:.5em 0}\n"
+    "td.n{text-align:right;font-variant-numeric:tabular-nums}\n"
+    "tr.front{background:#fff6dc}tr.bad{color:#888}tr.bad td{white-space:normal}p{color:#555}\n</style>\n<title>";
+
+/* a click on a heading sorts by it, another one the other way; empty cells stay last; a row's button copies its
+ * command, also from a file, where some browsers keep the clipboard to what is selected */
+static const char sorting[] =
+    "<script>\ndocument.querySelectorAll('th').forEach((th,c)=>th.addEventListener('click',()=>{\n"
+    "const body=document.querySelector('tbody'),way=th.dataset.way==='1'?-1:1;th.dataset.way=String(way);\n"
+    "const key=r=>r.cells[c].textContent.trim();\n"
+    "const rows=[...body.rows].sort((a,b)=>{const s=key(a),t=key(b);if(!s||!t)return s?-1:t?1:0;\n"
+    "const n=Number(s)-Number(t);return way*(Number.isNaN(n)?s.localeCompare(t):n)});\n"
+    "body.append(...rows)}));\n"
+    "const copied=document.querySelector('#copied');\n"
+    "document.querySelectorAll('button').forEach(b=>b.addEventListener('click',async()=>{\n"
+    "const line=copied.dataset.study+'--pick '+b.textContent+' -o NEW';let done=true;\n"
+    "copied.innerHTML='<span></span> <code></code>';copied.lastChild.textContent=line;\n"
+    "try{await navigator.clipboard.writeText(line)}catch{getSelection().selectAllChildren(copied.lastChild);\n"
+    "done=document.execCommand('copy')}\n"
+    "copied.firstChild.textContent=done?'copied:':'to be copied:'}));\n</script>\n";
+
+static void put_page(FILE *to, const pal_study_file *file, const char *svg)
+{
+    static const char *const column[] = {"",          "row",         "setting",     "ms",      "ms p95",
+                                         "live",      "error mm",    "rest RMS mm", "rest mm", "rest RMS %",
+                                         "rest %",    "way RMS mm",  "way mm",      "nodes",   "sub-steps",
+                                         "made in s", "foreseen ms", "foreseen mm"};
+    const pal_study *s = &file->study;
+    char text[200];
+    int order[PAL_STUDY_POINTS];
+    fputs(head, to);
+    put_text(to, s->name);
+    fputs(": what accuracy costs</title></head><body>\n<h1>", to);
+    put_text(to, s->name);
+    fputs(": what accuracy costs</h1>\n<dl>\n", to);
+    put_fact(to, "machine", s->machine);
+    put_fact(to, "reference", s->reference);
+    snprintf(text, sizeof text, "%.3g mm; the most that moves %.4g mm, the body %.4g mm across", 1e3 * s->reference_m,
+             1e3 * s->most_m, 1e3 * s->size_m);
+    put_fact(to, "its own error", text);
+    if (is_quick(file)) put_fact(to, "quick", "a coarse reference: errors below its own are of chance");
+    put_fact(to, "loads", file->loads);
+    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_all, file->whole ? "" : ", broken off");
+    put_fact(to, "settings", text);
+    put_fact(to, "made by", file->command);
+    fputs("</dl>\n", to);
+    fputs(svg ? "<div class=\"wide\">" : "", to);
+    fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
+    if (svg) fputs("</div>\n", to);
+    fprintf(to,
+            "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
+            "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
+            "at rest or on the way. Point at a mark for its setting. A row's button copies the command that writes its "
+            "scene; under one of the front it stands as well.</p>\n",
+            1e3 * s->step_s);
+    fputs("<p id=\"copied\" data-study=\"", to);
+    put_study(to, file);
+    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr>", to);
+    for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
+    fputs("</tr></thead><tbody>\n", to);
+    pal_study_order(s, order);
+    for (int k = 0; k < s->n_point; k++) put_row(to, file, &s->point[order[k]], k + 1);
+    fputs("</tbody></table></div>\n", to);
+    fputs(sorting, to);
+    fputs("</body></html>\n", to);
+}
+
+static pal_err write_page(const pal_study_file *file, const char *svg, const char *path, pal_note *note)
+{
+    char *bytes = NULL;
+    size_t n_byte = 0;
+    FILE *to = open_memstream(&bytes, &n_byte);
+    if (!to) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    put_page(to, file, svg);
+    bool whole = !ferror(to);
+    whole = fclose(to) == 0 && whole;
+    pal_err err = whole ? pal_file_write(path, bytes, n_byte, note)
+                        : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    free(bytes);
+    return err;
+}
+
+pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_note *note)
+{
+    char path[PAL_STUDY_PATH + 8], *svg = NULL;
+    size_t n_byte = 0;
+    snprintf(path, sizeof path, "%s.csv", stem);
+    PAL_TRY(pal_study_file_csv(file, path, note));
+    pal_err err = pal_study_draw(file, &svg, &n_byte, note);
+    if (err && err != PAL_ERR_REFUSED) return err;
+    snprintf(path, sizeof path, "%s.svg", stem);
+    err = svg ? pal_file_write(path, svg, n_byte, note) : PAL_ERR_OK;
+    snprintf(path, sizeof path, "%s.html", stem);
+    if (!err) err = write_page(file, svg, path, note);
+    free(svg);
+    return err;
+}

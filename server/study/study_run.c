@@ -1,0 +1,256 @@
+/* One point of a study: what it costs and how far off it is. */
+#include "server/base/clock.h"
+#include "server/base/machine.h"
+#include "server/base/vec3.h"
+#include "server/study/study_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_TIMES = 1200, WARM = 3, LEAST_TIMES = 30, ROUNDS = 2 };
+/* the way is gone again until its steps have taken so long together: a median of some microseconds is of nothing */
+static const double least_ms = 50;
+/* sub-steps times nodes of a way: what is slower is not followed, only timed */
+static const double most_work = 1.5e9, timed_s = 2;
+/* of the first load: put on at once it swings about as far as the whole one moves the body at rest */
+static const double way_share = 0.5;
+
+/* ---- at rest ---- */
+
+static bool same_rest(const pal_setting *a, const pal_setting *b)
+{
+    pal_setting p = *a, q = *b;
+    p.step_s = q.step_s = p.tolerance = q.tolerance = 0;
+    p.solver[0] = q.solver[0] = 0;
+    return pal_setting_same(&p, &q);
+}
+
+static void find_rest(pal_study_job *job, const pal_setting *setting, int *n_node)
+{
+    pal_study_rest *r = &job->rest;
+    pal_note why = {{0}};
+    double sum = 0;
+    *r = (pal_study_rest){.known = true, .of = *setting};
+    for (int k = 0; k < job->n_load && !r->err; k++) {
+        r->err = pal_study_static(job, setting, job->load[k], job->now, n_node, &why);
+        for (int i = 0; i < job->n_probe && !r->err; i++) {
+            double off = pal_dist3(job->now + 3 * i, job->still[k] + 3 * i);
+            sum += off * off;
+            r->most_m = fmax(r->most_m, off);
+        }
+    }
+    r->rms_m = sqrt(sum / (job->n_probe * job->n_load));
+    if (r->err) snprintf(r->why, sizeof r->why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+}
+
+/* ---- in motion ---- */
+
+static double quantile(const double *times, int n, double share)
+{
+    return n > 0 ? times[(int)(share * (n - 1) + 0.5)] : NAN;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* one step on the clock; false: it cannot go on */
+static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+{
+    pal_world_wake(w->world);
+    uint64_t before = pal_clock_thread_ns();
+    pal_err err = pal_world_step(w->world, w->set->scene.step_s);
+    if (err == PAL_ERR_BUDGET) return pal_note_set(note, err, "needs more sub-steps than the scene allows");
+    if (err || w->body->frozen || !pal_body_finite(w->body))
+        return pal_note_set(note, err ? err : PAL_ERR_FROZEN, "diverged and froze");
+    if (ms && *n_ms < most) ms[(*n_ms)++] = 1e-6 * (double)(pal_clock_thread_ns() - before);
+    return PAL_ERR_OK;
+}
+
+/* steps for the clock alone, until there are enough */
+static pal_err only_time(pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+{
+    double start = pal_clock_s();
+    while (*n_ms < LEAST_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < timed_s))
+        PAL_TRY(timed_step(w, ms, most, n_ms, note));
+    return PAL_ERR_OK;
+}
+
+/* frames lie between steps: linear from the one before to the one after; way NULL: for the clock alone */
+static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int most, int *n_ms,
+                      pal_note *note)
+{
+    double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
+    for (int frame = 0; frame < job->n_way;) {
+        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
+        pal_err err = timed_step(w, ms, most, n_ms, note);
+        if (err == PAL_ERR_FROZEN) return pal_note_set(note, err, "diverged and froze after %.2f s", time);
+        PAL_TRY(err);
+        if (way) PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, note));
+        time += step_s;
+        for (; frame < job->n_way && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
+            double share = fmin(fmax(1 - (time - (frame + 1) * PAL_STUDY_FRAME_S) / step_s, 0), 1);
+            for (int c = 0; c < 3 && way; c++) way[frame][c] = (1 - share) * last[c] + share * now[c];
+        }
+        if (way) pal_copy3(last, now);
+    }
+    return PAL_ERR_OK;
+}
+
+/* the same way from rest as often as it takes, so that short steps are timed as well as long ones */
+static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+{
+    pal_err err = PAL_ERR_OK;
+    for (;;) {
+        double sum = 0;
+        for (int i = 0; i < *n_ms; i++) sum += ms[i];
+        if (err || sum >= least_ms || *n_ms >= most) return err;
+        pal_world_reset(w->world);
+        err = pal_study_put(job, w, job->load[0], way_share, note);
+        if (!err) err = follow(job, w, NULL, ms, most, n_ms, note);
+    }
+}
+
+/* a factor's entries, floats, forwards and backwards, as fast as so much is read as all that a step may go through */
+static double read_ms(const pal_world *world)
+{
+    pal_solve_report report;
+    if (!pal_world_solve_report(world, 0, &report) || report.factor_nonzeros <= 0) return 0;
+    double factor = sizeof(float) * (double)report.factor_nonzeros, all = (double)pal_world_bytes(world) + factor;
+    return pal_machine_read_ms(all) * 2 * factor / all;
+}
+
+pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
+                      pal_study_point *facts, pal_note *note)
+{
+    pal_study_world w;
+    PAL_TRY(pal_study_open(job, setting, false, &w, note));
+    int n_substep = pal_world_substeps(w.world);
+    double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
+    pal_err err = pal_study_put(job, &w, job->load[0], way_share, note);
+    /* the reference is followed whatever it takes */
+    if (!err && facts && work > most_work) {
+        err = only_time(&w, ms, most, n_ms, note);
+        if (!err) err = pal_note_set(note, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
+    } else if (!err) {
+        err = follow(job, &w, way, ms, most, n_ms, note);
+        if (facts) facts->n_node = pal_body_nodes(w.body);
+        if (!err && ms) err = only_time(&w, ms, most, n_ms, note);
+        if (!err && ms) err = repeat(job, &w, ms, most, n_ms, note);
+    }
+    if (facts) {
+        /* what adapts takes the sub-steps of the finest level that it came to use */
+        facts->n_substep = w.body->shell ? pal_world_substeps(w.world) : n_substep;
+        if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
+        facts->prepare_s = w.prepare_s;
+        facts->read_ms = read_ms(w.world);
+        if (pal_study_is(setting->model, "fem")) facts->n_element = w.body->n_element;
+    }
+    pal_study_close(&w);
+    return err;
+}
+
+static void compare_ways(const pal_study_job *job, pal_study_point *out)
+{
+    double sum = 0;
+    out->way_most_m = 0;
+    for (int i = 0; i < job->n_way; i++) {
+        double off = pal_dist3(job->own[i], job->way[i]);
+        sum += off * off;
+        out->way_most_m = fmax(out->way_most_m, off);
+    }
+    out->way_rms_m = sqrt(sum / job->n_way);
+}
+
+/* ---- both ---- */
+
+/* the way on the clock; counts when it is the first, or quicker than those before it */
+static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_note *note)
+{
+    double *ms = calloc(MOST_TIMES, sizeof *ms);
+    int n_ms = 0;
+    pal_study_point facts = *out;
+    pal_err err =
+        !ms ? PAL_ERR_MEMORY : pal_study_way(job, &out->priced.setting, way, ms, MOST_TIMES, &n_ms, &facts, note);
+    /* how fast it reads is a matter of other work as well */
+    double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
+    if (way) *out = facts;
+    out->read_ms = read;
+    if (n_ms > 2 * WARM) {
+        qsort(ms + WARM, (size_t)(n_ms - WARM), sizeof *ms, compare);
+        /* shorter steps are more of them in the same time: what a step of the scene takes is what can be compared */
+        double share = job->out->step_s / out->priced.setting.step_s;
+        double median = share * quantile(ms + WARM, n_ms - WARM, 0.5);
+        if (!(out->priced.ms <= median)) {
+            out->priced.ms = median;
+            out->ms_p95 = share * quantile(ms + WARM, n_ms - WARM, 0.95);
+        }
+    }
+    free(ms);
+    return err;
+}
+
+pal_err pal_study_time_again(pal_study_job *job)
+{
+    const pal_study_options *o = job->options;
+    int n = job->out->n_point, n_round = o->quick ? 1 : ROUNDS;
+    for (int i = 0; i < n * n_round; i++) {
+        pal_study_point *p = &job->out->point[i % n];
+        bool go = !o->progress || o->progress("timed again", (double)i / (n * n_round), o->user);
+        pal_note why = {{0}};
+        if (go && !(p->priced.ms > 0)) continue;
+        /* what went once goes again, or is stopped */
+        if (go) (void)time_way(job, p, NULL, &why);
+        if (!go || !pal_study_goes_on(job))
+            return pal_note_set(job->note, PAL_ERR_STATE, "stopped while settings were timed again");
+    }
+    pal_study_front(job->out);
+    return PAL_ERR_OK;
+}
+
+static void run(pal_study_job *job, pal_study_point *out)
+{
+    pal_note why = {{0}};
+    pal_err err = time_way(job, out, job->own, &why);
+    if (!err) compare_ways(job, out);
+    if (err && !out->err) {
+        out->err = err;
+        snprintf(out->why, sizeof out->why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+    }
+}
+
+static pal_err fit(pal_study_job *job, pal_study_point *out)
+{
+    pal_note why = {{0}};
+    pal_err err = pal_study_fit(job, &out->priced.setting, &why);
+    if (!err) return PAL_ERR_OK;
+    out->err = err;
+    snprintf(out->why, sizeof out->why, "calibration: %.*s", PAL_SETTING_TEXT - 16, why.text);
+    return err;
+}
+
+pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_study_point *out)
+{
+    int n_node = 0;
+    *out = (pal_study_point){.priced = {.setting = wish->setting, .ms = NAN, .error_m = NAN}};
+    out->ms_p95 = out->static_rms_m = out->static_most_m = out->way_rms_m = out->way_most_m = NAN;
+    out->predicted_ms = out->predicted_m = NAN;
+    if (wish->calibrate && fit(job, out) && pal_study_goes_on(job)) return PAL_ERR_OK;
+    if (wish->calibrate && job->n_load == 1) snprintf(out->why, sizeof out->why, "fitted to the load it is judged by");
+    if (!job->rest.known || !same_rest(&job->rest.of, &out->priced.setting))
+        find_rest(job, &out->priced.setting, &n_node);
+    out->n_node = n_node;
+    out->err = job->rest.err;
+    if (out->err)
+        memcpy(out->why, job->rest.why, sizeof out->why);
+    else
+        out->static_rms_m = job->rest.rms_m, out->static_most_m = job->rest.most_m;
+    if (pal_study_goes_on(job)) run(job, out);
+    if (!pal_study_goes_on(job)) return pal_note_set(job->note, PAL_ERR_STATE, "stopped in a setting");
+    if (!out->err) out->priced.error_m = fmax(out->static_most_m, out->way_most_m);
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,64 @@
+/* What may stand on the front has to bear being mistreated: the cheapest two insults of the torture that springs fitted
+ * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing, nor does
+ * a body that its guard has stopped: it is safe, says so and is reset, while one that stays elsewhere says nothing. */
+#include "server/robustness/torture.h"
+#include "server/study/study_parts.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* processor time of one insult on one setting */
+static const double most_s = 1;
+
+static bool keeps_on(const char *what, double fraction, void *user)
+{
+    (void)what, (void)fraction;
+    return pal_study_goes_on(user);
+}
+
+/* the first insult that it fails; NULL: none that was decided */
+static const char *failed(pal_study_job *job, const pal_setting *setting)
+{
+    static const char *const insult[] = {"meganewton", "flat"};
+    pal_set_scene *set = NULL;
+    pal_note why = {{0}};
+    const char *found = NULL;
+    pal_torture_report *report = malloc(sizeof *report);
+    if (!report || pal_setting_make(job->scene, 0, setting, &why, &set)) {
+        free(report);
+        return NULL;
+    }
+    for (size_t k = 0; k < sizeof insult / sizeof *insult && !found; k++) {
+        pal_torture_options o;
+        pal_torture_default(&o);
+        o.only = insult[k], o.most_s = most_s, o.progress = keeps_on, o.user = job;
+        if (!pal_torture(&set->scene, &o, report, &why) && report->n_failed > 0 && !report->result[0].frozen)
+            found = insult[k];
+    }
+    pal_set_scene_free(set);
+    free(report);
+    return found;
+}
+
+pal_err pal_study_torture(pal_study_job *job)
+{
+    bool looked[PAL_STUDY_POINTS] = {false};
+    const pal_study_options *o = job->options;
+    for (int i = 0; i < job->out->n_point;) {
+        pal_study_point *p = &job->out->point[i];
+        if (!p->priced.front || looked[i]) {
+            i++;
+            continue;
+        }
+        bool go = !o->progress || o->progress("what is on the front, tortured", (double)i / job->out->n_point, o->user);
+        if (!go || !pal_study_goes_on(job)) return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the front");
+        looked[i] = true;
+        const char *insult = failed(job, &p->priced.setting);
+        if (!insult) continue;
+        snprintf(p->why, sizeof p->why, "fails %s of palpate torture: not named", insult);
+        /* what it stood before may be on the front now, also cheaper ones */
+        pal_study_front(job->out);
+        i = 0;
+    }
+    return PAL_ERR_OK;
+}

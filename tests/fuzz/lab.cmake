@@ -1,2 +1,0 @@
-pal_fuzz(problem LINK pal_scene)
-pal_fuzz(samples LINK pal_lab)

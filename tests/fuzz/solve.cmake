@@ -1,0 +1,2 @@
+pal_fuzz(problem LINK pal_scene)
+pal_fuzz(samples LINK pal_solve)
