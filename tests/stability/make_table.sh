@@ -19,7 +19,7 @@ kept=tests/stability/records.tsv
 models="tet_springs adaptive_springs fem subdivision_fem"
 tab=$(printf '\t')
 
-recorders() { grep -l '"tests/stability/\(hard_case\|four_models\).h"' tests/*/test_*.c; }
+recorders() { grep -lr --include='test_*.c' '"tests/stability/\(hard_case\|four_models\).h"' tests | sort; }
 
 # all records of a folder or file, one a line, in the order of the catalogue, models and tests; of equal case, model and
 # words in several tests the worst. Files of tests that are no more do not count
