@@ -237,6 +237,10 @@ static void an_adaptive_sphere_moves_as_the_refined_one(void)
 static void an_adaptive_stomach_moves_as_the_refined_one(void)
 {
     compare(take_stomach, "our stomach", 188, 746);
+}
+
+static void an_adaptive_stomach_of_188_nodes_moves_as_the_refined_one(void)
+{
     if (check_shared("data/stomach_188.obj")) compare(take_shared, "shared stomach", 188, 746);
 }
 
@@ -247,5 +251,6 @@ int main(void)
     RUN(a_stomach_comes_back_with_anchors_only);
     RUN(an_adaptive_sphere_moves_as_the_refined_one);
     RUN(an_adaptive_stomach_moves_as_the_refined_one);
+    RUN(an_adaptive_stomach_of_188_nodes_moves_as_the_refined_one);
     return check_report();
 }

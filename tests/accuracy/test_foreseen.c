@@ -208,7 +208,6 @@ static void check_organ(const organ *o)
                                     .element = o->element,
                                     .up = {o->up[0], o->up[1], o->up[2]}};
     char name[64];
-    check_count++; /* an absent organ is no failure */
     if (o->file && !path) return;
     pal_err err = path ? pal_scene_from_surface(path, &made, &loaded, NULL, &note)
                        : pal_scene_procedural(&made, &loaded, NULL, &note);

@@ -71,7 +71,6 @@ static void every_surface_becomes_a_sound_mesh_of_its_volume(void)
         char path[128];
         snprintf(path, sizeof path, "data/%s", KNOWN[i].file);
         const char *full = check_shared(path);
-        CHECK(true);
         if (!full) return;
         pal_surface surface;
         pal_note note;

@@ -26,7 +26,6 @@ static bool read_model(const char *file, pal_surface *out)
 static void compare(const char *file, const int paper[4])
 {
     pal_surface surface;
-    CHECK(true);
     if (!read_model(file, &surface)) return;
     for (int k = 0; k < 4; k++) {
         pal_voxel_options options = {.resolution = RESOLUTION[k], .border = true, .largest_only = true};

@@ -67,7 +67,11 @@ check "units given, not guessed" has out '"units":{"name":"mm","m":0.001,"guesse
 end
 
 begin "tetgen finds the mesh consistent"
+end
+
+name="tetgen reads the mesh"
 if command -v tetgen >/dev/null 2>&1; then
+    begin "$name"
     # as a mesh: read back and checked; as a boundary: no facet cuts another
     (cd scene2 && tetgen -rC box.node) >tetgen.out 2>&1
     check "tetgen -rC does not read it as it is" has tetgen.out "Mesh tetrahedra: $(head -1 scene2/box.ele | cut -d' ' -f1)\$"
@@ -77,10 +81,10 @@ if command -v tetgen >/dev/null 2>&1; then
     } >box.smesh
     tetgen -d box.smesh >tetgen.out 2>&1
     check "tetgen -d finds intersections" has tetgen.out "No faces are intersecting"
+    end
 else
-    echo "  left out: tetgen is not there"
+    skip "$name" "the program tetgen is not there"
 fi
-end
 
 begin "the unit is said, guessed or not"
 scaled_by() { awk -v k="$1" '$1 == "v" { $2 *= k; $3 *= k; $4 *= k } { print }' box.obj; }
@@ -445,9 +449,9 @@ refused 2 "either a file or --procedural"
 check "a folder was made" no_such x
 end
 
-begin "a stomach and a sphere of the shared models adapt"
 shared=${PAL_SHARED:-$here/../../../shared}/data
 if [ -e "$shared/stomach_188.obj" ] && [ -e "$shared/sphere_114.obj" ]; then
+    begin "a stomach and a sphere of the shared models adapt"
     run prepare "$shared/stomach_188.obj" -o x --model adaptive --json
     check "exit code $code" code_is 0
     check "stomach" has out '"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
@@ -458,10 +462,10 @@ if [ -e "$shared/stomach_188.obj" ] && [ -e "$shared/sphere_114.obj" ]; then
     refused 1 "dragon_11k.ply: byte [0-9]*: levels: 4 triangles"
     check "a folder was made" no_such y
     rm -rf x
+    end
 else
-    echo "  left out: $shared is not there"
+    skip "a stomach and a sphere of the shared models adapt" "$shared is not there"
 fi
-end
 
 # ---- wrong usage ----
 begin "wrong flags are refused by name with exit code 2"

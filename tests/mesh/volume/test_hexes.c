@@ -211,7 +211,6 @@ static void least_fill_leaves_the_voxels_of_the_reference_boxes(void)
     };
     for (int k = 0; k < 4; k++) {
         const char *path = check_shared(wanted[k].path);
-        CHECK(true);
         if (!path) continue;
         pal_surface s;
         pal_note note;
