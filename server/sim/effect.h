@@ -78,8 +78,8 @@ typedef struct pal_tangent {
      * as they were led). `last`: the stage ends the sub-step; brings the forces on the tools to those it was solved
      * with. Before: only sees to the caps. True: contact pulled where it can only push, or forces went beyond a cap, so
      * the row has changed its loads in body->load and its stiffness: solve the sub-step again from where it began.
-     * A row says so a bounded number of times (press.h: three a tool, a grip: one), and a solver always does, so that
-     * no sub-step ends on loads that it was not solved with */
+     * A row says so a bounded number of times, seldom more than three, and a solver always does, so that no sub-step
+     * ends on loads that it was not solved with */
     bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
 } pal_tangent;
 

@@ -94,7 +94,7 @@ void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_bod
 {
     press->first = ties->n_row;
     press->across = -1;
-    press->constant = press->settled = false;
+    press->constant = press->settled = press->staged = false;
     press->round = 0;
     pal_set3(press->total_N, 0, 0, 0);
     press->raw_N = 0;
@@ -124,21 +124,25 @@ void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_bod
 }
 
 /* k (d - m) of every contact, whether it acts or not; true: what acts is not what should have, by a noticeable part of
- * the forces, and is what should have now */
+ * the forces, and is what should have now. After ROUNDS solves only a contact that pulls as a whole is changed: ties
+ * that pull are let go and none is taken up, so that there is an end. In the last of several stages a pull may make up
+ * for the push of an earlier one, and stays */
 static bool choose(pal_press *press, pal_ties *ties, pal_body *body, const pal_contact *contact, double *force_N)
 {
     int n = press->n_contact;
-    double wrong = 0, push = 0, *change = press->share;
+    double wrong = 0, push = 0, pull = 0, *change = press->share;
     for (int i = 0; i < n; i++) {
         force_N[i] = contact[i].k_N_m * (contact[i].depth_m - ties->motion_m[press->first + i]);
         if (press->active[i] == (force_N[i] > 0))
             push += press->active[i] ? force_N[i] : 0;
         else
             wrong += fabs(force_N[i]);
+        if (press->active[i]) pull += fmax(0, -force_N[i]);
     }
-    if (press->round++ >= ROUNDS || !(wrong > WRONG * push)) return false;
+    const bool ends = press->round++ >= ROUNDS;
+    if (!(ends ? !press->staged && pull > push : wrong > WRONG * push)) return false;
     for (int i = 0; i < n; i++) {
-        press->active[i] = force_N[i] > 0;
+        press->active[i] = force_N[i] > 0 && (!ends || press->active[i]);
         double load = press->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
         change[i] = load - press->force_N[i];
         press->force_N[i] = load;
@@ -270,6 +274,7 @@ bool pal_press_within(pal_press *press, pal_ties *ties, pal_body *body, pal_tool
 {
     double force[PAL_PRESS_MOST + 2], stretch[2];
     int n = press->n_contact;
+    press->staged = true;
     if (n == 0 || press->constant) return false;
     take_back(press, tool);
     for (int i = 0; i < n; i++) {

@@ -4,9 +4,9 @@
  * the start of the sub-step is k d, the solver takes k back as tissue gives way, and the force that is left is k (d -
  * m), m the tissue's motion along `away`. Those that came out pulling should not have acted, and tissue that would have
  * come through the sphere should: where that is a noticeable part of the forces they are changed and the solver solves
- * again, at most twice. Coulomb friction is two more ties across the mean direction, as stiff as all contacts together,
- * on the mean of their points weighted by their loads; where they would pass friction times the normal force, they give
- * that constant force instead.
+ * again, at most twice; then again only where contact would pull as a whole. Coulomb friction is two more ties across
+ * the mean direction, as stiff as all contacts together, on the mean of their points weighted by their loads; where
+ * they would pass friction times the normal force, they give that constant force instead.
  *
  * Caps. The sum of the settled forces is bounded by the tool's cap at its ramp and by the node's load_cap_N. When the
  * solve left more, all ties of the tool become constant forces shortened to the cap, and the solver solves once more
@@ -33,6 +33,7 @@ typedef struct pal_press {
     uint8_t *active;      /* contacts that act [PAL_PRESS_MOST]                                */
     int round;            /* solves of this sub-step that were settled, while ties give way    */
     bool settled;         /* total_N is part of the tool's force                               */
+    bool staged;          /* the solver has several stages                                     */
     double total_N[3];    /* on the tool                                                       */
     double raw_N;         /* what it was before caps                                           */
     double allowed_N;     /* what caps leave of it, or would                                   */

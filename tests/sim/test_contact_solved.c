@@ -205,6 +205,25 @@ static void no_node_bears_more_than_its_cap(void)
         }
 }
 
+/* two tools press a body against each other without friction: neither is drawn in */
+static void contact_does_not_pull_as_a_whole(void)
+{
+    model_scene m;
+    double most_N = 0, pull_N = 0;
+    REQUIRE(open_case(&m, &cases[0], 15, 0, true) && model_scene_open(&m));
+    for (int k = 0; k < STEPS; k++) {
+        REQUIRE(insult_body(&m, PINCHED, k));
+        for (int t = 0; t < 2; t++) {
+            double out_N = (t ? 1 : -1) * pal_world_tools(m.world)->tool[t].force_N[1];
+            most_N = fmax(most_N, out_N), pull_N = fmax(pull_N, -out_N);
+        }
+    }
+    printf("  up to %.4g N out, %.4g N in\n", most_N, pull_N);
+    CHECK(most_N > 10);
+    CHECK_LE(pull_N, 0);
+    model_scene_close(&m);
+}
+
 /* ---- momentum ---- */
 
 static void find_momentum(const pal_body *body, double sum[3])
@@ -248,6 +267,7 @@ int main(void)
 {
     RUN(tools_feel_what_the_body_was_solved_with);
     RUN(no_node_bears_more_than_its_cap);
+    RUN(contact_does_not_pull_as_a_whole);
     RUN(a_step_gives_no_more_momentum_than_the_cap);
     return check_report();
 }
