@@ -71,8 +71,10 @@ static void take_force(pal_holder *to, const pal_body *body, const pal_holder *f
     free(sum);
     if (!to->hold.acts) return;
     to->hold.side_due = true;
-    pal_copy3(to->hold.total_N, from->total);
-    pal_copy3(to->total, from->total);
+    pal_set3(to->hold.total_N, 0, 0, 0);
+    for (int i = 0; i < to->hold.n_node; i++)
+        pal_sub3(to->hold.total_N, to->hold.total_N, to->hold.force_N + 3 * (size_t)i);
+    pal_copy3(to->total, to->hold.total_N);
 }
 
 /* the same body in another world: nothing to be let go */

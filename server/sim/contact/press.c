@@ -7,11 +7,13 @@
 
 /* passes of conjugate gradients for the stiffness of a contact, and steps from one answer to the next */
 enum { FELT_PASSES = 2, FELT_EVERY = 3 };
-/* times that a solver goes round again (pal_tangent.settle) */
+/* solves of a sub-step after which ties may be chosen anew: contacts that act, friction that sticks or slides */
 enum { ROUNDS = 2 };
 #define FELT_FORCE_CHANGE 0.02
-/* share of the pushing forces that ties may pull, or points may come through, without another round */
+/* share of the pushing forces that ties may pull, or points may come through, without another solve */
 #define WRONG 0.05
+/* friction may pass its limit, or fall short of it, by this share without another solve */
+#define OFF_LIMIT 0.02
 
 pal_err pal_press_make(pal_arena *arena, pal_press *out)
 {
@@ -92,7 +94,7 @@ void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_bod
 {
     press->first = ties->n_row;
     press->across = -1;
-    press->constant = press->settled = false;
+    press->constant = press->settled = press->staged = false;
     press->round = 0;
     pal_set3(press->total_N, 0, 0, 0);
     press->raw_N = 0;
@@ -122,21 +124,25 @@ void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_bod
 }
 
 /* k (d - m) of every contact, whether it acts or not; true: what acts is not what should have, by a noticeable part of
- * the forces, and is what should have now */
+ * the forces, and is what should have now. After ROUNDS solves only a contact that pulls as a whole is changed: ties
+ * that pull are let go and none is taken up, so that there is an end. In the last of several stages a pull may make up
+ * for the push of an earlier one, and stays */
 static bool choose(pal_press *press, pal_ties *ties, pal_body *body, const pal_contact *contact, double *force_N)
 {
     int n = press->n_contact;
-    double wrong = 0, push = 0, *change = press->share;
+    double wrong = 0, push = 0, pull = 0, *change = press->share;
     for (int i = 0; i < n; i++) {
         force_N[i] = contact[i].k_N_m * (contact[i].depth_m - ties->motion_m[press->first + i]);
         if (press->active[i] == (force_N[i] > 0))
             push += press->active[i] ? force_N[i] : 0;
         else
             wrong += fabs(force_N[i]);
+        if (press->active[i]) pull += fmax(0, -force_N[i]);
     }
-    if (press->round++ >= ROUNDS || !(wrong > WRONG * push)) return false;
+    const bool ends = press->round++ >= ROUNDS;
+    if (!(ends ? !press->staged && pull > push : wrong > WRONG * push)) return false;
     for (int i = 0; i < n; i++) {
-        press->active[i] = force_N[i] > 0;
+        press->active[i] = force_N[i] > 0 && (!ends || press->active[i]);
         double load = press->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
         change[i] = load - press->force_N[i];
         press->force_N[i] = load;
@@ -146,33 +152,37 @@ static bool choose(pal_press *press, pal_ties *ties, pal_body *body, const pal_c
     return true;
 }
 
-/* friction after the solve, for a normal force; true: it slid although it was taken as sticking or the other way round,
- * and its two ties are changed */
-static bool settle_across(pal_press *press, pal_ties *ties, pal_body *body, double normal_N, double friction,
-                          double out_N[2])
+/* the two rows of friction as the solver had them: how far they are stretched now, and their forces */
+static double across_now(const pal_press *press, const pal_ties *ties, double stretch_m[2], double force_N[2])
 {
-    double begin[2], stretch[2], change[2], stiffness = press->across_N_m, along = 0, had = 0;
+    for (int k = 0; k < 2; k++) {
+        double begin = pal_dot3(press->slip_m, press->t[k]) + pal_dot3(press->tool_move_m, press->t[k]);
+        stretch_m[k] = begin - ties->motion_m[press->across + k];
+        force_N[k] = press->slides ? press->force_N[press->n_contact + k] : press->across_N_m * stretch_m[k];
+    }
+    return hypot(stretch_m[0], stretch_m[1]);
+}
+
+/* friction after the solve, for a normal force; true: it slid although it was taken as sticking or the other way round,
+ * and its two ties are changed. force_N: as the solver had it */
+static bool settle_across(pal_press *press, pal_ties *ties, pal_body *body, double normal_N, double friction,
+                          double force_N[2])
+{
+    double stretch[2], change[2], stiffness = press->across_N_m, along = 0, had = 0;
     double free = friction * normal_N / stiffness, *load = press->force_N + press->n_contact;
-    for (int k = 0; k < 2; k++) {
-        begin[k] = pal_dot3(press->slip_m, press->t[k]) + pal_dot3(press->tool_move_m, press->t[k]);
-        stretch[k] = begin[k] - ties->motion_m[press->across + k];
-        along += stretch[k] * load[k];
-        had += load[k] * load[k];
-    }
-    double size = hypot(stretch[0], stretch[1]), keep = size > free ? free / size : 1;
+    double size = across_now(press, ties, stretch, force_N), within = size > free ? free / size : 1;
+    for (int k = 0; k < 2; k++) along += stretch[k] * load[k], had += load[k] * load[k];
     /* while it slides its force drags tissue no farther than a spring stretched to the limit would */
-    bool sticks = press->slides && along < 0.98 * free * sqrt(had), slips = !press->slides && size > 1.02 * free;
+    bool sticks = press->slides && along < (1 - OFF_LIMIT) * free * sqrt(had);
+    bool slips = !press->slides && size > (1 + OFF_LIMIT) * free;
     pal_set3(press->next_slip_m, 0, 0, 0);
-    for (int k = 0; k < 2; k++) {
-        out_N[k] = press->slides && !sticks ? load[k] : stiffness * keep * stretch[k];
-        pal_axpy3(press->next_slip_m, keep * stretch[k], press->t[k]);
-    }
+    for (int k = 0; k < 2; k++) pal_axpy3(press->next_slip_m, within * stretch[k], press->t[k]);
     press->next_slides = size > free && !sticks;
     press->normal_N = normal_N;
     if (press->round > ROUNDS || !(sticks || slips)) return false;
     press->slides = slips;
     for (int k = 0; k < 2; k++) {
-        double to = slips ? out_N[k] : stiffness * begin[k];
+        double to = slips ? within * force_N[k] : stiffness * (stretch[k] + ties->motion_m[press->across + k]);
         change[k] = to - load[k];
         load[k] = to;
         ties->k_N_m[press->across + k] = slips ? 0 : stiffness;
@@ -191,69 +201,120 @@ static void hold_constant(pal_press *press, pal_ties *ties, pal_body *body, cons
     press->constant = true;
 }
 
+/* the total on the tool, and the force of every contact that pushes: friction is shared out to those by their parts in
+ * the normal force */
 static void sum_forces(const pal_press *press, pal_contact *contact, const double *force_N, double total[3])
 {
     double across[3] = {0}, sum = 0;
     int n = press->n_contact;
-    for (int i = 0; i < n; i++) sum += force_N[i];
+    for (int i = 0; i < n; i++) sum += fmax(0, force_N[i]);
     if (press->across >= 0)
         for (int k = 0; k < 2; k++) pal_axpy3(across, force_N[n + k], press->t[k]);
-    pal_set3(total, 0, 0, 0);
+    pal_scale3(total, -1, across);
     for (int i = 0; i < n; i++) {
-        pal_scale3(contact[i].force, force_N[i], contact[i].away);
-        if (sum > 0) pal_axpy3(contact[i].force, force_N[i] / sum, across);
-        pal_sub3(total, total, contact[i].force);
+        double push_N = fmax(0, force_N[i]);
+        pal_axpy3(total, -force_N[i], contact[i].away);
+        pal_scale3(contact[i].force, push_N, contact[i].away);
+        if (sum > 0) pal_axpy3(contact[i].force, push_N / sum, across);
     }
+}
+
+/* forces as the solver had them; true: ties were chosen anew, the forces are a first guess of what comes next */
+static bool find_forces(pal_press *press, pal_ties *ties, pal_body *body, const pal_contact *contact, double friction,
+                        double *force_N)
+{
+    double normal[3] = {0};
+    int n = press->n_contact;
+    bool chosen = choose(press, ties, body, contact, force_N);
+    for (int i = 0; i < n; i++) {
+        if (!press->active[i]) force_N[i] = 0;
+        pal_axpy3(normal, fmax(0, force_N[i]), contact[i].away);
+    }
+    force_N[n] = force_N[n + 1] = 0;
+    if (press->across >= 0 && !chosen)
+        chosen = settle_across(press, ties, body, pal_norm3(normal), friction, force_N + n);
+    return chosen;
+}
+
+/* total and what caps leave of it; true: less than all, so that the forces are held from now on, shortened to the caps
+ */
+static bool keep_caps(pal_press *press, pal_ties *ties, pal_body *body, const pal_tool *tool, pal_contact *contact,
+                      double *force_N)
+{
+    int n_row = press->n_contact + (press->across >= 0 ? 2 : 0);
+    press->raw_N = pal_norm3(press->total_N);
+    double largest = pal_ties_largest(ties, force_N, press->first, n_row), room = pal_tool_room(tool, press->total_N);
+    if (body->load_cap_N > 0 && largest > body->load_cap_N) room = fmin(room, body->load_cap_N / largest);
+    press->allowed_N = fmin(room * press->raw_N, tool->force_cap_N * tool->ramp);
+    if (room >= 1) {
+        double node_N = largest > 0 && body->load_cap_N > 0 ? press->raw_N * body->load_cap_N / largest : INFINITY;
+        press->allowed_N = fmin(tool->force_cap_N * tool->ramp, node_N);
+    }
+    press->capped = room < 1;
+    if (!press->capped) return false;
+    for (int i = 0; i < n_row; i++) force_N[i] *= room;
+    hold_constant(press, ties, body, force_N, n_row);
+    sum_forces(press, contact, force_N, press->total_N);
+    return true;
+}
+
+/* the press's part of the tool's force, before it is found anew and after */
+static void take_back(const pal_press *press, pal_tool *tool)
+{
+    if (press->settled) pal_sub3(tool->force_N, tool->force_N, press->total_N);
+}
+
+static void give(pal_press *press, pal_tool *tool)
+{
+    pal_add3(tool->force_N, tool->force_N, press->total_N);
+    press->settled = true;
+}
+
+bool pal_press_within(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact)
+{
+    double force[PAL_PRESS_MOST + 2], stretch[2];
+    int n = press->n_contact;
+    press->staged = true;
+    if (n == 0 || press->constant) return false;
+    take_back(press, tool);
+    for (int i = 0; i < n; i++) {
+        double depth = contact[i].depth_m - ties->motion_m[press->first + i];
+        force[i] = press->active[i] ? contact[i].k_N_m * depth : 0;
+    }
+    if (press->across >= 0) (void)across_now(press, ties, stretch, force + n);
+    sum_forces(press, contact, force, press->total_N);
+    const bool finite = pal_finite3(press->total_N);
+    if (!finite) pal_set3(press->total_N, 0, 0, 0);
+    bool held = finite && keep_caps(press, ties, body, tool, contact, force);
+    give(press, tool);
+    return held;
 }
 
 bool pal_press_settle(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact,
                       double friction)
 {
-    double force[PAL_PRESS_MOST + 2], normal[3] = {0};
-    int n = press->n_contact, n_row = press->across >= 0 ? n + 2 : n;
-    if (n == 0) return false;
-    if (press->settled) pal_sub3(tool->force_N, tool->force_N, press->total_N);
-    bool again = false, chosen = false;
-    if (press->constant) {
-        memcpy(force, press->force_N, sizeof(double) * (size_t)n_row);
-    } else {
-        chosen = choose(press, ties, body, contact, force);
-        for (int i = 0; i < n; i++) {
-            force[i] = press->active[i] && force[i] > 0 ? force[i] : 0;
-            pal_axpy3(normal, force[i], contact[i].away);
-        }
-        force[n] = force[n + 1] = 0;
-        if (press->across >= 0 && !chosen)
-            chosen = settle_across(press, ties, body, pal_norm3(normal), friction, force + n);
-    }
+    double force[PAL_PRESS_MOST + 2];
+    bool chosen = false, held = false;
+    if (press->n_contact == 0) return false;
+    take_back(press, tool);
+    if (press->constant)
+        memcpy(force, press->force_N, sizeof force);
+    else
+        chosen = find_forces(press, ties, body, contact, friction, force);
     sum_forces(press, contact, force, press->total_N);
     if (!pal_finite3(press->total_N)) {
         pal_set3(press->total_N, 0, 0, 0);
         press->settled = true;
         return false;
     }
-    if (!press->constant) press->raw_N = pal_norm3(press->total_N);
-    if (chosen) pal_scale3(press->total_N, pal_tool_room(tool, press->total_N), press->total_N);
-    if (!press->constant && !chosen) {
-        double largest = pal_ties_largest(ties, force, press->first, n_row), room = pal_tool_room(tool, press->total_N);
-        if (body->load_cap_N > 0 && largest > body->load_cap_N) room = fmin(room, body->load_cap_N / largest);
-        press->allowed_N = fmin(room * press->raw_N, tool->force_cap_N * tool->ramp);
-        if (room >= 1) {
-            double node_N = largest > 0 && body->load_cap_N > 0 ? press->raw_N * body->load_cap_N / largest : INFINITY;
-            press->allowed_N = fmin(tool->force_cap_N * tool->ramp, node_N);
-        }
-        press->capped = room < 1;
-        again = press->capped;
-        if (again) {
-            for (int i = 0; i < n_row; i++) force[i] *= room;
-            hold_constant(press, ties, body, force, n_row);
-            sum_forces(press, contact, force, press->total_N);
-        }
-    }
-    pal_add3(tool->force_N, tool->force_N, press->total_N);
-    press->settled = true;
+    if (chosen) {
+        press->raw_N = pal_norm3(press->total_N);
+        pal_scale3(press->total_N, pal_tool_room(tool, press->total_N), press->total_N);
+    } else if (!press->constant)
+        held = keep_caps(press, ties, body, tool, contact, force);
+    give(press, tool);
     tool->touching = tool->touching || pal_dot3(press->total_N, press->total_N) > 0;
-    return again || chosen;
+    return chosen || held;
 }
 
 /* ---- felt stiffness ---- */

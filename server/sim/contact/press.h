@@ -3,14 +3,15 @@
  * Each point near the tool is a tie (contact_tangent.h) of stiffness k along `away`. One that touches acts: its load at
  * the start of the sub-step is k d, the solver takes k back as tissue gives way, and the force that is left is k (d -
  * m), m the tissue's motion along `away`. Those that came out pulling should not have acted, and tissue that would have
- * come through the sphere should: where that is a noticeable part of the forces they are changed and the solver goes
- * round again. What pulls in the end counts as zero. Coulomb friction is two more ties across the mean direction, as
- * stiff as all contacts together, on the mean of their points weighted by their loads; where they would pass friction
- * times the normal force, they give that constant force instead.
+ * come through the sphere should: where that is a noticeable part of the forces they are changed and the solver solves
+ * again, at most twice; then again only where contact would pull as a whole. Coulomb friction is two more ties across
+ * the mean direction, as stiff as all contacts together, on the mean of their points weighted by their loads; where
+ * they would pass friction times the normal force, they give that constant force instead.
  *
  * Caps. The sum of the settled forces is bounded by the tool's cap at its ramp and by the node's load_cap_N. When the
- * solve left more, all ties of the tool become constant forces shortened to the cap, and the solver goes round once
- * more (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped.
+ * solve left more, all ties of the tool become constant forces shortened to the cap, and the solver solves once more
+ * (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped. So a
+ * sub-step ends on the very forces that it was solved with, and the tool feels those, with what ties still pull.
  *
  * What a tool feels: pal_felt keeps, for each direction of contact, the tangent stiffness that the solver's compliance
  * gives (haptics.md 2.3 step 3 a). Thread: [sim], makes [load]. */
@@ -30,8 +31,9 @@ typedef struct pal_press {
     double t[2][3];       /* unit directions across                                            */
     bool constant;        /* the loads stay as they are whatever tissue does                   */
     uint8_t *active;      /* contacts that act [PAL_PRESS_MOST]                                */
-    int round;            /* of the solver in this sub-step                                    */
+    int round;            /* solves of this sub-step that were settled, while ties give way    */
     bool settled;         /* total_N is part of the tool's force                               */
+    bool staged;          /* the solver has several stages                                     */
     double total_N[3];    /* on the tool                                                       */
     double raw_N;         /* what it was before caps                                           */
     double allowed_N;     /* what caps leave of it, or would                                   */
@@ -49,8 +51,9 @@ int pal_press_thin(pal_contact *contact, int n);
  * move_m: the tool's own way in this sub-step (friction only) */
 void pal_press_begin(pal_press *press, pal_ties *ties, pal_touch *touch, pal_body *body, const pal_contact *contact,
                      int n, double friction, const double move_m[3]);
-/* after the solve, ties->motion_m taken: force of every contact, total on the tool. True: beyond a cap, loads changed
- */
+/* after a stage that is not the last, ties->motion_m taken. True: beyond a cap, loads changed */
+bool pal_press_within(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact);
+/* after the last stage: force of every contact, total on the tool. True: loads changed */
 bool pal_press_settle(pal_press *press, pal_ties *ties, pal_body *body, pal_tool *tool, pal_contact *contact,
                       double friction);
 

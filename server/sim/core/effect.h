@@ -74,12 +74,13 @@ typedef struct pal_tangent {
      * solver takes the polar part of the sum; where something hard meets something soft, a factor turned by the soft
      * one's rotations stretches the hard one); NULL: no rotations. At the last linearise */
     void (*rotate)(void *self, const pal_body *body, double *turn);
-    /* CONTACT, after the solve: it moved the nodes by `moved` [n_node][3], m, since the loads were given (held nodes
-     * too, as they were led). Brings the forces on the tools to those of the end of the sub-step; a solver of several
-     * stages asks after each, the last answer holds. True: contact pulled where it can only push, or forces went beyond
-     * a cap, so the row has changed its loads in body->load and its stiffness: solve the same stage again from where it
-     * began. A solver goes round at most twice more and takes the last answer as it is */
-    bool (*settle)(void *self, pal_step *step, const double *moved);
+    /* CONTACT, after a stage: it moved the nodes by `moved` [n_node][3], m, since the loads were given (held nodes too,
+     * as they were led). `last`: the stage ends the sub-step; brings the forces on the tools to those it was solved
+     * with. Before: only sees to the caps. True: contact pulled where it can only push, or forces went beyond a cap, so
+     * the row has changed its loads in body->load and its stiffness: solve the sub-step again from where it began.
+     * A row says so a bounded number of times, seldom more than three, and a solver always does, so that no sub-step
+     * ends on loads that it was not solved with */
+    bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
 } pal_tangent;
 
 /* how a solver is getting on, for status, lab and panel */

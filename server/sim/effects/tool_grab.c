@@ -14,7 +14,7 @@
  * spring implicitly and the forces are those of the end of the sub-step. The spring stretches by at most 0.02 S more
  * than at the end of the last sub-step (numerics.md part 3: a tool that jumps) and by no more than brings the force to
  * 98 % of the caps once the tissue has followed, as far as its compliance is known, so tissue follows a faster tool
- * late. Where caps leave less than the spring's force, it becomes a constant force and the solver goes round once more
+ * late. Where caps leave less than the spring's force, it becomes a constant force and the solver solves once more
  * (pal_tangent.settle).
  *
  * Another body in this one's place (hand): where it shows the same surface the grip holds the very vertices that it
@@ -55,6 +55,7 @@
 /* what a grip needs beside with an implicit solver */
 typedef struct firm_grip {
     bool constant, settled;       /* the load stays as it is; force is part of the tool's */
+    bool found;                   /* compliance was looked for in this sub-step           */
     double k_N_m, pull[3];        /* at the sub-step's begin: stiffness, force of the spring on tissue            */
     double load[3];               /* force on tissue in body->load                                                */
     double stretch_m;             /* at the end of the last sub-step                                              */
@@ -489,7 +490,7 @@ static void tie(const tool_grab *grab, grip *g, const pal_tool *tool, pal_step *
     double most = kept + fmin(rise, (BELOW_CAP * cap - k * kept) / lead);
     if (way > most) pal_scale3(goal, most / way, goal);
     g->pulls = pal_finite3(goal);
-    g->firm->constant = g->firm->settled = false;
+    g->firm->constant = g->firm->settled = g->firm->found = false;
     pal_set3(g->force, 0, 0, 0);
     if (!g->pulls) return;
     pal_scale3(g->firm->pull, g->firm->k_N_m, goal);
@@ -606,39 +607,42 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     }
 }
 
-/* force of one tool at the end; true: beyond a cap, another load */
-static bool settle_tool(grip *g, pal_tool *tool, pal_body *body, const double *moved)
+/* the load after a stage; true: beyond a cap, it is a constant one from now on */
+static bool keep_caps(grip *g, pal_tool *tool, pal_body *body, const double *moved)
 {
-    double mean[3], most = 0, room = 1;
-    if (g->firm->settled) pal_sub3(tool->force_N, tool->force_N, g->force);
+    double mean[3], change[3], most = 0, room = 1;
+    if (g->firm->constant) return false;
     mean_of(g, moved, mean);
-    if (!g->firm->constant)
-        for (int c = 0; c < 3; c++) g->firm->load[c] = g->firm->pull[c] - g->firm->k_N_m * mean[c];
+    for (int c = 0; c < 3; c++) g->firm->load[c] = g->firm->pull[c] - g->firm->k_N_m * mean[c];
     if (!pal_finite3(g->firm->load)) pal_set3(g->firm->load, 0, 0, 0);
     pal_scale3(g->force, -1, g->firm->load);
-    if (!g->firm->constant) {
-        for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
-        double size = most * pal_norm3(g->force);
-        if (body->load_cap_N > 0 && size > body->load_cap_N) room = body->load_cap_N / size;
-        room = fmin(room, pal_tool_room(tool, g->force));
-        if (room < 1) {
-            double change[3];
-            pal_scale3(g->firm->load, room, g->firm->load);
-            pal_scale3(g->force, room, g->force);
-            pal_sub3(change, g->firm->load, g->firm->pull);
-            to_nodes(g, change, body->load);
-            g->firm->constant = true;
-        }
-    }
+    for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
+    double size = most * pal_norm3(g->force);
+    if (body->load_cap_N > 0 && size > body->load_cap_N) room = body->load_cap_N / size;
+    room = fmin(room, pal_tool_room(tool, g->force));
+    if (room >= 1) return false;
+    pal_scale3(g->firm->load, room, g->firm->load);
+    pal_sub3(change, g->firm->load, g->firm->pull);
+    to_nodes(g, change, body->load);
+    g->firm->constant = true;
+    return true;
+}
+
+/* force of one tool after a stage; true: beyond a cap */
+static bool settle_tool(grip *g, pal_tool *tool, pal_body *body, const double *moved)
+{
+    if (g->firm->settled) pal_sub3(tool->force_N, tool->force_N, g->force);
+    bool capped = keep_caps(g, tool, body, moved);
+    pal_scale3(g->force, -1, g->firm->load);
     /* the stretch that this force would keep */
     g->firm->stretch_m = g->firm->k_N_m > 0 ? pal_norm3(g->firm->load) / g->firm->k_N_m : 0;
     pal_add3(tool->force_N, tool->force_N, g->force);
     g->firm->settled = true;
     tool->holding = true;
-    return room < 1;
+    return capped;
 }
 
-static bool settle(void *self, pal_step *step, const double *moved)
+static bool settle(void *self, pal_step *step, const double *moved, bool last)
 {
     tool_grab *grab = self;
     pal_tools *tools = step->tools;
@@ -647,12 +651,12 @@ static bool settle(void *self, pal_step *step, const double *moved)
     for (int t = 0; t < n_tool; t++) {
         grip *g = &grab->grip[t];
         if (!g->held || !g->pulls) continue;
-        bool first = !g->firm->settled;
         again |= settle_tool(g, &tools->tool[t], step->body, moved);
-        if (step->sub != step->n_sub - 1) continue;
+        if (!last || step->sub != step->n_sub - 1) continue;
         /* a grip that was handed over leads as the one before from its second step on */
         const bool goes_on = grab->handed && grab->handed[t].left_s > 0;
-        int n_find = first ? (goes_on && g->firm->n_give < 3 ? 3 : 1) : 0;
+        int n_find = g->firm->found ? 0 : goes_on && g->firm->n_give < 3 ? 3 : 1;
+        g->firm->found = true;
         for (int k = 0; k < n_find; k++) find_give(g, &tools->tool[t], step);
         publish(grab, g, &tools->tool[t], true);
     }

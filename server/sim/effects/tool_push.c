@@ -603,7 +603,7 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     pal_ties_multiply(((tool_push *)self)->ties, k, p, out);
 }
 
-static bool settle(void *self, pal_step *step, const double *moved)
+static bool settle(void *self, pal_step *step, const double *moved, bool last)
 {
     tool_push *push = self;
     pal_tools *tools = step->tools;
@@ -614,13 +614,17 @@ static bool settle(void *self, pal_step *step, const double *moved)
         holder *h = &push->holder[t];
         pal_tool *tool = &tools->tool[t];
         if (!h->active) continue;
+        if (!last) {
+            again |= pal_press_within(&h->firm->press, push->ties, step->body, tool, h->contact);
+            continue;
+        }
         again |= pal_press_settle(&h->firm->press, push->ties, step->body, tool, h->contact, push->friction);
         pal_add3(h->total, h->firm->press.total_N, h->hold.now_N);
         follow_side(h, h->firm->side_before);
         find_back(push, h, tool);
     }
     /* each tool in turn is the first to have its patches' stiffness found */
-    for (int i = 0; i < n_tool && step->sub == step->n_sub - 1; i++) {
+    for (int i = 0; i < n_tool && last && step->sub == step->n_sub - 1; i++) {
         int t = (i + push->n_step) % n_tool;
         holder *h = &push->holder[t];
         pal_tool *tool = &tools->tool[t];

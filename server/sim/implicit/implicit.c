@@ -522,7 +522,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     pal_system_place(&core->system);
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->untangle) (void)step->force[i].effect->untangle(step->force[i].self, step);
-    core->report.n_newton = core->report.n_cg = core->most_cg = core->round = 0;
+    core->report.n_newton = core->report.n_cg = core->most_cg = 0;
     core->risen = false;
     pal_system_touch(&core->system, step);
     if (core->system.has_contact) core->system.has_contact = contact_acts(core);
@@ -533,7 +533,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     return true;
 }
 
-bool pal_implicit_settle(pal_implicit *core, pal_step *step)
+bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last)
 {
     const pal_body *body = core->system.body;
     bool again = false;
@@ -542,9 +542,14 @@ bool pal_implicit_settle(pal_implicit *core, pal_step *step)
     for (int i = 0; i < step->n_contact; i++) {
         const pal_row *row = &step->contact[i];
         if (row->effect->tangent && row->effect->tangent->settle)
-            again |= row->effect->tangent->settle(row->self, step, core->node_moved);
+            again |= row->effect->tangent->settle(row->self, step, core->node_moved, last);
     }
-    return again && core->round++ < 2;
+    if (!again) return false;
+    /* energy is judged by the loads of the last solve, and points that came to touch act in it */
+    core->risen = false;
+    core->system.has_contact = true;
+    core->system.has_contact = contact_acts(core);
+    return true;
 }
 
 /* an embedded body has other samples since its matrices were found: they are found again a few columns a step, then

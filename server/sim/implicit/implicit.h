@@ -59,7 +59,7 @@ typedef struct pal_implicit {
     bool sound;          /* its last look found that x and v are finite */
     bool risen;          /* ... and was not kept in this sub-step ... */
     int n_risen, n_calm; /* ... nor in so many (0 after half a second of peace); sub-steps since then */
-    int most_cg, round;  /* in one solve of this sub-step; rounds of settle */
+    int most_cg;         /* in one solve of this sub-step       */
     uint64_t sampled;    /* of body->solid, at the factor       */
     bool probing;        /* an embedded body's matrices are being found anew */
     pal_solve_report report;
@@ -76,8 +76,9 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step);
 /* body->x: where to linearise first, body->v: first guess of V and velocities of held nodes; both hold the result.
  * Loads may change afterwards: solve again after setting x and the guess again */
 pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau_s);
-/* after a stage: true when contact wants it solved again */
-bool pal_implicit_settle(pal_implicit *core, pal_step *step);
+/* after a stage, the last of the sub-step or not: true when contact has changed its loads, so that the sub-step must be
+ * solved again */
+bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last);
 /* checks the result (not finite: back to the begin, frozen) and keeps the factor fresh */
 void pal_implicit_end(pal_implicit *core, pal_step *step);
 

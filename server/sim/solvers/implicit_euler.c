@@ -29,7 +29,7 @@ static pal_err run(void *self, pal_step *step)
     do {
         memcpy(body->x, core->x0, n_byte);
         PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
-    } while (pal_implicit_settle(core, step));
+    } while (pal_implicit_settle(core, step, true));
     pal_implicit_end(core, step);
     return PAL_ERR_OK;
 }

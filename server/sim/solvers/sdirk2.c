@@ -44,18 +44,20 @@ static pal_err run(void *self, pal_step *step)
     pal_body *body = step->body;
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
-    do {
+    for (bool again = true; again;) {
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
         if (core->n_risen > 0) { /* one stage of the whole step: see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
-            continue;
+        } else {
+            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
+            if (pal_implicit_settle(core, step, false)) continue;
+            open_second(core, body, step->dt_s);
+            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
         }
-        PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
-        open_second(core, body, step->dt_s);
-        PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
-    } while (pal_implicit_settle(core, step));
+        again = pal_implicit_settle(core, step, true);
+    }
     pal_implicit_end(core, step);
     return PAL_ERR_OK;
 }

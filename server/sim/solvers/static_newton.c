@@ -554,18 +554,43 @@ static pal_err find_rest(static_newton *row, pal_step *step)
     }
 }
 
-static void settle(static_newton *row, pal_step *step)
+/* true: contact has changed its loads */
+static bool settle(static_newton *row, pal_step *step)
 {
+    bool again = false;
     const pal_body *body = row->system.body;
     double *moved = body->embed ? row->node_moved : row->move;
     for (int i = 0; i < row->cg.n; i++) row->move[i] = body->x[i] - row->x0[i];
     if (body->embed) pal_point_rows_place(body->embed, row->move, moved);
     for (int i = 0; i < step->n_contact; i++) {
         const pal_row *contact = &step->contact[i];
-        /* what it asks for beyond that comes with the next world step */
         if (contact->effect->tangent && contact->effect->tangent->settle)
-            (void)contact->effect->tangent->settle(contact->self, step, moved);
+            again |= contact->effect->tangent->settle(contact->self, step, moved, true);
     }
+    return again;
+}
+
+/* the body at rest under its loads as they are now; *bad: it is no number, and went back to where it was */
+static pal_err solve(static_newton *row, pal_step *step, bool *bad)
+{
+    pal_body *body = row->system.body;
+    PAL_TRY(find_outer(row, step));
+    if (row->system.n_free == 0) {
+        pal_body_place(body);
+        row->report.converged = true;
+        return PAL_ERR_OK;
+    }
+    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
+    if (row->part == 0) row->part = 1;
+    PAL_TRY(find_rest(row, step));
+    if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
+    *bad = !pal_body_finite(body);
+    if (*bad) {
+        pal_body_stop_bad(body, "");
+        memcpy(body->x, row->x0, bytes3(row));
+    }
+    pal_body_place(body);
+    return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -584,24 +609,9 @@ static pal_err run(void *self, pal_step *step)
             pal_set3(body->v + 3 * i, 0, 0, 0);
     }
     pal_system_touch(&row->system, step);
-    PAL_TRY(find_outer(row, step));
-    if (row->system.n_free == 0) {
-        pal_body_place(body);
-        row->report.converged = true;
-        return PAL_ERR_OK;
-    }
-    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
-    if (row->part == 0) row->part = 1;
-    PAL_TRY(find_rest(row, step));
-    if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
-    if (!pal_body_finite(body)) {
-        pal_body_stop_bad(body, "");
-        memcpy(body->x, row->x0, bytes3(row));
-        pal_body_place(body);
-        return PAL_ERR_OK;
-    }
-    pal_body_place(body);
-    settle(row, step);
+    bool bad = false;
+    do PAL_TRY(solve(row, step, &bad));
+    while (row->system.n_free > 0 && !bad && settle(row, step));
     return PAL_ERR_OK;
 }
 
