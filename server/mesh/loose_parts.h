@@ -12,7 +12,9 @@
  *     component is to be held or left out is not ours to guess;
  *   - with no held point at all the body is free, which is a scene of its own: what is not below 1 % stays.
  *
- * Two components that are to fly apart while a third is held are two bodies of a scene. Thread: [load]. */
+ * A component that is to move freely beside a held one is a body of its own. The rule is applied where scenes are made
+ * ready; a world simulates every component of the mesh it is given. Pieces of an adaptive surface have anchors, which
+ * leave them no rigid motion: they all stay. Thread: [load]. */
 #ifndef PAL_MESH_LOOSE_PARTS_H
 #define PAL_MESH_LOOSE_PARTS_H
 #include "server/mesh/cells.h"
