@@ -27,6 +27,9 @@ static const char about[] =
     "scene\n"
     "that `palpate serve DIR/scene.json` runs: tetrahedra (paper B 2.2), skin, tissue, supports, tools.\n"
     "With --model adaptive a hollow organ: springs on the surface as it is, refined where it is touched (paper C).\n"
+    "Voxels are joined by faces. A component of them without support is dropped, and told, when it is below 1 % of\n"
+    "the largest one. A larger one is refused: --largest keeps only the largest, --hold may reach the others, finer\n"
+    "voxels may join them. In a scene.json each may have a support, or the body none at all: then it is free.\n"
     "Files written: DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at "
     "most\n"
     "1,000,000 tetrahedra (--tetgen writes them for any mesh, --no-tetgen for none). Either all of them or none.\n";
@@ -229,6 +232,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
     cJSON_AddNumberToObject(dropped, "nonfinite", (double)r->surface.n_nonfinite);
     cJSON_AddNumberToObject(dropped, "folded", (double)r->surface.n_folded);
+    cJSON_AddNumberToObject(dropped, "loose_components", loaded->loose[0].n_dropped);
+    cJSON_AddNumberToObject(dropped, "loose_m3", loaded->loose[0].dropped_m3);
     cJSON_AddNumberToObject(o, "mended", (double)r->surface.n_mended);
     cJSON_AddNumberToObject(o, "welded", (double)r->surface.n_welded);
     cJSON *seconds = cJSON_AddObjectToObject(o, "seconds");
@@ -304,6 +309,7 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
     const pal_prepared *mesh = &loaded->mesh[0];
     int n_component = r->n_level > 0 ? r->n_piece : r->prepare.voxel.n_component;
     double low[3], high[3];
+    pal_note told;
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
            1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
@@ -318,8 +324,9 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
         print_levels(mesh, wish, out);
     else
         print_solid(mesh, r);
-    if (n_component > 1)
-        printf("the components do not hang together; those without support drift (--largest keeps one)\n");
+    if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
+    pal_loose_parts_tell(&loaded->loose[0], loaded->scene.body[0].name, &told);
+    if (told.text[0]) printf("%s\n", told.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -494,7 +501,7 @@ static const pal_flag flag[] = {
      "shown triangles of a scan's surface or of the procedural organ (50,000); of adaptive the coarsest level\nof a "
      "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
     {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
-     "keep only the largest of several pieces that do not hang together"},
+     "keep only the largest of several components (of adaptive: pieces)"},
     {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, 1e-6, 1e12,
      "stiffness of the tissue (5000; adaptive: 50,000)"},
     {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},

@@ -389,12 +389,15 @@ int command_serve(int argc, char **argv)
     static serve_run run; /* large, and there is one */
     const char *input[MOST_SESSIONS], *unit = NULL;
     int n_input = 0, resolution = 0, label = -1;
+    bool largest_only = false;
     pal_note note = {""};
     const pal_flag flag[] = {
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of surfaces: m, cm, mm, um, in (guessed from the size)"},
         {"--label", "N", PAL_FLAG_COUNT, &label, 0, INT_MAX, "label of a label volume (the most frequent)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &resolution, 1, 1024,
          "voxels on the longest axis of a surface (about 13,000 tetrahedra)"},
+        {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
+         "keep only the largest of several components of a surface or of cells (see palpate prepare --help)"},
     };
     const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
                                   .about = about,
@@ -407,6 +410,7 @@ int command_serve(int argc, char **argv)
     pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
     run.surface = (pal_surface_scene){.resolution = resolution,
                                       .label = label,
+                                      .largest_only = largest_only,
                                       .unit_m = unit ? pal_mesh_unit_named(unit) : 0,
                                       .progress = pal_report_progress,
                                       .user = &run.common};

@@ -20,20 +20,8 @@ static const double locks_above = 0.47;
 /* a moving support stands where it is: its nodes are held, and put in place with the state */
 static void hold_led(pal_body_def *def, const pal_item *item)
 {
-    pal_support *to = &def->support[def->n_support];
-    pal_item read = *item;
-    double low[3], high[3];
     if (def->n_support == PAL_SUPPORT_MAX) return;
-    *to = (pal_support){.lowest = true, .fraction = 0.05};
-    if (pal_item_has(item, "low_m") && !pal_item_numbers(&read, "low_m", 3, low, NULL) &&
-        !pal_item_numbers(&read, "high_m", 3, high, NULL)) {
-        to->lowest = false;
-        pal_copy3(to->low_m, low);
-        pal_copy3(to->high_m, high);
-    } else {
-        (void)pal_item_number(&read, "lowest", 0, 1, &to->fraction, NULL);
-    }
-    def->n_support++;
+    if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
 }
 
 /* what bears on the body but for contact, which the state's loads stand for */

@@ -1,5 +1,5 @@
 /* The SCENE word of a command: a scene file, a folder with a scene.json, control cells (.palcells), or
- * any surface or scan. Thread: [load]. */
+ * any surface or scan. What was left out because nothing holds it is logged. Thread: [load]. */
 #ifndef PAL_COMMANDS_SCENE_ARG_H
 #define PAL_COMMANDS_SCENE_ARG_H
 #include "server/scene/scene_file.h"

@@ -135,7 +135,9 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
     pal_err err;
     if (has_mesh) {
         static const char *const only_surface[] = {"units", "resolution", "label", "triangles", "largest"};
-        for (int k = 0; k < 5; k++)
+        /* components of a mesh of tetrahedra are looked for whatever it was made from, pieces of a surface are not */
+        const int n = !strcmp(model->name, "adaptive_springs") ? 5 : 4;
+        for (int k = 0; k < n; k++)
             if (cJSON_GetObjectItemCaseSensitive(body, only_surface[k]))
                 return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
         err = pal_prepared_load(file, out, &why);
@@ -191,7 +193,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     snprintf(name, sizeof name, "body %d", index + 1);
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
     pal_body_def *body = &scene->scene.body[index];
-    bool solid = cJSON_GetObjectItemCaseSensitive(object, "cells") != NULL;
+    bool solid = cJSON_GetObjectItemCaseSensitive(object, "cells") != NULL, largest_only = false;
     if (solid)
         pal_body_default_cells(body, name, &scene->mesh[index], NULL);
     else
@@ -210,6 +212,10 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     else
         PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
+    PAL_TRY(pal_json_bool(json, object, path, "largest", &largest_only));
+    pal_note why = {""};
+    pal_err err = pal_scene_drop_loose(scene, index, largest_only, &why);
+    if (err) return pal_note_set(json->note, err, "%s: %s: %s", json->file, path, why.text);
     return pal_region_read(json, object, path, folder, scene, index);
 }
 

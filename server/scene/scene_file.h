@@ -13,7 +13,11 @@
  *   "bodies": [{
  *     "name": "liver", "mesh": "liver.palmesh"            (relative to the scene file; or "surface": "x.stl" with
  *                                                          "units": "mm", "resolution": 24, "label": 2,
- *                                                          "triangles": 50000, "largest": true, prepared at load)
+ *                                                          "triangles": 50000, prepared at load)
+ *     "largest": true,                                     keep only the largest of its components: what is joined by
+ *                                                          faces. Without it components without support are dropped
+ *                                                          below 1 % of the largest one and refused above, unless
+ *                                                          nothing of the body is held (mesh/loose_parts.h)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "regions": [                                         other materials in parts of the body, at most 32; what a
  *                                                          region does not give is the body's; later ones win. Springs
@@ -57,6 +61,7 @@
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
 #include "server/mesh/geometry/levels.h"
+#include "server/mesh/volume/loose_parts.h"
 #include "server/sim/core/def.h"
 
 /* what a region borrows */
@@ -70,9 +75,10 @@ typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
-    pal_cells cells[PAL_BODY_MAX];     /* control cells about the body's origin; of another model none   */
-    pal_stroke *stroke[PAL_BODY_MAX];  /* what a body's strokes borrow, from malloc; NULL: none          */
-    double *spring_grid[PAL_BODY_MAX]; /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_cells cells[PAL_BODY_MAX];       /* control cells about the body's origin; of another model none   */
+    pal_stroke *stroke[PAL_BODY_MAX];    /* what a body's strokes borrow, from malloc; NULL: none          */
+    double *spring_grid[PAL_BODY_MAX];   /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_loose_parts loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
     int n_mesh;
 } pal_loaded_scene;
 
@@ -90,7 +96,7 @@ typedef struct pal_surface_scene {
     int target_tri;        /* shown triangles of a label volume's surface; 50,000, adaptive 1,500; a surface file that
                             * adapts is made as coarse as that when it is given, or has more than 3,000 */
     pal_material material; /* young_Pa 0: the default material                 */
-    bool largest_only;     /* keep only the largest of several pieces             */
+    bool largest_only;     /* keep only the largest of several components         */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
     double hold;           /* lowest part of the height held in place; 0: 0.05, of cells
                             * more where that is not an eighth of the control vertices     */

@@ -351,6 +351,26 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
     return PAL_ERR_OK;
 }
 
+/* leaves out what nothing holds, and puts right what the report says of the mesh */
+static pal_err drop_loose(pal_loaded_scene *loaded, const pal_surface_scene *options, pal_surface_scene_report *report,
+                          pal_note *note)
+{
+    pal_prepare_report *told = &report->prepare;
+    const pal_prepared *mesh = &loaded->mesh[0];
+    pal_note why = {""};
+    if (told->voxel.n_component == 1) return PAL_ERR_OK;
+    pal_err err = pal_scene_drop_loose(loaded, 0, options->largest_only, &why);
+    if (err == PAL_ERR_REFUSED)
+        return pal_note_set(note, err, "%s; finer voxels may join them (--resolution, now %d)", why.text,
+                            report->resolution);
+    if (err) return pal_note_set(note, err, "%s", why.text);
+    if (loaded->loose[0].n_dropped == 0) return PAL_ERR_OK;
+    told->voxel.n_component -= loaded->loose[0].n_dropped;
+    told->n_voxel = mesh->hexes.n_hex;
+    told->volume_m3 = pal_tets_volume(&mesh->tets);
+    return PAL_ERR_OK;
+}
+
 /* an empty scene and report; NULL: out of memory */
 static pal_loaded_scene *begin(pal_surface_scene_report *report, const char *name, pal_note *note)
 {
@@ -375,6 +395,7 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     say(options, "levels", 0);
     if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &why);
     if (!err) err = dress(loaded, stem, options, report, &why);
+    if (!err) err = drop_loose(loaded, options, report, &why);
     if (err && why.text[0]) pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
     if (err) {
         pal_scene_free(loaded);
@@ -459,7 +480,9 @@ pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options,
     if (!loaded) return PAL_ERR_MEMORY;
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_solid_load(path, options->unit_m > 0 ? options->unit_m : 1, NULL, loaded, 0, note);
-    if (!err && (err = dress_cells(loaded, stem, options, &why))) pal_note_set(note, err, "%s: %s", path, why.text);
+    if (!err) err = dress_cells(loaded, stem, options, &why);
+    if (!err) err = pal_scene_drop_loose(loaded, 0, options->largest_only, &why);
+    if (err && why.text[0]) pal_note_set(note, err, "%s: %s", path, why.text);
     if (err) {
         pal_scene_free(loaded);
         return err;
@@ -520,6 +543,7 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     pal_surface_free(&shape.surface);
     if (!err) err = dress(loaded, shape.name, options, report, note);
     if (!err) err = dress_shape(&loaded->scene, &shape, options, note);
+    if (!err) err = drop_loose(loaded, options, report, note);
     if (err) {
         pal_scene_free(loaded);
         return err;

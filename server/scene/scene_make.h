@@ -6,6 +6,9 @@
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_note *note);
+/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/loose_parts.h), once its supports and effects are
+ * there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the body */
+pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_note *note);
 /* Model adaptive_springs (scene_shell.c). The surface alone, or its largest piece, as a prepared mesh; errors have no
  * file's name */
 pal_err pal_scene_shell_prepare(const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,

@@ -63,10 +63,21 @@ pal_err pal_solid_load(const char *file, double unit_m, const double *origin_m, 
     return err ? pal_note_set(note, err, "%s: no memory for its boundary", file) : PAL_ERR_OK;
 }
 
+pal_err pal_solid_show(pal_loaded_scene *scene, int index, pal_note *note)
+{
+    pal_prepared mesh = {0};
+    if (make_mesh(&scene->cells[index], scene->mesh[index].surface.origin_m, &mesh))
+        return pal_note_set(note, PAL_ERR_MEMORY, "body \"%s\": no memory for its boundary",
+                            scene->scene.body[index].name);
+    pal_prepared_free(&scene->mesh[index]);
+    scene->mesh[index] = mesh;
+    return PAL_ERR_OK;
+}
+
 pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
                        pal_loaded_scene *scene, int index)
 {
-    static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles", "largest"};
+    static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles"};
     const pal_body_def *def = &scene->scene.body[index];
     char at[PAL_JSON_PATH], name[512] = "", units[16] = "", file[PATH];
     double origin_m[3] = {0}, unit_m = 1;

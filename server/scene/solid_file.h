@@ -10,6 +10,8 @@
  * box. unit_m: of the file's positions. Errors as of pal_cell_file_load */
 pal_err pal_solid_load(const char *file, double unit_m, const double *origin_m, pal_loaded_scene *scene, int index,
                        pal_note *note);
+/* makes mesh [index] anew from the boundary of cells [index], about the same origin; MEMORY */
+pal_err pal_solid_show(pal_loaded_scene *scene, int index, pal_note *note);
 /* the keys "cells", "units" and "origin_m" of a body; folder: where a relative name is looked up */
 pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
                        pal_loaded_scene *scene, int index);

@@ -11,6 +11,7 @@
 #include "server/solve/load_case.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/volume/loose_parts.h"
 #include "server/num/shape.h"
 
 #include <math.h>
@@ -77,18 +78,42 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
+/* what no support holds is left out, as where a scene is made ready (mesh/loose_parts.h) */
+static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_note *note)
+{
+    const pal_tets *tets = &mesh->tets;
+    pal_loose_parts parts;
+    uint8_t *held = calloc((size_t)tets->n_node, sizeof *held);
+    if (!held) return pal_note_set(note, PAL_ERR_MEMORY, "no memory to find what is held");
+    for (int i = 0; i < tets->n_node; i++) {
+        double x[3];
+        pal_add3(x, tets->x + 3 * (size_t)i, tets->origin_m);
+        for (int k = 0; k < p->n_support && !held[i]; k++)
+            held[i] = pal_box_holds(&p->support[k].region, x, pal_case_slack(tets));
+    }
+    pal_err err = pal_loose_parts_drop("problem", held, false, mesh, &parts, note);
+    free(held);
+    return err;
+}
+
 pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_voxel_wish *wish,
                         pal_prepared *out, pal_note *note)
 {
     pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .least_fill = wish->least_fill};
+    pal_prepare_report report;
     bool chosen = !(wish->least_fill > 0);
     if (chosen) voxel.least_fill = wish->fill ? drop_fill : whole_fill;
     if (wish->align) align(problem, wish->resolution, surface, voxel.ahead);
-    PAL_TRY(pal_prepared_make(surface, &voxel, out, NULL, note));
-    if (!chosen || !wish->fill || !(missing(out) > most_missing)) return PAL_ERR_OK;
-    pal_prepared_free(out);
-    voxel.least_fill = keep_fill;
-    return pal_prepared_make(surface, &voxel, out, NULL, note);
+    PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, note));
+    if (chosen && wish->fill && missing(out) > most_missing) {
+        pal_prepared_free(out);
+        voxel.least_fill = keep_fill;
+        PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, note));
+    }
+    if (report.voxel.n_component == 1) return PAL_ERR_OK;
+    pal_err err = drop_loose(problem, out, note);
+    if (err) pal_prepared_free(out);
+    return err;
 }
 
 pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support out[PAL_PROBLEM_REGIONS],

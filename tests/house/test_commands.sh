@@ -114,6 +114,44 @@ check "no title in the scene" has organ/scene.json "My organ"
 check "TetGen files in spite of --no-tetgen" test "$(ls -A organ | wc -l)" -eq 2
 end
 
+# box.obj and a copy of it, scaled and moved up by so many millimetres
+above() { # above SCALE MM
+    cat box.obj
+    awk -v by="$1" -v up="$2" '$1 == "v" { print "v", by * $2, by * $3, by * $4 + up }
+                               $1 == "f" { print "f", $2 + 8, $3 + 8, $4 + 8, $5 + 8 }' box.obj
+}
+
+begin "a component that nothing holds is dropped when small and told, in words and in JSON"
+above 0.1 90 >dust.obj
+run prepare dust.obj -o dust --no-tetgen --units mm --model fem --resolution 10
+check "exit code $code" code_is 0
+check "not told" has out 'body "dust": dropped 1 of 2 components, 1 ml of 481 ml (0.21 %): small and without support'
+check "more than one component" has out ", 1 component, "
+run prepare dust.obj -o dust2 --no-tetgen --units mm --model fem --resolution 10 --json
+check "no figures" has out '"loose_components":1,"loose_m3":9.99'
+check "more than one component" has out '"components":1,'
+run prepare box.obj -o dust3 --no-tetgen --json
+check "something dropped of a box" has out '"loose_components":0,"loose_m3":0'
+end
+
+begin "a large one is refused by a sentence that names file, body and number, and --largest keeps the other"
+above 0.5 90 >stack.obj
+run prepare stack.obj -o stack --no-tetgen --units mm --model fem --resolution 12
+check "exit code $code" code_is 1
+check "not one line" lines_are err 1
+check "no file and body" has err 'stack.obj: line 9: body "stack": 1 of 2 components has no support'
+check "no way out" has err "by a support, or keep only the largest one (--largest"
+check "a folder was left" test ! -e stack
+run prepare stack.obj -o stack --no-tetgen --units mm --model fem --resolution 12 --largest
+check "exit code $code" code_is 0
+check "more than one component" has out ", 1 component, "
+run plan stack.obj
+check "exit code $code of another command" code_is 1
+check "no file and body" has err 'stack.obj: line 9: body "stack": 1 of 2 components has no support'
+run plan dust.obj
+check "exit code $code of another command" code_is 0
+end
+
 begin "the same input gives the same files"
 run prepare box.obj -o again
 for file in scene.json box.palmesh box.node box.ele box.face; do check "$file differs" cmp -s "scene/$file" "again/$file"; done

@@ -161,8 +161,8 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 
 /* crossings in the order they are found, with their rows */
 typedef struct scanner {
-    int n_p, n_q, axis;
-    int64_t n, cap, most; /* crossings, room, budget */
+    int n_p, n_q, n_place, axis; /* n_place: voxels along the axis */
+    int64_t n, cap, most;        /* crossings, room, budget */
     pal_crossing *item;
     int32_t *row;
 } scanner;
@@ -306,7 +306,8 @@ static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const 
             if (((value_ab + ab.bias) | (value_bc + bc.bias) | (value_ca + ca.bias)) >= 0) {
                 pal_crossing *c_out = scanner_next(s, (int32_t)(j * (int64_t)s->n_p + i));
                 if (!c_out) return false;
-                c_out->place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
+                int32_t place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
+                c_out->place = place < 0 ? 0 : place > s->n_place ? s->n_place : place;
                 c_out->part = part;
                 c_out->sign = sign;
             }
@@ -369,7 +370,7 @@ static pal_err deal_rows(const scanner *s, pal_crossings *out)
 
 pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out)
 {
-    scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .axis = axis};
+    scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .n_place = n[axis], .axis = axis};
     s.most = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
     bool ok = true;
     for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++) {

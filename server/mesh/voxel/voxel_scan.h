@@ -56,7 +56,8 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex);
 uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign);
 
 typedef struct pal_crossing {
-    int32_t place; /* first voxel of the row whose centre lies behind the crossing */
+    int32_t
+        place; /* first voxel of the row whose centre lies behind the crossing, 0 .. n: a surface may reach beyond */
     int32_t depth; /* of the crossing, grid units                                  */
     int32_t part;
     int32_t sign; /* +1: the row goes in, -1: it comes out                        */

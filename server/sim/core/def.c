@@ -1,6 +1,8 @@
 /* Scene defaults and checks. */
 #include "server/sim/core/def.h"
 
+#include "server/base/vec3.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -72,6 +74,50 @@ pal_err pal_material_check(pal_material *material, pal_note *note)
         material->poisson = 0.4999;
     }
     return PAL_ERR_OK;
+}
+
+void pal_support_hold(const pal_support *support, const double up[3], const double *x, int n, uint8_t *held)
+{
+    double low = INFINITY, high = -INFINITY;
+    if (support->rim) return;
+    for (int i = 0; i < n && support->lowest; i++) {
+        double z = pal_dot3(x + 3 * (size_t)i, up);
+        low = fmin(low, z), high = fmax(high, z);
+    }
+    /* a hair above, so that rounding does not part nodes of one height */
+    double top = low + (support->fraction + 1e-9) * (high - low);
+    for (int i = 0; i < n; i++) {
+        const double *p = x + 3 * (size_t)i;
+        bool in = support->lowest ? pal_dot3(p, up) <= top : true;
+        for (int c = 0; c < 3 && !support->lowest; c++)
+            in = in && p[c] >= support->low_m[c] && p[c] <= support->high_m[c];
+        if (in) held[i] = 1;
+    }
+}
+
+bool pal_support_of_effect(const pal_item *effect, pal_support *out)
+{
+    pal_item read = *effect;
+    double low[3], high[3];
+    *out = (pal_support){.lowest = true, .fraction = 0.05};
+    if (strcmp(effect->name, "moving_support") != 0 && strcmp(effect->name, "penalty") != 0) return false;
+    if (pal_item_has(effect, "low_m") && !pal_item_numbers(&read, "low_m", 3, low, NULL) &&
+        !pal_item_numbers(&read, "high_m", 3, high, NULL)) {
+        out->lowest = false;
+        pal_copy3(out->low_m, low);
+        pal_copy3(out->high_m, high);
+    } else {
+        (void)pal_item_number(&read, "lowest", 0, 1, &out->fraction, NULL);
+    }
+    return true;
+}
+
+void pal_body_def_hold(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *held)
+{
+    pal_support support;
+    for (int k = 0; k < def->n_support; k++) pal_support_hold(&def->support[k], up, x, n, held);
+    for (int k = 0; k < def->n_effect; k++)
+        if (pal_support_of_effect(&def->effect[k], &support)) pal_support_hold(&support, up, x, n, held);
 }
 
 static pal_err check_support(const pal_body_def *body, int index, pal_note *note)

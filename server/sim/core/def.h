@@ -116,6 +116,12 @@ void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *
 void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prepared *mesh, const pal_cells *cells);
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
+/* held [n] = 1 for the points x [n][3] (body frame) in the support's box or lowest part; rim: none */
+void pal_support_hold(const pal_support *support, const double up[3], const double *x, int n, uint8_t *held);
+/* what of the body the effect holds: that of moving_support and penalty; false: the effect holds nothing */
+bool pal_support_of_effect(const pal_item *effect, pal_support *out);
+/* held [n] = 1 for all points that the body's supports but rims and its effects hold */
+void pal_body_def_hold(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *held);
 /* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 and below 0.5 is taken as 0.4999 and
  * note says so */
 pal_err pal_material_check(pal_material *material, pal_note *note);

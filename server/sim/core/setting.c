@@ -1,6 +1,8 @@
 /* Settings read from scenes and put into them. */
 #include "server/sim/core/setting.h"
 
+#include "server/mesh/volume/loose_parts.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -281,19 +283,33 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-static pal_err fill_voxels(const pal_body_def *body, const pal_surface *surface, int size, pal_prepared *out,
-                           pal_note *note)
+/* what no support holds in voxels of this size is left out, as where a scene is made ready */
+static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prepared *mesh, pal_note *note)
 {
+    pal_loose_parts parts;
+    uint8_t *held = calloc((size_t)mesh->tets.n_node, sizeof *held);
+    if (!held) return pal_note_set(note, PAL_ERR_MEMORY, "no memory to find what is held");
+    pal_body_def_hold(body, up, mesh->tets.x, mesh->tets.n_node, held);
+    pal_err err = pal_loose_parts_drop(body->name, held, false, mesh, &parts, note);
+    free(held);
+    return err;
+}
+
+static pal_err fill_voxels(const pal_body_def *body, const double up[3], const pal_surface *surface, int size,
+                           pal_prepared *out, pal_note *note)
+{
+    pal_prepare_report report;
     pal_note why = {{0}};
     pal_voxel_options voxel = {
         .resolution = size, .border = true, .least_fill = drop_fill, .fill = true, .most_voxel = MOST_KEPT};
     align(body, surface, size, voxel.ahead);
-    pal_err err = pal_prepared_make(surface, &voxel, out, NULL, &why);
+    pal_err err = pal_prepared_make(surface, &voxel, out, &report, &why);
     if (!err && missing(out) > most_missing) {
         pal_prepared_free(out);
         voxel.least_fill = keep_fill;
-        err = pal_prepared_make(surface, &voxel, out, NULL, &why);
+        err = pal_prepared_make(surface, &voxel, out, &report, &why);
     }
+    if (!err && report.voxel.n_component > 1 && (err = drop_loose(body, up, out, &why))) pal_prepared_free(out);
     return err ? pal_note_set(note, err, "body \"%s\" in %d voxels: %s", body->name, size, why.text) : PAL_ERR_OK;
 }
 
@@ -319,17 +335,17 @@ static pal_err cells_surface(const pal_body_def *body, pal_surface *out, pal_not
 }
 
 /* voxels for a body that has none of that size */
-static pal_err make_mesh(const pal_body_def *body, int size, pal_prepared *out, pal_note *note)
+static pal_err make_mesh(const pal_body_def *body, const double up[3], int size, pal_prepared *out, pal_note *note)
 {
     if (size < 1)
         return pal_note_set(note, PAL_ERR_REFUSED,
                             "body \"%s\": as many voxels as it has are wanted, and it was not made of voxels: say how "
                             "many",
                             body->name);
-    if (!body->cells) return fill_voxels(body, &body->mesh->surface, size, out, note);
+    if (!body->cells) return fill_voxels(body, up, &body->mesh->surface, size, out, note);
     pal_surface surface = {0};
     PAL_TRY(cells_surface(body, &surface, note));
-    pal_err err = fill_voxels(body, &surface, size, out, note);
+    pal_err err = fill_voxels(body, up, &surface, size, out, note);
     pal_surface_free(&surface);
     return err;
 }
@@ -428,7 +444,7 @@ static pal_err change(const pal_scene *from, const pal_setting *now, const pal_s
     pal_body_def *body = &set->scene.body[set->body];
     if (!keeps_mesh(body, now, to)) {
         box_supports(from, set->body, body);
-        PAL_TRY(make_mesh(body, to->size, &set->mesh, note));
+        PAL_TRY(make_mesh(body, set->scene.up, to->size, &set->mesh, note));
         body->mesh = &set->mesh;
         body->spring_grid = (pal_spring_grid){.n = {0}};
         snprintf(body->output.name, sizeof body->output.name, "skin_out");

@@ -68,26 +68,9 @@ static pal_err hold_rim(pal_body *body, int index, pal_note *note)
 
 static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3], pal_note *note)
 {
-    double low = INFINITY, high = -INFINITY;
-    for (int i = 0; i < body->n_dof; i++) {
-        double z = pal_dot3(body->x_rest + 3 * i, up);
-        low = fmin(low, z), high = fmax(high, z);
-    }
     for (int s = 0; s < def->n_support; s++) {
-        const pal_support *support = &def->support[s];
-        if (support->rim) {
-            PAL_TRY(hold_rim(body, s, note));
-            continue;
-        }
-        /* a hair above, so that rounding does not part nodes of one height */
-        double top = low + (support->fraction + 1e-9) * (high - low);
-        for (int i = 0; i < body->n_dof; i++) {
-            const double *x = body->x_rest + 3 * i;
-            bool in = support->lowest ? pal_dot3(x, up) <= top : true;
-            for (int c = 0; c < 3 && !support->lowest; c++)
-                in = in && x[c] >= support->low_m[c] && x[c] <= support->high_m[c];
-            if (in) body->held[i] = 1;
-        }
+        if (def->support[s].rim) PAL_TRY(hold_rim(body, s, note));
+        pal_support_hold(&def->support[s], up, body->x_rest, body->n_dof, body->held);
     }
     return PAL_ERR_OK;
 }

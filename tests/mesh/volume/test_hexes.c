@@ -1,6 +1,7 @@
 /* Voxels as hexahedra: found in the split, filled by their share inside the surface, dropped where that is small. */
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/volume/hexes.h"
+#include "server/mesh/voxel/voxel_scan.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
 
@@ -279,6 +280,51 @@ static void voxels_joined_by_an_edge_are_counted(void)
     }
 }
 
+/* crossings stay within the row, on either side of a grid that the surface reaches beyond */
+static void rows_of_a_grid_within_the_surface_end_with_the_grid(void)
+{
+    pal_surface ball = shape_sphere(0.1);
+    const double h = 0.01, low[3] = {-0.02, -0.02, -0.02};
+    const int n[3] = {4, 4, 4};
+    pal_scan_surface scan;
+    REQUIRE(!pal_scan_snap(&ball, low, h, &scan));
+    for (int axis = 0; axis < 3; axis++) {
+        pal_crossings rows;
+        REQUIRE(!pal_scan_axis(&scan, n, axis, &rows));
+        CHECK_INT(rows.start[16], 32);
+        for (int k = 0; k < 32; k++) CHECK_INT(rows.item[k].place, k % 2 ? 4 : 0);
+        pal_crossings_free(&rows);
+    }
+    pal_scan_surface_free(&scan);
+    pal_surface_free(&ball);
+}
+
+/* the fill of what largest_only left, by the whole surface, is that by its own part: nothing is written beyond it */
+static void a_surface_that_reaches_beyond_the_mesh_fills_it_alike(void)
+{
+    for (int side = -1; side <= 1; side += 2) {
+        pal_surface ball = shape_sphere(0.1), far = shape_sphere(0.03);
+        shape_move(&far, side * 1.0, 0, 0);
+        pal_surface both = shape_join(shape_sphere(0.1), far);
+        pal_voxel_options options = {.resolution = 140, .border = true, .largest_only = true};
+        body b;
+        REQUIRE(make_body(&both, &options, &b));
+        size_t n_byte = (size_t)b.hexes.n_hex * sizeof *b.hexes.fill;
+        float *own = malloc(n_byte);
+        REQUIRE(own && !pal_hexes_fill(&b.hexes, &b.tets, &ball, 0, NULL));
+        memcpy(own, b.hexes.fill, n_byte);
+        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &both, 0, NULL));
+        double worst = 0;
+        for (int e = 0; e < b.hexes.n_hex; e++) worst = fmax(worst, fabs((double)(own[e] - b.hexes.fill[e])));
+        CHECK_LE(worst, 1e-6);
+        CHECK_NEAR(fill_volume(&b), fabs(pal_surface_volume(&ball)), 1e-4 * pal_surface_volume(&ball));
+        free(own);
+        free_body(&b);
+        pal_surface_free(&ball);
+        pal_surface_free(&both);
+    }
+}
+
 int main(void)
 {
     RUN(every_voxel_is_found_with_its_corners_in_order);
@@ -290,5 +336,7 @@ int main(void)
     RUN(least_fill_leaves_the_voxels_of_the_reference_boxes);
     RUN(least_fill_drops_border_voxels_only);
     RUN(voxels_joined_by_an_edge_are_counted);
+    RUN(rows_of_a_grid_within_the_surface_end_with_the_grid);
+    RUN(a_surface_that_reaches_beyond_the_mesh_fills_it_alike);
     return check_report();
 }
