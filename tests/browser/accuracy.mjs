@@ -42,7 +42,7 @@ const colours = (page) => page.evaluate(() => {
   return {
     options: [...document.querySelector("#field").options].map((o) => o.value), chosen: document.querySelector("#field").value, field: state.field,
     legend: !document.querySelector("#legend").hidden, note: document.querySelector("#field-note").textContent, told: window.told,
-    values: [...state.bodies.values()][0].values !== null, row: state.rows.includes("field_out"),
+    values: [...state.bodies.values()][0].values !== null, row: state.rows.includes("field_output"),
   };
 });
 const choose = async (page, name) => {

@@ -36,13 +36,13 @@ async function look(name, scene, wanted, offered = wanted) {
     let f = await figures(page);
     check(`${name}: offered is what the model gives`, f.options.join() === ["none", ...offered].join(), f.options.join(" "));
     check(`${name}: what is missing is said`, (f.note !== "") === !wanted.includes("von_mises"), f.note);
-    check(`${name}: nobody asked, so there is no row, no legend, no colour`, !f.rows.includes("field_out") && !f.legend && f.mix === 0 && f.wanted.length === 0);
+    check(`${name}: nobody asked, so there is no row, no legend, no colour`, !f.rows.includes("field_output") && !f.legend && f.mix === 0 && f.wanted.length === 0);
     const pixel = await until(() => organPixel(page), (p) => p);
     await pull(page, pixel, 9);
     for (const field of wanted) {
       await choose(page, field);
-      f = await until(() => figures(page), (g) => g.values && g.values.high > 0.3 * g.range.high && g.rows.includes("field_out"));
-      check(`${name}: ${field} comes when asked for, with its row in the plan`, f.values !== null && f.rows.includes("field_out") && f.legend && f.mix === 1,
+      f = await until(() => figures(page), (g) => g.values && g.values.high > 0.3 * g.range.high && g.rows.includes("field_output"));
+      check(`${name}: ${field} comes when asked for, with its row in the plan`, f.values !== null && f.rows.includes("field_output") && f.legend && f.mix === 1,
         `${f.low} to ${f.high} ${f.unit}, values ${f.values?.low.toPrecision(3)} to ${f.values?.high.toPrecision(3)}`);
       check(`${name}: ${field} lies within its legend`, f.values && f.values.high > 0 && f.values.high <= f.range.high * 1.0001 && f.values.low >= f.range.low * 0.9999);
       await page.screenshot({ path: join(pictures, `field_${name}_${field}.png`) });
@@ -56,8 +56,8 @@ async function look(name, scene, wanted, offered = wanted) {
     await page.screenshot({ path: join(pictures, `field_${name}_long.png`) });
     await page.mouse.up();
     await choose(page, "none");
-    f = await until(() => figures(page), (g) => !g.rows.includes("field_out"));
-    check(`${name}: looked away, the row and the colours are gone`, !f.rows.includes("field_out") && !f.legend && f.mix === 0 && f.values === null, f.rows.join(" "));
+    f = await until(() => figures(page), (g) => !g.rows.includes("field_output"));
+    check(`${name}: looked away, the row and the colours are gone`, !f.rows.includes("field_output") && !f.legend && f.mix === 0 && f.values === null, f.rows.join(" "));
     // paused: values come at once all the same
     await page.click("#pause");
     await until(() => page.evaluate(() => window.palpate.state.status.paused), (p) => p);

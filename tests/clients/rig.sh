@@ -46,7 +46,7 @@ make_scene() {
     cat >"$work/ball.json" <<'SCENE'
 {"name": "ball", "title": "Ball", "gravity_m_s2": 0,
  "bodies": [{"name": "ball", "surface": "ball.obj", "units": "m", "resolution": 6, "supports": [{"lowest": 0.3}],
-             "effects": [{"name": "tool_push"}, {"name": "tool_grab"}, {"name": "finite_guard"}]}],
+             "effects": [{"name": "tool_push"}, {"name": "tool_grasp"}, {"name": "finite_guard"}]}],
  "tools": [{"name": "probe 1", "radius_m": 0.008}, {"name": "probe 2", "radius_m": 0.008},
            {"name": "probe 3", "radius_m": 0.008}]}
 SCENE

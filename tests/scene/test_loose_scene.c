@@ -3,12 +3,12 @@
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/cells/cell_lattice.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/core/setting.h"
+#include "server/sim/core/configuration.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 
 static char folder[] = "/tmp/palpate_loose_XXXXXX";
-static pal_note note;
+static pal_diagnostic diag;
 
 static char *in_folder(const char *name)
 {
@@ -47,15 +47,15 @@ static void check_held(const pal_scene *scene, int body)
 {
     const pal_body_def *def = &scene->body[body];
     const pal_tets *tets = &def->mesh->tets;
-    uint8_t *held = calloc((size_t)tets->n_node, 1), *reached = NULL;
+    uint8_t *fixed = calloc((size_t)tets->n_node, 1), *reached = NULL;
     int32_t *label = malloc((size_t)tets->n_tet * sizeof *label);
     int n = 0;
-    REQUIRE(held && label && !pal_tets_components(tets, label, &n));
+    REQUIRE(fixed && label && !pal_tets_components(tets, label, &n));
     REQUIRE((reached = calloc((size_t)n, 1)) != NULL);
-    pal_body_def_hold(def, scene->up, tets->x, tets->n_node, held);
-    for (int i = 0; i < 4 * tets->n_tet; i++) reached[label[i / 4]] |= held[tets->tet[i]];
+    pal_body_def_hold(def, scene->up, tets->x, tets->n_node, fixed);
+    for (int i = 0; i < 4 * tets->n_tet; i++) reached[label[i / 4]] |= fixed[tets->tet[i]];
     for (int k = 0; k < n; k++) CHECK_INT(reached[k], 1);
-    free(held), free(label), free(reached);
+    free(fixed), free(label), free(reached);
 }
 
 /* a state of rest exists: static_newton refuses a body of which a part keeps a rigid motion */
@@ -65,9 +65,9 @@ static pal_err try_static(const pal_scene *from)
     pal_world *world = NULL;
     if (!scene) return PAL_ERR_MEMORY;
     *scene = *from;
-    pal_item_init(&scene->body[0].solver, "solver", "static_newton");
+    pal_entry_init(&scene->body[0].solver, "solver", "static_newton");
     scene->body[0].n_effect = 0;
-    pal_err err = pal_world_create(scene, &note, &world);
+    pal_err err = pal_world_create(scene, &diag, &world);
     if (!err) pal_world_destroy(world);
     free(scene);
     return err;
@@ -76,10 +76,10 @@ static pal_err try_static(const pal_scene *from)
 /* the same scene on all voxels of its surface, as it was made before components were looked at */
 static pal_err try_static_with_all(const pal_loaded_scene *loaded, int n_hex)
 {
-    pal_voxel_options options = {.resolution = 11, .border = true, .least_fill = 0.1};
+    pal_voxel_options options = {.resolution = 11, .border = true, .min_fill = 0.1};
     pal_scene *scene = malloc(sizeof *scene);
     pal_prepared whole = {0};
-    pal_err err = scene ? pal_prepared_make(&loaded->mesh[0].surface, &options, &whole, NULL, &note) : PAL_ERR_MEMORY;
+    pal_err err = scene ? pal_prepared_make(&loaded->mesh[0].surface, &options, &whole, NULL, &diag) : PAL_ERR_MEMORY;
     if (!err) {
         CHECK_INT(whole.hexes.n_hex, n_hex);
         *scene = loaded->scene;
@@ -100,7 +100,7 @@ static void a_loose_voxel_of_a_surface_is_left_out(void)
         pal_loaded_scene *loaded = NULL;
         pal_surface_scene_report report;
         REQUIRE(write_boxes("speck.obj", 2, k == 0 ? speck : detached));
-        REQUIRE(!pal_scene_from_surface(in_folder("speck.obj"), &wanted_speck, &loaded, &report, &note));
+        REQUIRE(!pal_scene_from_surface(in_folder("speck.obj"), &wanted_speck, &loaded, &report, &diag));
         CHECK_INT(loaded->loose[0].n_component, 2);
         CHECK_INT(loaded->loose[0].n_dropped, 1);
         CHECK_NEAR(loaded->loose[0].dropped_m3, 1e-6, 1e-12);
@@ -111,9 +111,9 @@ static void a_loose_voxel_of_a_surface_is_left_out(void)
         CHECK_INT(try_static(&loaded->scene), PAL_ERR_OK);
         if (k == 1) CHECK_INT(try_static_with_all(loaded, n_hex + 1), PAL_ERR_REFUSED);
         /* what is saved has nothing loose any more */
-        REQUIRE(!pal_scene_save(loaded, in_folder("saved"), &note));
+        REQUIRE(!pal_scene_save(loaded, in_folder("saved"), &diag));
         pal_scene_free(loaded);
-        REQUIRE(!pal_scene_load(in_folder("saved/scene.json"), &loaded, &note));
+        REQUIRE(!pal_scene_load(in_folder("saved/scene.json"), &loaded, &diag));
         CHECK_INT(loaded->loose[0].n_component, 1);
         CHECK_INT(loaded->loose[0].n_dropped, 0);
         pal_scene_free(loaded);
@@ -127,7 +127,7 @@ static void springs_are_treated_alike(void)
     pal_loaded_scene *loaded = NULL;
     pal_surface_scene wanted = {.unit_m = 1e-3, .resolution = 25, .label = -1};
     REQUIRE(write_boxes("far.obj", 2, far));
-    REQUIRE(!pal_scene_from_surface(in_folder("far.obj"), &wanted, &loaded, NULL, &note));
+    REQUIRE(!pal_scene_from_surface(in_folder("far.obj"), &wanted, &loaded, NULL, &diag));
     CHECK_TEXT(loaded->scene.body[0].model.name, "tet_springs");
     CHECK_INT(loaded->loose[0].n_dropped, 1);
     CHECK_NEAR(loaded->loose[0].dropped_m3, 7e-6, 1e-12);
@@ -141,14 +141,14 @@ static void a_large_one_of_a_surface_is_refused_and_the_largest_can_be_kept(void
     pal_surface_scene_report report;
     pal_surface_scene wanted = wanted_stack;
     REQUIRE(write_boxes("stack.obj", 2, stack));
-    CHECK_INT(pal_scene_from_surface(in_folder("stack.obj"), &wanted, &loaded, NULL, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_scene_from_surface(in_folder("stack.obj"), &wanted, &loaded, NULL, &diag), PAL_ERR_REFUSED);
     CHECK(loaded == NULL);
-    CHECK(strstr(note.text, "stack.obj: line "));
-    CHECK(strstr(note.text,
+    CHECK(strstr(diag.text, "stack.obj: line "));
+    CHECK(strstr(diag.text,
                  "body \"stack\": 1 of 2 components has no support, the largest of 48 ml (42.9 % of the body)"));
-    CHECK(strstr(note.text, "--largest") && strstr(note.text, "by a support") && strstr(note.text, "now 12"));
+    CHECK(strstr(diag.text, "--largest") && strstr(diag.text, "by a support") && strstr(diag.text, "now 12"));
     wanted.largest_only = true;
-    REQUIRE(!pal_scene_from_surface(in_folder("stack.obj"), &wanted, &loaded, &report, &note));
+    REQUIRE(!pal_scene_from_surface(in_folder("stack.obj"), &wanted, &loaded, &report, &diag));
     CHECK_INT(report.prepare.voxel.n_component, 1);
     CHECK_INT(loaded->mesh[0].hexes.n_hex, 64);
     check_held(&loaded->scene, 0);
@@ -162,8 +162,8 @@ static pal_loaded_scene *parse(const char *body)
     char text[1024];
     pal_loaded_scene *loaded = NULL;
     snprintf(text, sizeof text, "{\"bodies\": [{\"name\": \"b\", %s}]}", body);
-    note.text[0] = 0;
-    return pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note) ? NULL : loaded;
+    diag.text[0] = 0;
+    return pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &diag) ? NULL : loaded;
 }
 
 #define FEM      ", \"model\": {\"name\": \"fem\", \"fill\": true}"
@@ -198,10 +198,10 @@ static void check_scenes(const char *thing)
         pal_loaded_scene *loaded = parse(body);
         int n_hex = loaded ? loaded->mesh[0].hexes.n_hex : 0;
         if (n_hex != turn[k].n_hex)
-            CHECK_FAIL("%s: %d hexahedra, wanted %d (%s)", body, n_hex, turn[k].n_hex, note.text);
+            CHECK_FAIL("%s: %d hexahedra, wanted %d (%s)", body, n_hex, turn[k].n_hex, diag.text);
         static const char sentence[] = "s.json: bodies[0]: body \"b\": 1 of 2 components has no support";
-        if (!loaded && strncmp(note.text, sentence, strlen(sentence)) != 0) CHECK_FAIL("%s: \"%s\"", body, note.text);
-        if (!loaded) CHECK(strstr(note.text, "or keep only the largest one (--largest, \"largest\": true in a scene)"));
+        if (!loaded && strncmp(diag.text, sentence, strlen(sentence)) != 0) CHECK_FAIL("%s: \"%s\"", body, diag.text);
+        if (!loaded) CHECK(strstr(diag.text, "or keep only the largest one (--largest, \"largest\": true in a scene)"));
         pal_scene_free(loaded);
     }
 }
@@ -213,7 +213,7 @@ static void a_scene_says_what_is_held(void)
     check_scenes(SURFACE);
     /* the same prepared before, by a program that kept all */
     REQUIRE((loaded = parse(SURFACE ", \"supports\": []")) != NULL);
-    REQUIRE(!pal_prepared_save(&loaded->mesh[0], in_folder("stack.palmesh"), &note));
+    REQUIRE(!pal_prepared_save(&loaded->mesh[0], in_folder("stack.palmesh"), &diag));
     pal_scene_free(loaded);
     check_scenes(MESH);
 }
@@ -223,7 +223,7 @@ static void two_bodies_may_be_one_held_and_one_free(void)
     static const char text[] = "{\"bodies\": [{\"name\": \"a\", " SURFACE
                                ", \"largest\": true}, {\"name\": \"b\", " SURFACE ", \"supports\": []}]}";
     pal_loaded_scene *loaded = NULL;
-    REQUIRE(!pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note));
+    REQUIRE(!pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &diag));
     CHECK_INT(loaded->mesh[0].hexes.n_hex, 64);
     CHECK_INT(loaded->mesh[1].hexes.n_hex, 112);
     CHECK_INT(loaded->loose[1].n_dropped, 0);
@@ -235,12 +235,12 @@ static void pieces_of_an_adaptive_surface_all_stay(void)
 {
     pal_loaded_scene *loaded =
         parse("\"surface\": \"stack.obj\", \"units\": \"mm\", \"model\": {\"name\": \"adaptive_springs\"}");
-    if (!loaded) CHECK_FAIL("%s", note.text);
+    if (!loaded) CHECK_FAIL("%s", diag.text);
     REQUIRE(loaded != NULL);
     CHECK_INT(loaded->loose[0].n_component, 0);
     CHECK_INT(loaded->mesh[0].surface.n_tri, 24);
     pal_world *world = NULL;
-    REQUIRE(!pal_world_create(&loaded->scene, &note, &world));
+    REQUIRE(!pal_world_create(&loaded->scene, &diag, &world));
     for (int k = 0; k < 60; k++) REQUIRE(!pal_world_step(world, loaded->scene.step_s));
     const pal_body *body = pal_world_body(world, 0);
     double most = 0;
@@ -267,8 +267,8 @@ static bool write_cells(double width)
     pal_cell_lattice lattice = {.n = {2, 2, 3}, .row = row, .place = narrow};
     pal_cells cells;
     last_width = width;
-    if (pal_cell_lattice_make(&lattice, &cells, &note)) return false;
-    pal_err err = pal_cell_file_save(&cells, in_folder("c.palcells"), &note);
+    if (pal_cell_lattice_make(&lattice, &cells, &diag)) return false;
+    pal_err err = pal_cell_file_save(&cells, in_folder("c.palcells"), &diag);
     pal_cells_free(&cells);
     return !err;
 }
@@ -281,11 +281,11 @@ static void control_cells_are_treated_alike(void)
     pal_surface_scene options = {.label = -1};
     REQUIRE(write_cells(1));
     CHECK(!parse(plain));
-    CHECK(strstr(note.text, "s.json: bodies[0]: body \"b\": 1 of 2 components has no support, the largest of 1 ml"));
-    CHECK_INT(pal_scene_from_cells(in_folder("c.palcells"), &options, &loaded, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "c.palcells: body \"c\": 1 of 2 components"));
+    CHECK(strstr(diag.text, "s.json: bodies[0]: body \"b\": 1 of 2 components has no support, the largest of 1 ml"));
+    CHECK_INT(pal_scene_from_cells(in_folder("c.palcells"), &options, &loaded, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "c.palcells: body \"c\": 1 of 2 components"));
     options.largest_only = true;
-    REQUIRE(!pal_scene_from_cells(in_folder("c.palcells"), &options, &loaded, &note));
+    REQUIRE(!pal_scene_from_cells(in_folder("c.palcells"), &options, &loaded, &diag));
     CHECK_INT(loaded->cells[0].n_cell, 2);
     CHECK_INT(loaded->mesh[0].surface.n_tri, 20);
     pal_scene_free(loaded);
@@ -299,7 +299,7 @@ static void control_cells_are_treated_alike(void)
     CHECK_INT(loaded->loose[0].n_dropped, 1);
     CHECK_NEAR(loaded->loose[0].dropped_m3, 1e-8, 1e-14);
     pal_world *world = NULL;
-    CHECK_INT(pal_world_create(&loaded->scene, &note, &world), PAL_ERR_OK);
+    CHECK_INT(pal_world_create(&loaded->scene, &diag, &world), PAL_ERR_OK);
     pal_world_destroy(world);
     pal_scene_free(loaded);
 }
@@ -310,26 +310,26 @@ static void control_cells_are_treated_alike(void)
 static void another_setting_leaves_out_what_is_loose_in_its_voxels(void)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_set_scene *set = NULL;
-    pal_setting to;
+    pal_configured_scene *set = NULL;
+    pal_configuration to;
     pal_surface_scene springs = wanted_speck;
     springs.fem = false;
     REQUIRE(write_boxes("speck.obj", 2, speck));
-    REQUIRE(!pal_scene_from_surface(in_folder("speck.obj"), &springs, &loaded, NULL, &note));
+    REQUIRE(!pal_scene_from_surface(in_folder("speck.obj"), &springs, &loaded, NULL, &diag));
     CHECK_INT(loaded->loose[0].n_dropped, 0);
-    pal_setting_of(&loaded->scene, 0, &to);
+    pal_configuration_of(&loaded->scene, 0, &to);
     snprintf(to.model, sizeof to.model, "fem");
     snprintf(to.element, sizeof to.element, "hex8_bbar");
     snprintf(to.law, sizeof to.law, "corotational");
     snprintf(to.solver, sizeof to.solver, "implicit_euler");
     to.size = 22;
     to.k_distance_J = to.k_volume_J = to.k_area_J = 0;
-    pal_err err = pal_setting_make(&loaded->scene, 0, &to, &note, &set);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_configuration_make(&loaded->scene, 0, &to, &diag, &set);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_INT(set->scene.body[0].mesh->hexes.n_hex, 8000);
     check_held(&set->scene, 0);
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     pal_scene_free(loaded);
 }
 

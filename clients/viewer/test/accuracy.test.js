@@ -138,16 +138,16 @@ test("numbers are short", () => {
 test("rows that were switched off stay on the list, with whose they are and why", () => {
   const plan = { rows: ["gravity", "hex_elastic", "hex_elastic"], row_parts: [0, 0, 1], row_whys: ["gravity_m_s2", "bodies[0].model", "bodies[1].model"] };
   assert.deepEqual(rowsOf(plan, null).map((r) => [r.name, r.part, r.on, r.ms, r.why]), [["gravity", 0, true, 0, "gravity_m_s2"], ["hex_elastic", 0, true, 1, "bodies[0].model"], ["hex_elastic", 1, true, 2, "bodies[1].model"]]);
-  const off = rowsOf(plan, { rows: ["hex_elastic", "hex_elastic", "field_out"], row_parts: [0, 1, 1], off: [{ row: "gravity", part: 0 }] });
-  assert.deepEqual(off.map((r) => [r.name, r.part, r.on, r.ms, r.why]), [["hex_elastic", 0, true, 0, "bodies[0].model"], ["hex_elastic", 1, true, 1, "bodies[1].model"], ["field_out", 1, true, 2, ""], ["gravity", 0, false, null, "gravity_m_s2"]]);
-  const fixed = rowsOf({ ...plan, row_fixed: [0, 1, 1] }, { rows: ["hex_elastic", "hex_elastic", "field_out"], row_parts: [0, 1, 1], off: [{ row: "gravity", part: 0 }] });
-  assert.deepEqual(fixed.map((r) => [r.name, r.fixed]), [["hex_elastic", true], ["hex_elastic", true], ["field_out", true], ["gravity", false]], "what cannot go has no switch");
+  const off = rowsOf(plan, { rows: ["hex_elastic", "hex_elastic", "field_output"], row_parts: [0, 1, 1], off: [{ row: "gravity", part: 0 }] });
+  assert.deepEqual(off.map((r) => [r.name, r.part, r.on, r.ms, r.why]), [["hex_elastic", 0, true, 0, "bodies[0].model"], ["hex_elastic", 1, true, 1, "bodies[1].model"], ["field_output", 1, true, 2, ""], ["gravity", 0, false, null, "gravity_m_s2"]]);
+  const fixed = rowsOf({ ...plan, row_fixed: [0, 1, 1] }, { rows: ["hex_elastic", "hex_elastic", "field_output"], row_parts: [0, 1, 1], off: [{ row: "gravity", part: 0 }] });
+  assert.deepEqual(fixed.map((r) => [r.name, r.fixed]), [["hex_elastic", true], ["hex_elastic", true], ["field_output", true], ["gravity", false]], "what cannot go has no switch");
   assert.deepEqual(off.map((r) => r.fixed), [false, false, false, false], "a server that does not say");
   assert.deepEqual(rowsOf({ rows: ["a"] }, { rows: [] }).map((r) => [r.name, r.part, r.why]), [["a", 0, ""]], "a server of before");
 });
 
 test("a row without a switch says why, and a bar is as long as its figure", () => {
-  const rows = rowsOf({ rows: ["verlet"], row_parts: [0], row_fixed: [1] }, { rows: ["verlet", "field_out"], row_parts: [0, 0] });
+  const rows = rowsOf({ rows: ["verlet"], row_parts: [0], row_fixed: [1] }, { rows: ["verlet", "field_output"], row_parts: [0, 0] });
   assert.deepEqual(rows.map((r) => [r.fixed, r.planned]), [[true, true], [true, false]]);
   assert.match(fixedWhy(rows[0]), /moves the body/);
   assert.match(fixedWhy(rows[1]), /came while the scene runs/);

@@ -2,7 +2,7 @@
 #include "server/mesh/volume/loose_parts.h"
 
 #include "server/base/vec3.h"
-#include "server/num/roots.h"
+#include "server/num/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,38 +14,40 @@ static const double small_share = 0.01;
 
 typedef struct component {
     double volume_m3, moment[3]; /* moment: volume times middle, m^4 */
-    bool held, keep;
+    bool fixed, keep;
 } component;
 
 /* ---- what stays ---- */
 
 static pal_err refuse(const char *name, const component *part, const pal_loose_parts *all, int n_bad, int bad,
-                      pal_note *note)
+                      pal_diagnostic *diag)
 {
     const component *p = &part[bad];
     double middle[3];
     pal_scale3(middle, 1 / p->volume_m3, p->moment);
-    return pal_note_set(note, PAL_ERR_REFUSED,
-                        "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
-                        "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
-                        name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3,
-                        100 * p->volume_m3 / all->volume_m3, middle[0], middle[1], middle[2]);
+    return pal_diagnostic_set(
+        diag, PAL_ERR_REFUSED,
+        "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
+        "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
+        name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3, 100 * p->volume_m3 / all->volume_m3,
+        middle[0], middle[1], middle[2]);
 }
 
-static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_parts *out, pal_note *note)
+static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_parts *out,
+                      pal_diagnostic *diag)
 {
     int best = 0, bad = -1, n_bad = 0;
     bool any_held = false;
     *out = (pal_loose_parts){.n_component = n, .largest_only = largest_only};
     for (int k = 0; k < n; k++) {
         out->volume_m3 += part[k].volume_m3;
-        any_held |= part[k].held;
+        any_held |= part[k].fixed;
         if (part[k].volume_m3 > part[best].volume_m3) best = k;
     }
     for (int k = 0; k < n; k++) {
         bool small = part[k].volume_m3 < small_share * part[best].volume_m3;
-        part[k].keep = largest_only ? k == best : part[k].held || !small;
-        if (!largest_only && any_held && !part[k].held && !small) {
+        part[k].keep = largest_only ? k == best : part[k].fixed || !small;
+        if (!largest_only && any_held && !part[k].fixed && !small) {
             n_bad++;
             if (bad < 0 || part[k].volume_m3 > part[bad].volume_m3) bad = k;
         }
@@ -54,22 +56,22 @@ static pal_err choose(const char *name, bool largest_only, component *part, int 
         out->dropped_m3 += part[k].volume_m3;
         out->most_dropped_m3 = fmax(out->most_dropped_m3, part[k].volume_m3);
     }
-    return bad < 0 ? PAL_ERR_OK : refuse(name, part, out, n_bad, bad, note);
+    return bad < 0 ? PAL_ERR_OK : refuse(name, part, out, n_bad, bad, diag);
 }
 
-void pal_loose_parts_tell(const pal_loose_parts *parts, const char *name, pal_note *out)
+void pal_loose_parts_tell(const pal_loose_parts *parts, const char *name, pal_diagnostic *out)
 {
     out->text[0] = 0;
     if (parts->n_dropped == 0) return;
-    pal_note_set(out, PAL_ERR_OK, "body \"%.60s\": dropped %d of %d components, %.3g ml of %.3g ml (%.2g %%)%s", name,
-                 parts->n_dropped, parts->n_component, 1e6 * parts->dropped_m3, 1e6 * parts->volume_m3,
-                 100 * parts->dropped_m3 / parts->volume_m3,
-                 parts->largest_only ? ": only the largest is kept" : ": small and without support");
+    pal_diagnostic_set(out, PAL_ERR_OK, "body \"%.60s\": dropped %d of %d components, %.3g ml of %.3g ml (%.2g %%)%s",
+                       name, parts->n_dropped, parts->n_component, 1e6 * parts->dropped_m3, 1e6 * parts->volume_m3,
+                       100 * parts->dropped_m3 / parts->volume_m3,
+                       parts->largest_only ? ": only the largest is kept" : ": small and without support");
 }
 
 /* ---- tetrahedra ---- */
 
-static void add_tet(const pal_tets *tets, const uint8_t *held, const int32_t *corner, component *to)
+static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *corner, component *to)
 {
     const double *x[4];
     double e[3][3], cross[3];
@@ -80,7 +82,7 @@ static void add_tet(const pal_tets *tets, const uint8_t *held, const int32_t *co
     to->volume_m3 += volume;
     for (int c = 0; c < 4; c++) {
         pal_axpy3(to->moment, volume / 4, x[c]);
-        to->held |= held[corner[c]] != 0;
+        to->fixed |= fixed[corner[c]] != 0;
     }
 }
 
@@ -147,8 +149,8 @@ static pal_err keep_mesh(pal_prepared *mesh, const int32_t *label, const compone
     return PAL_ERR_OK;
 }
 
-pal_err pal_loose_parts_drop(const char *name, const uint8_t *held, bool largest_only, pal_prepared *mesh,
-                             pal_loose_parts *out, pal_note *note)
+pal_err pal_loose_parts_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
+                             pal_loose_parts *out, pal_diagnostic *diag)
 {
     const pal_tets *tets = &mesh->tets;
     int n = 0;
@@ -158,10 +160,10 @@ pal_err pal_loose_parts_drop(const char *name, const uint8_t *held, bool largest
     pal_err err = label ? pal_tets_components(tets, label, &n) : PAL_ERR_MEMORY;
     component *part = err ? NULL : calloc((size_t)n, sizeof *part);
     if (!err && !part) err = PAL_ERR_MEMORY;
-    for (int t = 0; !err && t < tets->n_tet; t++) add_tet(tets, held, tets->tet + 4 * (size_t)t, &part[label[t]]);
-    if (!err) err = choose(name, largest_only, part, n, out, note);
+    for (int t = 0; !err && t < tets->n_tet; t++) add_tet(tets, fixed, tets->tet + 4 * (size_t)t, &part[label[t]]);
+    if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_mesh(mesh, label, part);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "body \"%.60s\": no memory to find its components", name);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
     free(label);
     free(part);
     return err;
@@ -172,14 +174,14 @@ pal_err pal_loose_parts_drop(const char *name, const uint8_t *held, bool largest
 static int label_cells(const pal_cells *cells, int32_t *label)
 {
     int n = 0;
-    pal_roots_clear(label, cells->n_cell);
+    pal_union_find_init(label, cells->n_cell);
     for (int32_t f = 0; f < cells->n_face; f++)
         if (!pal_cells_face_boundary(cells, f))
-            pal_roots_join(label, cells->face_use[cells->face[f].use[0]].cell,
-                           cells->face_use[cells->face[f].use[1]].cell);
+            pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
+                                cells->face_use[cells->face[f].use[1]].cell);
     /* the root of a set is its least member, so that it has its label before the others ask for it */
     for (int32_t c = 0; c < cells->n_cell; c++) {
-        int32_t root = pal_root(label, c);
+        int32_t root = pal_union_find_root(label, c);
         label[c] = root;
     }
     for (int32_t c = 0; c < cells->n_cell; c++) label[c] = label[c] == c ? n++ : label[label[c]];
@@ -203,8 +205,8 @@ static pal_err keep_cells(pal_cells *cells, const int32_t *label, const componen
     return PAL_ERR_OK;
 }
 
-pal_err pal_loose_cells_drop(const char *name, const uint8_t *held, bool largest_only, pal_cells *cells,
-                             pal_loose_parts *out, pal_note *note)
+pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_cells *cells,
+                             pal_loose_parts *out, pal_diagnostic *diag)
 {
     int32_t *label = malloc((size_t)cells->n_cell * sizeof *label);
     int n = label ? label_cells(cells, label) : 0;
@@ -218,11 +220,11 @@ pal_err pal_loose_cells_drop(const char *name, const uint8_t *held, bool largest
         to->volume_m3 += volume;
         pal_axpy3(to->moment, volume, middle);
         for (int32_t k = cells->cell_vertex.start[c]; k < cells->cell_vertex.start[c + 1]; k++)
-            to->held |= held[cells->cell_vertex.item[k]] != 0;
+            to->fixed |= fixed[cells->cell_vertex.item[k]] != 0;
     }
-    if (!err) err = choose(name, largest_only, part, n, out, note);
+    if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_cells(cells, label, part);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "body \"%.60s\": no memory to find its components", name);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
     free(label);
     free(part);
     return err;

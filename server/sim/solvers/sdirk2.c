@@ -12,15 +12,15 @@
  *
  * Keys: as implicit_euler. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/implicit/implicit.h"
+#include "server/sim/implicit/implicit_solver.h"
 
 #include <string.h>
 
 static const double gamma_share = 0.29289321881345248;
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_wish wish;
+    pal_implicit_options wish;
     pal_implicit *core = NULL;
     PAL_TRY(pal_implicit_read(item, build, &wish));
     pal_err err = pal_implicit_make(&wish, build, gamma_share, &core);
@@ -48,7 +48,7 @@ static pal_err run(void *self, pal_step *step)
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
-        if (core->n_risen > 0) { /* one stage of the whole step: see above */
+        if (core->n_energy_rise > 0) { /* one stage of the whole step: see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
         } else {
             PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
@@ -71,5 +71,5 @@ const pal_effect pal_effect_sdirk2 = {.name = "sdirk2",
                                       .reset = pal_implicit_reset,
                                       .implicit = true,
                                       .report = pal_implicit_report,
-                                      .keeps_rows = true,
+                                      .keeps_components = true,
                                       .destroy = pal_implicit_destroy};

@@ -53,7 +53,7 @@ static bool settle_tapped(void *self, pal_step *step, const double *moved, bool 
     double *tie = calloc(n3, sizeof *tie);
     if (!tie) abort();
     for (int i = 0; i < step->n_contact; i++) {
-        const pal_row *row = &step->contact[i];
+        const pal_component *row = &step->contact[i];
         if (row->effect->tangent) row->effect->tangent->multiply(row->self, body, 1, 0, moved, tie);
     }
     tap.node_share = take_forces(body, tie);
@@ -89,8 +89,8 @@ static pal_err solve_tapped(void *self, pal_step *step)
 static bool tap_rows(pal_world *world)
 {
     memset(&tap, 0, sizeof tap);
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row *row = (pal_row *)(uintptr_t)pal_world_effect(world, i);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component *row = (pal_component *)(uintptr_t)pal_world_component(world, i);
         if (row->effect->stage == PAL_STAGE_CONTACT && !tap.contact && row->effect->tangent) {
             tap.contact = row->effect;
             tap.tangent = *tap.contact->tangent, tap.contact_tapped = *tap.contact;
@@ -108,14 +108,14 @@ static bool tap_rows(pal_world *world)
 
 /* ---- insults ---- */
 
-static bool open_case(model_scene *m, const body_case *c, double most_N, double friction, bool held)
+static bool open_case(model_scene *m, const body_case *c, double most_N, double friction, bool fixed)
 {
     model_scene_make(m, c->kind);
-    pal_item *push = model_scene_effect(m, "tool_push");
-    model_scene_effect(m, "tool_grab");
-    if (c->solver[0]) pal_item_init(&m->def->solver, "bodies[0].solver", c->solver);
-    pal_item_put_number(push, "friction", friction, NULL);
-    if (!held) m->def->n_support = 0;
+    pal_config_entry *push = model_scene_effect(m, "tool_push");
+    model_scene_effect(m, "tool_grasp");
+    if (c->solver[0]) pal_entry_init(&m->def->solver, "bodies[0].solver", c->solver);
+    pal_entry_put_number(push, "friction", friction, NULL);
+    if (!fixed) m->def->n_support = 0;
     for (int t = 0; t < 2; t++) m->scene->tool[t].force_cap_N = most_N;
     return true;
 }
@@ -242,8 +242,8 @@ static void a_step_gives_no_more_momentum_than_the_cap(void)
             double before[3], after[3], most_N = 0, most_off_N = 0;
             REQUIRE(open_case(&m, &cases[i], cap_N, 0, false));
             m.def->material.damping_1_s = 0;
-            pal_item_put_number(&m.def->solver, "tolerance", 1e-12, NULL);
-            pal_item_put_number(&m.def->solver, "iterations", 2000, NULL);
+            pal_entry_put_number(&m.def->solver, "tolerance", 1e-12, NULL);
+            pal_entry_put_number(&m.def->solver, "iterations", 2000, NULL);
             REQUIRE(model_scene_open(&m));
             for (int k = 0; k < STEPS; k++) {
                 find_momentum(m.body, before);
