@@ -316,7 +316,7 @@ static void a_scene_of_cells_steps(void)
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
     int n_held = 0;
-    for (int i = 0; i < body->n_dof; i++) n_held += body->fixed[i];
+    for (int i = 0; i < body->n_dof; i++) n_held += body->support[i];
     CHECK_INT(body->n_dof, 36);
     CHECK_INT(n_held, 9);
     CHECK_INT(pal_cell_elements_count(&body->model.solid->elements), 96);

@@ -10,6 +10,7 @@
 #include "server/sim/core/dofs.h"
 #include "server/sim/core/safeguards.h"
 #include "server/sim/core/simd_blocks.h"
+#include "server/sim/core/tuning.h"
 
 /* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
  * Published by an implicit solver that holds a static factor; rows stay apart, the body carries the door. */
@@ -44,6 +45,9 @@ typedef struct pal_shown_field {
     double time_s;     /* simulated, when they were taken                     */
 } pal_shown_field;
 
+/* who moves a dof: the solver, nobody, or a component that gives its velocity */
+typedef enum pal_support { PAL_FREE, PAL_FIXED, PAL_PRESCRIBED } pal_support;
+
 typedef struct pal_body {
     const char *name;
     int n_dof;              /* points the solver moves: control points (A) or mass nodes             */
@@ -66,7 +70,7 @@ typedef struct pal_body {
      * embed, where it is 1 / mass [n_node] */
     double *node_inverse_mass_1_kg;
     double *node_rest; /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
-    uint8_t *fixed;    /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
+    uint8_t *support;  /* pal_support of each dof                                 [n_dof]      */
     double *x_rest;    /* rest position m                                         [n_dof][3]    */
     /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (adaptive_surface.h) has
      * arrays for its finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over
@@ -145,7 +149,8 @@ static inline int pal_body_nodes(const pal_body *body)
 /* load_cap_N of a body of this material: by what its edges are, where their constants are given */
 static inline double pal_body_load_cap_N(const pal_body *body, double young_Pa)
 {
-    return 10 * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m * body->edge_m;
+    return PAL_LOAD_CAP_FACTOR * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m *
+           body->edge_m;
 }
 /* most of a lasting load that a node bears (less of it beyond 2 S from its rest place, world_load.c): load_cap_N, and
  * of that the part that the node is of the corner of a full voxel, or of a solid's mean cell, as a sliver is as much
@@ -159,7 +164,7 @@ static inline double pal_body_node_load_cap_N(const pal_body *body, int node)
 static inline double pal_body_inverse_mass_1_kg(const pal_body *body, int node)
 {
     if (body->node_inverse_mass_1_kg) return body->node_inverse_mass_1_kg[node];
-    return body->fixed[node] ? 0 : 1 / body->mass_kg[node];
+    return body->support[node] ? 0 : 1 / body->mass_kg[node];
 }
 
 /* arrays for n points without embed, all active, zeroed, f = g, d = x, dv = v; MEMORY. [load] */

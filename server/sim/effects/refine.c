@@ -311,7 +311,7 @@ static bool let_down_once(refine *row, pal_step *step)
     body->v = v, body->dv = dv;
     for (int k = 0; k < body->n_active && done; k++) {
         const size_t i = (size_t)pal_body_point(body, k);
-        if (row->seen[i] == row->report.n_switch || body->fixed[i] || !(row->bound_N_m[i] > 0)) continue;
+        if (row->seen[i] == row->report.n_switch || body->support[i] || !(row->bound_N_m[i] > 0)) continue;
         double move[3];
         for (int c = 0; c < 3; c++)
             move[c] = (body->f[3 * i + (size_t)c] - body->load[3 * i + (size_t)c]) / row->bound_N_m[i];
@@ -338,7 +338,7 @@ static void let_down(refine *row, pal_step *step)
 /* free, and of the changed region, where that is not all of the body */
 static bool in_region(const refine *row, const pal_body *body, bool whole, int i)
 {
-    if (body->fixed[i]) return false;
+    if (body->support[i]) return false;
     if (whole || row->seen[i] != row->report.n_switch) return true;
     return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
 }

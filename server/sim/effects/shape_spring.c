@@ -55,7 +55,7 @@ static void turn_back(shape_spring *row)
 static bool is_held(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) return true;
+        if (body->support[i]) return true;
     return false;
 }
 

@@ -108,7 +108,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
     tool_grasp *grasp = self;
     (void)body, (void)diag;
     grasp->young_Pa = mat->young_Pa;
-    grasp->poisson = fmin(mat->poisson, 0.4999);
+    grasp->poisson = fmin(mat->poisson, PAL_POISSON_CLAMP);
     return PAL_ERR_OK;
 }
 
@@ -340,7 +340,7 @@ static void leave(const grip *g, const grip *b, const double force_N[3], const p
     const pal_interpolation *place = by->place;
     if (!by->left_N || !place || !pal_finite3(force_N)) return;
     for (int i = 0; i < b->n_node; i++) {
-        if (!by->from->interpolation && by->from->fixed[b->node[i]]) continue;
+        if (!by->from->interpolation && by->from->support[b->node[i]]) continue;
         for (int32_t k = place->start[b->node[i]]; k < place->start[b->node[i] + 1]; k++)
             pal_axpy3(by->left_N + 3 * (size_t)place->point[k], b->weight[i] * place->weight[k], force_N);
     }
@@ -434,7 +434,7 @@ static void find_limits(const tool_grasp *grasp, grip *g, const pal_body *body, 
     double least = INFINITY;
     if (body->interpolation) least = patch_mass(grasp, g, body);
     for (int i = 0; i < g->n_node && !body->interpolation; i++)
-        if (!body->fixed[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
+        if (!body->support[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
     g->k_max_N_m = ALPHA * least / (dt_s * dt_s);
     g->c_most_Ns_m = BETA * least / dt_s;
 }

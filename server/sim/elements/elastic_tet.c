@@ -80,7 +80,7 @@ static void take_rest(pal_elastic_tets *t, double edge_m)
 pal_err pal_elastic_tets_make(const pal_elastic_tets_options *wish, pal_build *build, pal_elastic_tets *out)
 {
     const pal_body *body = build->body;
-    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->fixed};
+    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->support};
     out->n_point = wish->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));

@@ -387,7 +387,7 @@ static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, c
     for (int i = 0; i < edges->n_item; i++)
         for (int c = 0; c < 2; c++) sum[corners(edges, i)[c]] += 2 * edge_N_m(edges, i);
     for (int i = 0; i < t->n_node; i++)
-        if (!body->fixed[i] && sum[i] > 0 && body->mass_kg[i] < least * sum[i]) least = body->mass_kg[i] / sum[i];
+        if (!body->support[i] && sum[i] > 0 && body->mass_kg[i] < least * sum[i]) least = body->mass_kg[i] / sum[i];
     return isfinite(least) ? sqrt(least) : 0;
 }
 
@@ -413,7 +413,7 @@ static void begin(pal_spring_recovery *t, const rows *r, const pal_body *body, d
     double fixed[9];
     int n_free = 0;
     const bool led = pal_support_rotation(body, fixed);
-    for (int i = 0; i < t->n_node; i++) n_free += !body->fixed[i];
+    for (int i = 0; i < t->n_node; i++) n_free += !body->support[i];
     for (int p = 0; p < t->n_patch; p++) {
         t->of[p].fixed = led && 2 * t->of[p].n > n_free;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);

@@ -75,7 +75,7 @@ static void follow_body(pal_world *w, int b, const pal_body *from, const double 
     if (v) memcpy(to->v, v, n_byte);
     /* what is held from now on stands still */
     for (int i = 0; i < to->n_dof; i++)
-        if (to->fixed[i] == 1) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
+        if (to->support[i] == PAL_FIXED) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
     pal_body_update_nodes(to);
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);

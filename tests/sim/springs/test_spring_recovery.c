@@ -30,7 +30,7 @@ static void fold(box_bench *b, double from_m)
 {
     for (int i = 0; i < b->body->n_dof; i++) {
         double *x = b->body->x + 3 * i;
-        if (b->body->fixed[i] || b->body->x_rest[3 * i] < from_m) continue;
+        if (b->body->support[i] || b->body->x_rest[3 * i] < from_m) continue;
         x[0] = 2 * from_m - x[0];
         for (int c = 0; c < 3; c++) x[c] += 0.002 * (check_random01(&seed) - 0.5);
     }

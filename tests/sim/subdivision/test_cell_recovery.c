@@ -228,7 +228,7 @@ static void held_parts_say_where_a_whole_body_turns_to(void)
     for (int i = 0; i < body->n_dof; i++) {
         pal_copy3(body->x_rest + 3 * i, b.cells.x + 3 * i);
         for (int c = 0; c < 3; c++) body->x[3 * i + c] = pal_dot3(turn + 3 * c, b.cells.x + 3 * i);
-        body->fixed[i] = b.cells.x[3 * i] < 0.5;
+        body->support[i] = b.cells.x[3 * i] < 0.5;
     }
     cell_map(&b, (double[9]){0}, 0);
     CHECK(look(&b));
