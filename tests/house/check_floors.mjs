@@ -12,7 +12,7 @@ const tree = process.argv.slice(2).find((a) => !a.startsWith("--")) ?? path.join
 const floors = [
     ["server/base", "protocol", "lcmtypes"],
     ["server/num", "clients/link"],
-    ["server/mesh/geometry", "clients/haptic_bridge", "clients/lcm_bridge", "clients/trainee"],
+    ["server/mesh/geometry", "clients/haptic_bridge", "clients/lcm_bridge", "clients/scripted_client"],
     ["server/mesh/files", "server/mesh/voxel"],
     ["server/mesh/scan", "server/mesh/cells"],
     ["server/mesh/volume"],

@@ -1,4 +1,4 @@
-// PATCH messages (protocol/README.md, "PATCH"; protocol/patch_codec.c): changed places of the table of triangles of a part
+// PATCH messages (protocol/README.md, "PATCH"; protocol/topology_delta_codec.c): changed places of the table of triangles of a part
 // that adapts, and what a table shows: its triangles without the empty places 0 0 0, and the vertices in them. Pure.
 import { planes, unfold } from "./asset.js";
 import { lz4Decode } from "./lz4.js";
