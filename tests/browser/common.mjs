@@ -13,7 +13,8 @@ export const scratch = mkdtempSync(join(tmpdir(), "palpate-browser-"));
 const { chromium } = createRequire(join(build, "viewer_packages", "package.json"))("playwright-core");
 mkdirSync(pictures, { recursive: true });
 
-let passed = 0, failed = 0;
+let passed = 0,
+  failed = 0;
 export function check(what, good, figure = "") {
   console.log(`${good ? "ok  " : "FAIL"} ${what} ${figure}`);
   if (good) passed++;
@@ -25,14 +26,28 @@ export function finish() {
   process.exit(failed ? 1 : 0);
 }
 
-const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz", LIVER = "data/images/liver.inr.gz";
+const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz",
+  LIVER = "data/images/liver.inr.gz";
 
 /** the CT's liver, else (said) our own organ; coarse, so that it steps quickly beside two software renderers */
 export function prepare() {
-  const folder = join(scratch, "organ"), size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
+  const folder = join(scratch, "organ"),
+    size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
   if (existsSync(SCAN)) {
     execFileSync("tar", ["-xzf", SCAN, "-C", scratch, LIVER]);
-    execFileSync(palpate, ["prepare", join(scratch, LIVER), "--label", "255", "--up", "-y", "--hold", "12", "--title", "Liver, from an abdominal CT", ...size]);
+    execFileSync(palpate, [
+      "prepare",
+      join(scratch, LIVER),
+      "--label",
+      "255",
+      "--up",
+      "-y",
+      "--hold",
+      "12",
+      "--title",
+      "Liver, from an abdominal CT",
+      ...size,
+    ]);
   } else {
     console.log("     the scan is not there: our own organ serves");
     execFileSync(palpate, ["prepare", "--procedural", ...size]);
@@ -42,7 +57,9 @@ export function prepare() {
 
 /** starts the server, resolves with its first JSON line */
 export function serve(scene, port, more = []) {
-  const child = spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], { stdio: ["ignore", "pipe", "inherit"] });
+  const child = spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], {
+    stdio: ["ignore", "pipe", "inherit"],
+  });
   return new Promise((resolve, reject) => {
     let text = "";
     child.stdout.on("data", (bytes) => {
@@ -53,11 +70,23 @@ export function serve(scene, port, more = []) {
   });
 }
 
-const FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-  "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+const FLAGS = [
+  "--headless",
+  "--no-sandbox",
+  "--disable-gpu",
+  "--use-gl=angle",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
 /** what the pages complained of in their consoles */
 export const troubles = [];
-export const launch = () => chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: FLAGS });
+export const launch = () =>
+  chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: FLAGS });
 
 /** a page that shows the organ */
 export async function open(browser, address, name, viewport) {
@@ -71,18 +100,23 @@ export async function open(browser, address, name, viewport) {
 }
 
 /** largest displacement of what a page shows, m */
-export const moved = (page) => page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
+export const moved = (page) =>
+  page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
 
 /** a pixel on the organ near the middle of the picture */
-export const organPixel = (page) => page.evaluate(() => {
-  const { stage, input } = window.palpate, w = innerWidth, h = innerHeight;
-  for (let r = 0; r < 0.4; r += 0.04)
-    for (let a = 0; a < 6.28; a += 0.5) {
-      const x = w * (0.5 + r * Math.cos(a)), y = h * (0.5 + r * Math.sin(a));
-      if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
-    }
-  return null;
-});
+export const organPixel = (page) =>
+  page.evaluate(() => {
+    const { stage, input } = window.palpate,
+      w = innerWidth,
+      h = innerHeight;
+    for (let r = 0; r < 0.4; r += 0.04)
+      for (let a = 0; a < 6.28; a += 0.5) {
+        const x = w * (0.5 + r * Math.cos(a)),
+          y = h * (0.5 + r * Math.sin(a));
+        if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
+      }
+    return null;
+  });
 
 /** waits until test(await read()) or the time is over, gives the last value; long, for machines whose cores others have too */
 export async function until(read, test, ms = 90000) {

@@ -19,12 +19,14 @@ export const LEAST_SAID_M = 1e-6;
 export const METHOD_COLOURS = Object.freeze(["#5cb8ff", "#ffb45c", "#62d39a", "#e08bd8", "#f2e36b", "#b0bec8"]);
 
 /** parts of an error, in the order in which they are stacked */
-export const PARTS = Object.freeze(/** @type {const} */ ([
-  { key: "discretisation_m", title: "mesh", colour: "#5cb8ff" },
-  { key: "algebraic_m", title: "solver", colour: "#62d39a" },
-  { key: "time_m", title: "step", colour: "#ffb45c" },
-  { key: "model_m", title: "model", colour: "#e08bd8" },
-]));
+export const PARTS = Object.freeze(
+  /** @type {const} */ ([
+    { key: "discretisation_m", title: "mesh", colour: "#5cb8ff" },
+    { key: "algebraic_m", title: "solver", colour: "#62d39a" },
+    { key: "time_m", title: "step", colour: "#ffb45c" },
+    { key: "model_m", title: "model", colour: "#e08bd8" },
+  ]),
+);
 
 /** is it a number that a logarithm takes? @param {number | undefined} v @returns {v is number} */
 const positive = (v) => typeof v === "number" && Number.isFinite(v) && v > 0;
@@ -38,10 +40,14 @@ export function logRange(values, least = 10) {
   const good = values.filter(positive);
   if (good.length === 0) return { low: 1, high: least };
   const step = (/** @type {number} */ v, /** @type {boolean} */ up) => {
-    const ten = 10 ** Math.floor(Math.log10(v) + 1e-9), all = [1, 2, 5, 10].map((s) => s * ten);
-    return up ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten) : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
+    const ten = 10 ** Math.floor(Math.log10(v) + 1e-9),
+      all = [1, 2, 5, 10].map((s) => s * ten);
+    return up
+      ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten)
+      : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
   };
-  let low = step(Math.min(...good) / 1.15, false), high = step(Math.max(...good) * 1.15, true);
+  let low = step(Math.min(...good) / 1.15, false),
+    high = step(Math.max(...good) * 1.15, true);
   while (high / low < least * (1 - 1e-9)) {
     high = step(high * 1.01, true);
     if (high / low < least * (1 - 1e-9)) low = step(low / 1.01, false);
@@ -86,7 +92,8 @@ export function short(v) {
 }
 
 /** @param {number | undefined} m */
-export const millimetres = (m) => (m === undefined ? "not known" : m !== 0 && m < LEAST_SAID_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`);
+export const millimetres = (m) =>
+  m === undefined ? "not known" : m !== 0 && m < LEAST_SAID_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`;
 /** @param {number | undefined} ms */
 export const milliseconds = (ms) => (ms === undefined ? "not known" : `${short(ms)} ms`);
 
@@ -99,15 +106,24 @@ const OLD_S = 1;
  */
 export function errorWords(e) {
   if (!e) return { error: "being estimated", ago: "", note: "", known: false };
-  if (e.tick === 0) return { error: e.note ? "not estimated" : "being estimated", ago: "", note: e.note ?? "", known: false };
-  const notes = [(e.note ?? "").replace(/([^.])$/, "$1."), e.locking ? "It locks: the true error is larger." : "", typeof e.zz_percent === "number" && e.error_m !== undefined && e.error_m >= LEAST_SAID_M ? `In energy ${e.zz_percent.toPrecision(2)} %.` : ""];
+  if (e.tick === 0)
+    return { error: e.note ? "not estimated" : "being estimated", ago: "", note: e.note ?? "", known: false };
+  const notes = [
+    (e.note ?? "").replace(/([^.])$/, "$1."),
+    e.locking ? "It locks: the true error is larger." : "",
+    typeof e.zz_percent === "number" && e.error_m !== undefined && e.error_m >= LEAST_SAID_M
+      ? `In energy ${e.zz_percent.toPrecision(2)} %.`
+      : "",
+  ];
   const ago = (e.age_s ?? 0) > OLD_S ? `${short(Math.round(/** @type {number} */ (e.age_s)))} s ago` : "";
   return { error: millimetres(e.error_m), ago, note: notes.filter(Boolean).join(" "), known: true };
 }
 
 /** the points of the front by their milliseconds: what the slider goes along @param {Point[]} points @returns {Point[]} */
 export function frontOf(points) {
-  return points.filter((p) => p.front && positive(p.ms) && positive(p.error_m)).sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
+  return points
+    .filter((p) => p.front && positive(p.ms) && positive(p.error_m))
+    .sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
 }
 
 /**
@@ -128,10 +144,15 @@ export function placeOn(front, estimate) {
  * @param {Point[]} points @param {Estimate | null} estimate @param {{left: number, right: number, top: number, bottom: number}} box
  */
 export function layOut(points, estimate, box) {
-  const good = points.filter((p) => positive(p.ms) && positive(p.error_m)), near = (estimate?.neighbours ?? []);
-  const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) => p !== null && positive(p.ms) && positive(p.error_m);
+  const good = points.filter((p) => positive(p.ms) && positive(p.error_m)),
+    near = estimate?.neighbours ?? [];
+  const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) =>
+    p !== null && positive(p.ms) && positive(p.error_m);
   const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
-  const msRange = logRange([...shown.map((p) => /** @type {number} */ (p?.ms)), ...(positive(estimate?.ms) ? [estimate.ms] : [])]);
+  const msRange = logRange([
+    ...shown.map((p) => /** @type {number} */ (p?.ms)),
+    ...(positive(estimate?.ms) ? [estimate.ms] : []),
+  ]);
   // a body at rest is far below all that was studied: it stands at the foot of the plot
   const least = Math.max(LEAST_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
   const errorRange = logRange(shown.map((p) => 1e3 * Math.max(least, /** @type {number} */ (p?.error_m))));
@@ -142,12 +163,24 @@ export function layOut(points, estimate, box) {
     methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),
     xTicks: logTicks(msRange).map((v) => ({ at: logPlace(v, msRange, box.left, box.right), text: short(v) })),
     yTicks: logTicks(errorRange, 5).map((v) => ({ at: logPlace(v, errorRange, box.bottom, box.top), text: short(v) })),
-    marks: good.map((p) => ({ x: x(p.ms), y: y(p.error_m), point: p, colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length] })),
+    marks: good.map((p) => ({
+      x: x(p.ms),
+      y: y(p.error_m),
+      point: p,
+      colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length],
+    })),
     front: frontOf(good).map((p) => ({ x: x(p.ms), y: y(p.error_m) })),
-    neighbours: near.flatMap((n) => (positive(n.ms) && positive(n.error_m) ? [{ x: x(n.ms), y: y(n.error_m), of: n }] : [])),
+    neighbours: near.flatMap((n) =>
+      positive(n.ms) && positive(n.error_m) ? [{ x: x(n.ms), y: y(n.error_m), of: n }] : [],
+    ),
     // without an error the body is a line across the plot: what it costs is known
-    live: positive(estimate?.ms) ? { x: x(estimate.ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null } : null,
-    x, y, msRange, errorRange,
+    live: positive(estimate?.ms)
+      ? { x: x(estimate.ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
+      : null,
+    x,
+    y,
+    msRange,
+    errorRange,
   };
 }
 
@@ -167,16 +200,27 @@ export function partsOf(estimate) {
  */
 export function neighbourWords(now, to) {
   const cost = positive(now.ms) && positive(to.ms) ? to.ms - now.ms : null;
-  const price = cost === null ? "" : Math.abs(cost) < 0.005 ? ": same cost" : `: ${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
+  const price =
+    cost === null
+      ? ""
+      : Math.abs(cost) < 0.005
+        ? ": same cost"
+        : `: ${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
   if (!known(now.error_m) || !known(to.error_m)) return to.label + price;
   // what is said to be less than a length is not told apart below it
   const ratio = Math.max(LEAST_SAID_M, to.error_m) / Math.max(LEAST_SAID_M, now.error_m);
-  const gain = ratio > 0.43 && ratio < 0.57 ? "halve the error"
-    : ratio > 1.75 && ratio < 2.3 ? "twice the error"
-    : Math.abs(ratio - 1) < 0.02 ? "same error"
-    : ratio < 1 ? `${Math.round(100 * (1 - ratio))} % less error`
-    : ratio < 2 ? `${Math.round(100 * (ratio - 1))} % more error`
-    : `${short(ratio)} times the error`;
+  const gain =
+    ratio > 0.43 && ratio < 0.57
+      ? "halve the error"
+      : ratio > 1.75 && ratio < 2.3
+        ? "twice the error"
+        : Math.abs(ratio - 1) < 0.02
+          ? "same error"
+          : ratio < 1
+            ? `${Math.round(100 * (1 - ratio))} % less error`
+            : ratio < 2
+              ? `${Math.round(100 * (ratio - 1))} % more error`
+              : `${short(ratio)} times the error`;
   return gain + price;
 }
 
@@ -184,7 +228,8 @@ export function neighbourWords(now, to) {
 export function knobOrder(body, to) {
   /** @type {Record<string, number>} */
   const args = {};
-  for (const key of /** @type {const} */ (["size", "step_ms", "tolerance"])) if (to[key]) args[key] = /** @type {number} */ (to[key]);
+  for (const key of /** @type {const} */ (["size", "step_ms", "tolerance"]))
+    if (to[key]) args[key] = /** @type {number} */ (to[key]);
   return to.knob === "method" || Object.keys(args).length === 0 ? null : { verb: "knob", target: body, args };
 }
 
@@ -192,15 +237,22 @@ export function knobOrder(body, to) {
 function boundWords({ most_move_m, bound_m }) {
   if (typeof bound_m !== "number") return "";
   // what rounds to nothing in these words is no jump
-  return most_move_m <= Math.max(bound_m, LEAST_SAID_M) ? ` of ${millimetres(bound_m)} allowed` : `, more than the ${millimetres(bound_m)} allowed`;
+  return most_move_m <= Math.max(bound_m, LEAST_SAID_M)
+    ? ` of ${millimetres(bound_m)} allowed`
+    : `, more than the ${millimetres(bound_m)} allowed`;
 }
 
 /** what a switch did @param {{text: string, args?: Record<string, number>}} answer */
 export function switchWords({ text, args = {} }) {
   const said = [];
-  if (typeof args.energy_percent === "number") said.push(`energy ${args.energy_percent >= 0 ? "+" : "−"}${Math.abs(args.energy_percent).toFixed(2)} %`);
-  if (typeof args.frame_move_m === "number") said.push(`moves ${millimetres(args.most_move_m)}${boundWords(args)}, ${millimetres(args.frame_move_m)} a frame`);
+  if (typeof args.energy_percent === "number")
+    said.push(`energy ${args.energy_percent >= 0 ? "+" : "−"}${Math.abs(args.energy_percent).toFixed(2)} %`);
+  if (typeof args.frame_move_m === "number")
+    said.push(`moves ${millimetres(args.most_move_m)}${boundWords(args)}, ${millimetres(args.frame_move_m)} a frame`);
   else if (typeof args.most_move_m === "number") said.push(`moved ${millimetres(args.most_move_m)}${boundWords(args)}`);
-  if (typeof args.made_ms === "number") said.push(`made in ${args.made_ms < 1000 ? `${args.made_ms.toFixed(0)} ms` : `${(args.made_ms / 1000).toFixed(1)} s`}`);
+  if (typeof args.made_ms === "number")
+    said.push(
+      `made in ${args.made_ms < 1000 ? `${args.made_ms.toFixed(0)} ms` : `${(args.made_ms / 1000).toFixed(1)} s`}`,
+    );
   return said.length ? `Switched: ${said.join(", ")}.` : text;
 }

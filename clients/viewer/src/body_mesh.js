@@ -5,7 +5,8 @@ import * as THREE from "./three.js";
 
 const BLEND_MS = 100; // from one set of values to the next, which come ten times a second
 const LINES = { color: 0xf2dccb, opacity: 0.36 };
-const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 }, MATT = { clearcoat: 0.06, sheen: 0.02, specularIntensity: 0.3 };
+const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 },
+  MATT = { clearcoat: 0.06, sheen: 0.02, specularIntensity: 0.3 };
 
 /**
  * @typedef {{mix: {value: number}, range: {value: THREE.Vector2}, older: {value: THREE.Vector2}, newer: {value: THREE.Vector2},
@@ -20,8 +21,14 @@ const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 }, MATT = { 
  */
 function makeTissue(uniforms) {
   const material = new THREE.MeshPhysicalMaterial({
-    color: 0x82352b, roughness: 0.5, metalness: 0, clearcoatRoughness: 0.28,
-    sheenRoughness: 0.5, sheenColor: new THREE.Color(0xd98a7a), side: THREE.DoubleSide, ...WET,
+    color: 0x82352b,
+    roughness: 0.5,
+    metalness: 0,
+    clearcoatRoughness: 0.28,
+    sheenRoughness: 0.5,
+    sheenColor: new THREE.Color(0xd98a7a),
+    side: THREE.DoubleSide,
+    ...WET,
   });
   material.onBeforeCompile = (shader) => {
     shader.uniforms.mapMix = uniforms.mix;
@@ -31,10 +38,18 @@ function makeTissue(uniforms) {
     shader.uniforms.mapBlend = uniforms.blend;
     shader.uniforms.mapStops = uniforms.stops;
     shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nattribute vec3 rest;\nattribute float older, newer;\nuniform vec2 mapOlder, mapNewer;\nuniform float mapBlend;\nvarying float vField;\nvarying vec3 vRest;")
-      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvField = mix(mix(mapOlder.x, mapOlder.y, older), mix(mapNewer.x, mapNewer.y, newer), mapBlend);\nvRest = rest;");
+      .replace(
+        "#include <common>",
+        "#include <common>\nattribute vec3 rest;\nattribute float older, newer;\nuniform vec2 mapOlder, mapNewer;\nuniform float mapBlend;\nvarying float vField;\nvarying vec3 vRest;",
+      )
+      .replace(
+        "#include <begin_vertex>",
+        "#include <begin_vertex>\nvField = mix(mix(mapOlder.x, mapOlder.y, older), mix(mapNewer.x, mapNewer.y, newer), mapBlend);\nvRest = rest;",
+      );
     shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", `#include <common>
+      .replace(
+        "#include <common>",
+        `#include <common>
 varying float vField;
 varying vec3 vRest;
 uniform float mapMix;
@@ -53,13 +68,20 @@ float mottle(vec3 p) {
   f = f * f * (3.0 - 2.0 * f);
   return mix(mix(mix(lattice(i), lattice(i + vec3(1, 0, 0)), f.x), mix(lattice(i + vec3(0, 1, 0)), lattice(i + vec3(1, 1, 0)), f.x), f.y),
              mix(mix(lattice(i + vec3(0, 0, 1)), lattice(i + vec3(1, 0, 1)), f.x), mix(lattice(i + vec3(0, 1, 1)), lattice(i + vec3(1, 1, 1)), f.x), f.y), f.z);
-}`)
-      .replace("#include <color_fragment>", `#include <color_fragment>
+}`,
+      )
+      .replace(
+        "#include <color_fragment>",
+        `#include <color_fragment>
 float shade = 0.86 + 0.14 * mottle(vRest * 160.0) + 0.10 * mottle(vRest * 45.0);
 diffuseColor.rgb *= shade;
 vec3 shown = mapColour((vField - mapRange.x) / (mapRange.y - mapRange.x));
-diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`)
-      .replace("#include <emissivemap_fragment>", "#include <emissivemap_fragment>\ntotalEmissiveRadiance += 0.48 * mapMix * shown;");
+diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`,
+      )
+      .replace(
+        "#include <emissivemap_fragment>",
+        "#include <emissivemap_fragment>\ntotalEmissiveRadiance += 0.48 * mapMix * shown;",
+      );
   };
   return material;
 }
@@ -69,13 +91,27 @@ diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`)
  * @param {Float32Array} x [n][3] @param {Uint32Array} triangles [m][3]
  */
 function isClosed(x, triangles) {
-  const n = x.length / 3, edges = new Set();
+  const n = x.length / 3,
+    edges = new Set();
   let volume = 0; // sixfold
   for (let t = 0; t < triangles.length; t += 3) {
-    const a = triangles[t], b = triangles[t + 1], c = triangles[t + 2], i = 3 * a, j = 3 * b, k = 3 * c;
-    volume += x[i] * (x[j + 1] * x[k + 2] - x[j + 2] * x[k + 1]) + x[i + 1] * (x[j + 2] * x[k] - x[j] * x[k + 2]) + x[i + 2] * (x[j] * x[k + 1] - x[j + 1] * x[k]);
+    const a = triangles[t],
+      b = triangles[t + 1],
+      c = triangles[t + 2],
+      i = 3 * a,
+      j = 3 * b,
+      k = 3 * c;
+    volume +=
+      x[i] * (x[j + 1] * x[k + 2] - x[j + 2] * x[k + 1]) +
+      x[i + 1] * (x[j + 2] * x[k] - x[j] * x[k + 2]) +
+      x[i + 2] * (x[j] * x[k + 1] - x[j + 1] * x[k]);
     // an edge and its like in the other direction take one another away
-    for (const [from, to] of [[a, b], [b, c], [c, a]]) if (!edges.delete(to * n + from)) edges.add(from * n + to);
+    for (const [from, to] of [
+      [a, b],
+      [b, c],
+      [c, a],
+    ])
+      if (!edges.delete(to * n + from)) edges.add(from * n + to);
   }
   return edges.size === 0 && volume > 0;
 }
@@ -92,8 +128,12 @@ export class BodyMesh {
     this.visible = visible;
     /** @type {MapUniforms} */
     this.uniforms = {
-      mix: { value: 0 }, range: { value: new THREE.Vector2(0, 1) }, older: { value: new THREE.Vector2() }, newer: { value: new THREE.Vector2() },
-      blend: { value: 1 }, stops: { value: COLOURS.map((c) => new THREE.Color(c)) },
+      mix: { value: 0 },
+      range: { value: new THREE.Vector2(0, 1) },
+      older: { value: new THREE.Vector2() },
+      newer: { value: new THREE.Vector2() },
+      blend: { value: 1 },
+      stops: { value: COLOURS.map((c) => new THREE.Color(c)) },
     };
     /** @type {{low: number, high: number} | null} of the values shown */
     this.values = null;
@@ -128,10 +168,17 @@ export class BodyMesh {
 
   /** does a frame lie within `least` m of what is shown, in every coordinate? @param {Float32Array} positions @param {number} least */
   near(positions, least) {
-    const x = this.position.array, visible = this.visible, n = this.nVisible();
+    const x = this.position.array,
+      visible = this.visible,
+      n = this.nVisible();
     for (let k = 0; k < n; k++) {
       const i = 3 * (visible ? visible[k] : k);
-      if (Math.abs(x[i] - positions[i]) > least || Math.abs(x[i + 1] - positions[i + 1]) > least || Math.abs(x[i + 2] - positions[i + 2]) > least) return false;
+      if (
+        Math.abs(x[i] - positions[i]) > least ||
+        Math.abs(x[i + 1] - positions[i + 1]) > least ||
+        Math.abs(x[i + 2] - positions[i + 2]) > least
+      )
+        return false;
     }
     return this.shown;
   }
@@ -149,7 +196,9 @@ export class BodyMesh {
       room.set(triangles);
       // what the renderer made of the former index goes with it
       if (index) this.geometry.dispose();
-      this.geometry.setIndex(new THREE.BufferAttribute(room, 1).setUsage(index ? THREE.DynamicDrawUsage : THREE.StaticDrawUsage));
+      this.geometry.setIndex(
+        new THREE.BufferAttribute(room, 1).setUsage(index ? THREE.DynamicDrawUsage : THREE.StaticDrawUsage),
+      );
     }
     this.geometry.setDrawRange(0, triangles.length);
     this.nCorner = triangles.length;
@@ -167,7 +216,8 @@ export class BodyMesh {
 
   /** new vertices take the mean value of their neighbours until values come for them @param {Uint32Array} triangles */
   spreadField(triangles) {
-    const n = this.rest.length / 3, known = new Uint8Array(n);
+    const n = this.rest.length / 3,
+      known = new Uint8Array(n);
     if (!this.visible) return;
     for (const v of this.visible) known[v] = 1;
     for (const attribute of [this.older, this.newer]) {
@@ -196,7 +246,10 @@ export class BodyMesh {
    * @returns {{positions: Float32Array, normals: Float32Array}}
    */
   take(positions, normals) {
-    const old = { positions: /** @type {Float32Array} */ (this.position.array), normals: /** @type {Float32Array} */ (this.normal.array) };
+    const old = {
+      positions: /** @type {Float32Array} */ (this.position.array),
+      normals: /** @type {Float32Array} */ (this.normal.array),
+    };
     this.shown = true;
     this.position.array = positions;
     this.normal.array = normals;
@@ -210,7 +263,8 @@ export class BodyMesh {
    * @param {Uint8Array} level [n] @param {number} low value of level 0 @param {number} high of level 255 @param {number} now ms
    */
   takeField(level, low, high, now) {
-    const u = this.uniforms, first = !this.values;
+    const u = this.uniforms,
+      first = !this.values;
     this.older.array = first ? level.slice() : this.newer.array;
     this.newer.array = level;
     u.older.value.set(first ? low : u.newer.value.x, first ? high : u.newer.value.y);
@@ -228,7 +282,8 @@ export class BodyMesh {
    * @param {Uint8Array} level @param {number} low @param {number} high
    */
   valuesOf(level, low, high) {
-    let least = 255, most = 0;
+    let least = 255,
+      most = 0;
     if (!this.visible) return { low, high };
     for (const v of this.visible) {
       least = Math.min(least, level[v]);
@@ -276,7 +331,13 @@ export class BodyMesh {
   /** lines of the triangles over the body @param {boolean} on */
   wireframe(on) {
     if (on && !this.lines) {
-      const material = new THREE.MeshBasicMaterial({ wireframe: true, transparent: true, depthWrite: false, toneMapped: false, ...LINES });
+      const material = new THREE.MeshBasicMaterial({
+        wireframe: true,
+        transparent: true,
+        depthWrite: false,
+        toneMapped: false,
+        ...LINES,
+      });
       this.lines = new THREE.Mesh(this.geometry, material);
       this.lines.frustumCulled = false;
       this.scene.add(this.lines);
@@ -286,10 +347,14 @@ export class BodyMesh {
 
   /** largest displacement of the shown frame, m */
   moved() {
-    const x = this.position.array, r = this.rest, visible = this.visible, n = this.nVisible();
+    const x = this.position.array,
+      r = this.rest,
+      visible = this.visible,
+      n = this.nVisible();
     let most = 0;
     for (let k = 0; k < n; k++) {
-      const i = 3 * (visible ? visible[k] : k), d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
+      const i = 3 * (visible ? visible[k] : k),
+        d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
       if (d > most) most = d;
     }
     return Math.sqrt(most);
@@ -297,9 +362,14 @@ export class BodyMesh {
 
   /** nearest front hit of a ray @param {THREE.Ray} ray @returns {{point: THREE.Vector3, normal: THREE.Vector3, distance: number} | null} */
   pick(ray) {
-    const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index).array, x = this.position.array;
-    const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3(), hit = new THREE.Vector3();
-    let best = Infinity, found = -1;
+    const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index).array,
+      x = this.position.array;
+    const a = new THREE.Vector3(),
+      b = new THREE.Vector3(),
+      c = new THREE.Vector3(),
+      hit = new THREE.Vector3();
+    let best = Infinity,
+      found = -1;
     const point = new THREE.Vector3();
     for (let t = 0; t < this.nCorner; t += 3) {
       a.fromArray(x, 3 * index[t]);

@@ -1,6 +1,7 @@
 // The keyboard: what the page's buttons do, and looking around for people without a pointer.
 
-const TURN_PX = 40, NEARER = 0.85;
+const TURN_PX = 40,
+  NEARER = 0.85;
 
 /**
  * @typedef {{orbit: (dx: number, dy: number) => void, zoom: (factor: number) => void, home: () => void}} View
@@ -10,9 +11,14 @@ const TURN_PX = 40, NEARER = 0.85;
 /** @param {View} view @returns {Record<string, () => void>} keys that may be held down */
 function viewKeys(view) {
   return {
-    arrowleft: () => view.orbit(-TURN_PX, 0), arrowright: () => view.orbit(TURN_PX, 0),
-    arrowup: () => view.orbit(0, -TURN_PX), arrowdown: () => view.orbit(0, TURN_PX),
-    "+": () => view.zoom(NEARER), "=": () => view.zoom(NEARER), "-": () => view.zoom(1 / NEARER), "0": () => view.home(),
+    arrowleft: () => view.orbit(-TURN_PX, 0),
+    arrowright: () => view.orbit(TURN_PX, 0),
+    arrowup: () => view.orbit(0, -TURN_PX),
+    arrowdown: () => view.orbit(0, TURN_PX),
+    "+": () => view.zoom(NEARER),
+    "=": () => view.zoom(NEARER),
+    "-": () => view.zoom(1 / NEARER),
+    0: () => view.home(),
   };
 }
 

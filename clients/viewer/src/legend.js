@@ -4,7 +4,17 @@
  * viridis (Smith and van der Walt 2015) without its darkest eighth, which would drown in the backdrop: nine stops whose
  * lightness grows evenly, told apart with any colour vision
  */
-export const COLOURS = Object.freeze(["#472e7c", "#3c4f8a", "#2f6b8d", "#25868d", "#25a086", "#3db974", "#73ce55", "#b7dd2f", "#fde725"]);
+export const COLOURS = Object.freeze([
+  "#472e7c",
+  "#3c4f8a",
+  "#2f6b8d",
+  "#25868d",
+  "#25a086",
+  "#3db974",
+  "#73ce55",
+  "#b7dd2f",
+  "#fde725",
+]);
 
 /**
  * Fields that this page can show. `least` is the smallest range worth colouring, so that a body at rest shows no noise;
@@ -12,10 +22,45 @@ export const COLOURS = Object.freeze(["#472e7c", "#3c4f8a", "#2f6b8d", "#25868d"
  * @type {Record<string, {title: string, least: number, units: [string, number][], signed?: boolean}>}
  */
 export const FIELDS = Object.freeze({
-  displacement: { title: "Displacement", least: 1e-4, units: [["µm", 1e-6], ["mm", 1e-3], ["m", 1]] },
-  von_mises: { title: "Von Mises stress", least: 1, units: [["Pa", 1], ["kPa", 1e3], ["MPa", 1e6], ["GPa", 1e9]] },
-  energy: { title: "Strain energy density", least: 1e-3, units: [["mJ/m³", 1e-3], ["J/m³", 1], ["kJ/m³", 1e3], ["MJ/m³", 1e6]] },
-  stiffness: { title: "Edge stiffness k_d", least: 1e-9, units: [["nJ", 1e-9], ["µJ", 1e-6], ["mJ", 1e-3], ["J", 1]] },
+  displacement: {
+    title: "Displacement",
+    least: 1e-4,
+    units: [
+      ["µm", 1e-6],
+      ["mm", 1e-3],
+      ["m", 1],
+    ],
+  },
+  von_mises: {
+    title: "Von Mises stress",
+    least: 1,
+    units: [
+      ["Pa", 1],
+      ["kPa", 1e3],
+      ["MPa", 1e6],
+      ["GPa", 1e9],
+    ],
+  },
+  energy: {
+    title: "Strain energy density",
+    least: 1e-3,
+    units: [
+      ["mJ/m³", 1e-3],
+      ["J/m³", 1],
+      ["kJ/m³", 1e3],
+      ["MJ/m³", 1e6],
+    ],
+  },
+  stiffness: {
+    title: "Edge stiffness k_d",
+    least: 1e-9,
+    units: [
+      ["nJ", 1e-9],
+      ["µJ", 1e-6],
+      ["mJ", 1e-3],
+      ["J", 1],
+    ],
+  },
   strain: { title: "Largest strain", least: 1e-3, units: [["%", 1e-2]] },
   distortion: { title: "Volume distortion", least: 1e-3, units: [["%", 1e-2]], signed: true },
 });
@@ -45,13 +90,14 @@ export function roundDown(v) {
  * @returns {{low: number, high: number}}
  */
 export function rangeOf(field, low, high, before) {
-  const least = FIELDS[field]?.least ?? 1e-9, signed = FIELDS[field]?.signed ?? false;
+  const least = FIELDS[field]?.least ?? 1e-9,
+    signed = FIELDS[field]?.signed ?? false;
   const top = Math.max(high, signed ? -low : high, least);
   const holds = before && top <= before.high && (top >= KEEP * before.high || before.high <= roundUp(least));
   const to = holds ? before.high : roundUp(top);
   if (signed) return { low: -to, high: to };
   const floor = low > 0.55 * to ? roundDown(low) : 0;
-  const kept = before && holds && before.low <= low && (before.low > 0) === (low > 0.5 * to);
+  const kept = before && holds && before.low <= low && before.low > 0 === low > 0.5 * to;
   return { low: kept ? before.low : floor < to ? floor : 0, high: to };
 }
 
@@ -82,6 +128,9 @@ export function offered(parts) {
 export function missing(parts) {
   const names = offered(parts);
   if (names.length === 0) return "This server sends no fields.";
-  if (!names.includes("von_mises") || !names.includes("energy")) return "Stress and energy need a model of finite elements.";
-  return parts.some((part) => names.some((name) => !part.fields?.includes(name))) ? "Not every body has every field." : "";
+  if (!names.includes("von_mises") || !names.includes("energy"))
+    return "Stress and energy need a model of finite elements.";
+  return parts.some((part) => names.some((name) => !part.fields?.includes(name)))
+    ? "Not every body has every field."
+    : "";
 }

@@ -7,13 +7,18 @@ import { vertexNormals } from "./normals.js";
 import { applyPatch, readPatchHead, shownOf } from "./patch_decoder.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
-const RETRY_MS = 500, RETRY_MOST_MS = 5000;
+const RETRY_MS = 500,
+  RETRY_MOST_MS = 5000;
 const BEAT_MS = 50; // a resting tool is said again this often: the server lets a silent one go
 const PAGE_MS = 3000; // unless the page itself has been silent for so long
 /** close codes after which trying again makes no sense, with what to tell people */
 const FINAL = new Map([
-  [1002, "the server refused what this page sent"], [1008, "not allowed here"], [1009, "the server refused what this page sent"],
-  [4001, "this page sent too much"], [4003, "the session is full"], [4004, "this session does not exist"],
+  [1002, "the server refused what this page sent"],
+  [1008, "not allowed here"],
+  [1009, "the server refused what this page sent"],
+  [4001, "this page sent too much"],
+  [4003, "the session is full"],
+  [4004, "this session does not exist"],
 ]);
 
 /**
@@ -32,7 +37,10 @@ const FINAL = new Map([
 export { BEAT_MS };
 
 /** of a close: at most 123 bytes @param {unknown} error */
-const reason = (error) => String(error).replace(/[^ -~]/g, "?").slice(0, 100);
+const reason = (error) =>
+  String(error)
+    .replace(/[^ -~]/g, "?")
+    .slice(0, 100);
 
 export class Link {
   /** @type {WebSocket | null} */
@@ -105,7 +113,13 @@ export class Link {
     this.socket = socket;
     socket.onopen = () => {
       if (generation !== this.generation) return;
-      this.send({ type: "join", name: this.want.name, role: this.want.role, tool: this.want.role === "viewer" ? null : -1, patches: true });
+      this.send({
+        type: "join",
+        name: this.want.name,
+        role: this.want.role,
+        tool: this.want.role === "viewer" ? null : -1,
+        patches: true,
+      });
     };
     socket.onmessage = (event) => {
       if (generation !== this.generation) return;
@@ -162,10 +176,16 @@ export class Link {
     if (this.socket?.readyState !== 1) return;
     this.saidAt = this.around.now();
     this.lastPosition = pose.position ?? this.lastPosition;
-    this.socket.send(writePose({
-      tool: pose.tool, seq: ++this.poseSeq, flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
-      stampUs: Math.round(this.around.now() * 1000), position: this.lastPosition, buttons: pose.grab ? 1 : 0,
-    }));
+    this.socket.send(
+      writePose({
+        tool: pose.tool,
+        seq: ++this.poseSeq,
+        flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
+        stampUs: Math.round(this.around.now() * 1000),
+        position: this.lastPosition,
+        buttons: pose.grab ? 1 : 0,
+      }),
+    );
   }
 
   /** @param {string | ArrayBuffer} data */
@@ -191,7 +211,8 @@ export class Link {
       message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
       this.say("live", "live");
       this.ping();
-    } else if (message.type === "topology") message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
+    } else if (message.type === "topology")
+      message.parts.forEach((/** @type {any} */ part, /** @type {number} */ i) => this.loadPart(i, part));
     else if (message.type === "pong") this.rtt = this.around.now() - message.stamp_ms;
     this.around.post({ type: "control", message });
   }
@@ -214,18 +235,29 @@ export class Link {
       if (generation !== this.generation || this.wanted.get(index) !== info.epoch) return;
       // a server whose assets cannot be read is asked again ever more slowly
       this.tries = 0;
-      const n = asset.rest.length / 3, shown = shownOf(asset.triangles, n);
-      this.parts.set(index, { decoder: new FrameDecoder(asset), table: asset.triangles, shown, patched: false, epoch: info.epoch, n, spare: [] });
+      const n = asset.rest.length / 3,
+        shown = shownOf(asset.triangles, n);
+      this.parts.set(index, {
+        decoder: new FrameDecoder(asset),
+        table: asset.triangles,
+        shown,
+        patched: false,
+        epoch: info.epoch,
+        n,
+        spare: [],
+      });
       this.around.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
       this.laterMessages(index);
     } catch (error) {
-      if (generation === this.generation && this.wanted.get(index) === info.epoch) this.socket?.close(4900, reason(error));
+      if (generation === this.generation && this.wanted.get(index) === info.epoch)
+        this.socket?.close(4900, reason(error));
     }
   }
 
   /** what came before the asset @param {number} index of the part that is there now */
   laterMessages(index) {
-    const kept = this.kept.get(index), patches = this.keptPatches.get(index) ?? [];
+    const kept = this.kept.get(index),
+      patches = this.keptPatches.get(index) ?? [];
     this.kept.delete(index);
     this.keptPatches.delete(index);
     for (const patch of patches) this.patch(index, patch);
@@ -237,19 +269,24 @@ export class Link {
 
   /** @param {number} index @param {Uint8Array} bytes */
   field(index, bytes) {
-    const part = this.parts.get(index), { epoch } = readFieldHead(bytes);
+    const part = this.parts.get(index),
+      { epoch } = readFieldHead(bytes);
     if (!part || epoch > part.epoch) {
       this.keptField.set(index, bytes.slice());
       return;
     }
     if (epoch < part.epoch) return;
-    const level = new Uint8Array(part.n), head = decodeField(bytes, level);
-    this.around.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [level.buffer]);
+    const level = new Uint8Array(part.n),
+      head = decodeField(bytes, level);
+    this.around.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
+      level.buffer,
+    ]);
   }
 
   /** into the table at once, shown together with the frame that follows @param {number} index @param {Uint8Array} bytes */
   patch(index, bytes) {
-    const part = this.parts.get(index), { epoch } = readPatchHead(bytes);
+    const part = this.parts.get(index),
+      { epoch } = readPatchHead(bytes);
     if (!part || epoch > part.epoch) {
       const before = this.keptPatches.get(index) ?? [];
       this.keptPatches.set(index, [...before.filter((older) => readPatchHead(older).epoch === epoch), bytes.slice()]);
@@ -264,16 +301,21 @@ export class Link {
 
   /** @param {number} index @param {Uint8Array} bytes */
   frame(index, bytes) {
-    const part = this.parts.get(index), { epoch } = readFrameHead(bytes);
+    const part = this.parts.get(index),
+      { epoch } = readFrameHead(bytes);
     if (!part || epoch > part.epoch) {
       this.kept.set(index, bytes.slice());
       return;
     }
     if (epoch < part.epoch) return;
     const begin = this.around.now();
-    const { positions, normals } = part.spare.pop() ?? { positions: new Float32Array(3 * part.n), normals: new Float32Array(3 * part.n) };
+    const { positions, normals } = part.spare.pop() ?? {
+      positions: new Float32Array(3 * part.n),
+      normals: new Float32Array(3 * part.n),
+    };
     part.decoder.decode(bytes, positions);
-    const ms = this.around.now() - begin, shown = part.patched ? shownOf(part.table, part.n) : null;
+    const ms = this.around.now() - begin,
+      shown = part.patched ? shownOf(part.table, part.n) : null;
     if (shown) part.shown = shown;
     part.patched = false;
     vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
@@ -286,7 +328,8 @@ export class Link {
   /** arrays come back from the page @param {{part: number, positions: Float32Array, normals: Float32Array}} old */
   reuse(old) {
     const part = this.parts.get(old.part);
-    if (part && part.spare.length < 4 && old.positions.length === 3 * part.n) part.spare.push({ positions: old.positions, normals: old.normals });
+    if (part && part.spare.length < 4 && old.positions.length === 3 * part.n)
+      part.spare.push({ positions: old.positions, normals: old.normals });
   }
 
   /** @param {Uint8Array} bytes */
@@ -303,7 +346,12 @@ export class Link {
     }
     this.around.post({ type: "tools", tools: message.tools });
     if (now - this.figuresAt > 500) {
-      const figures = { latency_ms: this.latency, rtt_ms: this.rtt, decode_ms: this.nDecoded ? this.decodeSum / this.nDecoded : 0, bytes_s: (1000 * this.bytes) / (now - this.figuresAt) };
+      const figures = {
+        latency_ms: this.latency,
+        rtt_ms: this.rtt,
+        decode_ms: this.nDecoded ? this.decodeSum / this.nDecoded : 0,
+        bytes_s: (1000 * this.bytes) / (now - this.figuresAt),
+      };
       this.around.post({ type: "figures", figures });
       this.figuresAt = now;
       this.bytes = this.nDecoded = this.decodeSum = 0;

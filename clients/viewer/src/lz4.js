@@ -12,13 +12,15 @@ function damaged() {
  */
 export function lz4Decode(src, dst, begin, end) {
   const n = src.length;
-  let from = 0, to = begin;
+  let from = 0,
+    to = begin;
   if (n === 0) damaged();
   for (;;) {
     // literals: length in the token's high bits, continued while bytes are 255
     if (from >= n) damaged();
     const token = src[from++];
-    let length = token >> 4, byte = 255;
+    let length = token >> 4,
+      byte = 255;
     if (length === 15)
       do {
         if (from >= n) damaged();
@@ -30,7 +32,7 @@ export function lz4Decode(src, dst, begin, end) {
       dst.set(src.subarray(from, from + length), to);
       from += length;
       to += length;
-    } else for (const stop = from + length; from < stop;) dst[to++] = src[from++];
+    } else for (const stop = from + length; from < stop; ) dst[to++] = src[from++];
     if (from === n) break;
 
     // match: distance in two bytes, length in the token's low bits, at least 4; may overlap what it writes

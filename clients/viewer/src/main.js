@@ -38,7 +38,8 @@ const state = {
   /** @type {any} */ status: null,
   /** @type {Map<number, BodyMesh>} */ bodies: new Map(),
   /** @type {Map<number, BodyMesh>} bodies of another topology, until their first frame */ coming: new Map(),
-  /** @type {BodyMesh[]} whose place was taken, until the next picture: what they share with the renderer is kept */ going: [],
+  /** @type {BodyMesh[]} whose place was taken, until the next picture: what they share with the renderer is kept */ going:
+    [],
   /** @type {Map<number, {positions: Float32Array, normals: Float32Array, shown: import("./patch_decoder.js").Shown | null}>} newest undrawn frame of
    * each part, with the triangles that came since the last drawn one */ frames: new Map(),
   /** @type {import("./wire.js").Tool[]} */ tools: [],
@@ -55,7 +56,9 @@ const state = {
   wires: false, // lines of the triangles are shown
   /** @type {{low: number, high: number} | null} what the colours mean, null: no values yet */ range: null,
   /** @type {string[]} names of the plan's rows as the panel has them */ rows: [],
-  /** @type {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} of hello or the last topology that had rows */ plan: { rows: [] },
+  /** @type {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} of hello or the last topology that had rows */ plan: {
+    rows: [],
+  },
 };
 
 const input = new ToolInput(
@@ -100,7 +103,13 @@ function sendPose(now) {
   if (state.wish) {
     if (!now && t - state.poseAt < HOLD_MS) return;
     if (now && t - state.poseAt < POSE_MS / 2 && !state.away) return;
-    worker.postMessage({ type: "pose", tool: state.myTool, position: destination(state.wish, t), grab: state.wish.grab, away: false });
+    worker.postMessage({
+      type: "pose",
+      tool: state.myTool,
+      position: destination(state.wish, t),
+      grab: state.wish.grab,
+      away: false,
+    });
     state.away = false;
     state.poseAt = t;
   } else if (!state.away) {
@@ -121,9 +130,12 @@ function standBeside() {
   // not under a hand that holds tissue: its place would be another one
   beside = state.wish === null;
   if (!beside) return;
-  const covers = (/** @type {string[]} */ ids) => Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18));
-  const covered = [covers(["cost-panel", "sculpt"]), covers(["panel"])], room = innerWidth > 640 && innerWidth - covered[0] - covered[1] >= LEAST_ROOM;
-  const [left, right] = room ? covered : [0, 0], style = document.documentElement.style;
+  const covers = (/** @type {string[]} */ ids) =>
+    Math.max(0, ...ids.map((id) => byId(id).offsetWidth && byId(id).offsetWidth + 18));
+  const covered = [covers(["cost-panel", "sculpt"]), covers(["panel"])],
+    room = innerWidth > 640 && innerWidth - covered[0] - covered[1] >= LEAST_ROOM;
+  const [left, right] = room ? covered : [0, 0],
+    style = document.documentElement.style;
   style.setProperty("--left", `${left}px`);
   style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
   style.setProperty("--free", `calc(100vw - ${left + right}px)`);
@@ -167,7 +179,10 @@ function keepParts(n) {
 function save(ending) {
   const pieces = [...state.bodies.values()].map((body) => body.piece());
   const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([WRITERS[ending](pieces)])), download: `${name}.${ending}` });
+  const link = Object.assign(document.createElement("a"), {
+    href: URL.createObjectURL(new Blob([WRITERS[ending](pieces)])),
+    download: `${name}.${ending}`,
+  });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
@@ -194,7 +209,8 @@ function showTool() {
   if (state.myTool < 0 && me) {
     hint.classList.remove("gone");
     hint.textContent = "All tools are in use. You are looking on; a tool is yours as soon as one is free.";
-  } else if (!hint.classList.contains("gone")) hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
+  } else if (!hint.classList.contains("gone"))
+    hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
 }
 
 /** asks for the chosen field of every part that gives it, and for none of the others */
@@ -234,8 +250,11 @@ function chooseField(name) {
  * @param {boolean} anew nothing was asked for on this connection
  */
 function offerFields(anew) {
-  const names = offered(state.hello.parts), note = missing(state.hello.parts), chosen = state.field;
-  const option = (/** @type {string} */ value, /** @type {string} */ text) => Object.assign(document.createElement("option"), { value, textContent: text });
+  const names = offered(state.hello.parts),
+    note = missing(state.hello.parts),
+    chosen = state.field;
+  const option = (/** @type {string} */ value, /** @type {string} */ text) =>
+    Object.assign(document.createElement("option"), { value, textContent: text });
   byId("field").replaceChildren(option("none", "Tissue"), ...names.map((name) => option(name, FIELDS[name].title)));
   byId("field-note").textContent = note;
   byId("field-note").hidden = !note;
@@ -252,7 +271,12 @@ function offerFields(anew) {
 function followField() {
   const values = [...state.bodies.values()].flatMap((body) => body.values ?? []);
   if (values.length === 0) return;
-  const range = rangeOf(state.field, Math.min(...values.map((v) => v.low)), Math.max(...values.map((v) => v.high)), state.range);
+  const range = rangeOf(
+    state.field,
+    Math.min(...values.map((v) => v.low)),
+    Math.max(...values.map((v) => v.high)),
+    state.range,
+  );
   const same = state.range && range.low === state.range.low && range.high === state.range.high;
   state.range = range;
   for (const body of state.bodies.values()) body.colourRange(range);
@@ -262,7 +286,8 @@ function followField() {
 let shownRows = "";
 /** rows come and go with fields, switches and other methods */
 function showRows() {
-  const rows = rowsOf(state.plan, state.status), mayswitch = state.hello.you.role === "instructor" && state.plan.row_parts !== undefined;
+  const rows = rowsOf(state.plan, state.status),
+    mayswitch = state.hello.you.role === "instructor" && state.plan.row_parts !== undefined;
   const key = JSON.stringify([rows, mayswitch]);
   if (key === shownRows) return;
   shownRows = key;
@@ -279,13 +304,20 @@ function order({ verb, target, args }) {
 function stopped(m) {
   const still = m.parts?.filter((/** @type {any} */ p) => p.frozen) ?? [];
   const names = still.map((/** @type {any} */ p) => state.hello.parts[p.part]?.name ?? p.part).join(", ");
-  return still.length ? `${names}: stopped. ${still[0].why ?? ""} Reset brings it back.` : "The body diverged and was frozen. Reset brings it back.";
+  return still.length
+    ? `${names}: stopped. ${still[0].why ?? ""} Reset brings it back.`
+    : "The body diverged and was frozen. Reset brings it back.";
 }
 
 function showFigures() {
   if (byId("panel").hidden || !state.status) return;
   panel.status(state.status, state.here, state.hello.parts);
-  byId("unwatched").textContent = unwatchedLine({ field: state.field !== "none", estimate: cost.opened, estimates: state.hello.estimates === true, unwatched: state.status.unwatched ?? 0 });
+  byId("unwatched").textContent = unwatchedLine({
+    field: state.field !== "none",
+    estimate: cost.opened,
+    estimates: state.hello.estimates === true,
+    unwatched: state.status.unwatched ?? 0,
+  });
 }
 
 /** @type {Record<string, (m: any) => void>} */
@@ -351,15 +383,21 @@ const control = {
     const me = state.members.get(state.me);
     state.myTool = me?.tool ?? -1;
     const held = new Set(m.members.map((/** @type {any} */ p) => p.tool));
-    const free = state.hello && state.hello.tools.findIndex((/** @type {any} */ _, /** @type {number} */ i) => !held.has(i));
-    if (me && state.myTool < 0 && me.role !== "viewer" && free >= 0) worker.postMessage({ type: "control", message: { type: "take", tool: -1 } });
+    const free =
+      state.hello && state.hello.tools.findIndex((/** @type {any} */ _, /** @type {number} */ i) => !held.has(i));
+    if (me && state.myTool < 0 && me.role !== "viewer" && free >= 0)
+      worker.postMessage({ type: "control", message: { type: "take", tool: -1 } });
     panel.people(m.members, state.me);
     showTool();
     stage.dirty = true; // names beside tools
   },
   error(m) {
     if (m.code === "tool_taken") return;
-    if (["refused", "args", "role", "busy", "target"].includes(m.code) && (sculpt.refused(m.text) || cost.refused(m.text))) return;
+    if (
+      ["refused", "args", "role", "busy", "target"].includes(m.code) &&
+      (sculpt.refused(m.text) || cost.refused(m.text))
+    )
+      return;
     if (m.code === "field" && state.field !== "none") chooseField("none");
     notice(m.text, TOLD_MS);
   },
@@ -383,7 +421,8 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
     case "part": {
       // a body that is shown stays until the first frame of the new one
       state.coming.get(data.part)?.dispose();
-      const body = new BodyMesh(stage.scene, data.rest, data.triangles, data.visible), waits = state.bodies.has(data.part);
+      const body = new BodyMesh(stage.scene, data.rest, data.triangles, data.visible),
+        waits = state.bodies.has(data.part);
       state.frames.delete(data.part); // of the body before
       sculpt.grow(data.rest);
       body.epoch = data.epoch;
@@ -396,7 +435,11 @@ worker.onmessage = (/** @type {MessageEvent} */ { data }) => {
     case "frame": {
       const older = state.frames.get(data.part);
       if (older) giveBack(data.part, older);
-      state.frames.set(data.part, { positions: data.positions, normals: data.normals, shown: data.shown ?? older?.shown ?? null });
+      state.frames.set(data.part, {
+        positions: data.positions,
+        normals: data.normals,
+        shown: data.shown ?? older?.shown ?? null,
+      });
       break;
     }
     case "field": {
@@ -546,7 +589,8 @@ byId("modes").addEventListener("keydown", (/** @type {KeyboardEvent} */ e) => {
   if (!e.key.startsWith("Arrow")) return;
   e.preventDefault();
   e.stopPropagation();
-  const all = modes(), step = e.key === "ArrowLeft" || e.key === "ArrowUp" ? all.length - 1 : 1;
+  const all = modes(),
+    step = e.key === "ArrowLeft" || e.key === "ArrowUp" ? all.length - 1 : 1;
   setMode(all[(all.indexOf(input.mode) + step) % all.length]);
   byId("mode-" + input.mode).focus();
 });
@@ -567,7 +611,20 @@ const toggleWires = () => {
   stage.dirty = true;
 };
 byId("mesh").onclick = toggleWires;
-const actionOf = keyMap({ "1": () => setMode("pull"), "2": () => setMode("press"), "3": () => setMode("sculpt"), "4": toggleCost, " ": togglePause, r: () => command("reset"), p: togglePanel, c: nextField, m: toggleWires }, stage);
+const actionOf = keyMap(
+  {
+    1: () => setMode("pull"),
+    2: () => setMode("press"),
+    3: () => setMode("sculpt"),
+    4: toggleCost,
+    " ": togglePause,
+    r: () => command("reset"),
+    p: togglePanel,
+    c: nextField,
+    m: toggleWires,
+  },
+  stage,
+);
 window.addEventListener("keydown", (e) => {
   const action = sculpt.key(e) ? () => {} : actionOf(e);
   if (action) {
@@ -588,7 +645,12 @@ function connect() {
   const query = new URLSearchParams(location.search);
   const session = query.get("session");
   const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
-  worker.postMessage({ type: "connect", url, name: byId("name").value.trim() || "Guest", role: query.get("role") ?? "trainee" });
+  worker.postMessage({
+    type: "connect",
+    url,
+    name: byId("name").value.trim() || "Guest",
+    role: query.get("role") ?? "trainee",
+  });
 }
 byId("name").value = new URLSearchParams(location.search).get("name") ?? remembered();
 byId("name").onchange = () => {

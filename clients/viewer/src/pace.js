@@ -2,7 +2,8 @@
 
 const QUICK_MS = 10; // a picture that costs no more needs no pause: 60 a second leave enough room
 const SLOW_MS = 28; // pictures that cost more give up sharpness
-const SLOW_RUN = 3, QUICK_RUN = 90; // so many in a row: one slow picture is a shader being made
+const SLOW_RUN = 3,
+  QUICK_RUN = 90; // so many in a row: one slow picture is a shader being made
 const MOST_PAUSE_MS = 700; // one picture that took seconds, as the first with its shaders, holds up none after it
 const LOST_MS = 3000; // an answer that never comes stands for one that came
 

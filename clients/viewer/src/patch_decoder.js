@@ -4,7 +4,9 @@ import { planes, unfold } from "./asset.js";
 import { lz4Decode } from "./lz4.js";
 import { KIND, PART_MAX, readHead, WireError } from "./wire.js";
 
-const HEAD_BYTES = 32, PLACE_BYTES = 16, PLACE_MAX = 2 ** 22;
+const HEAD_BYTES = 32,
+  PLACE_BYTES = 16,
+  PLACE_MAX = 2 ** 22;
 
 /** @param {boolean} good @param {string} code @param {string} text */
 function need(good, code, text) {
@@ -29,8 +31,12 @@ export function readPatchHead(bytes) {
   need(flags === 0, "FLAGS", `flags ${flags}`);
   need(bytes.length >= HEAD_BYTES, "SHORT", "no room for its head");
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const epoch = view.getUint32(8, true), n = view.getUint32(12, true), low = view.getUint32(16, true), high = view.getUint32(20, true);
-  const nRaw = view.getUint32(24, true), nLz4 = view.getUint32(28, true);
+  const epoch = view.getUint32(8, true),
+    n = view.getUint32(12, true),
+    low = view.getUint32(16, true),
+    high = view.getUint32(20, true);
+  const nRaw = view.getUint32(24, true),
+    nLz4 = view.getUint32(28, true);
   need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "block cut short");
   need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the block");
   need(index < PART_MAX && high < 1 << 21, "RANGE", "part or revision");
@@ -45,12 +51,15 @@ export function readPatchHead(bytes) {
  * @returns {PatchHead}
  */
 export function applyPatch(bytes, table, nVertex) {
-  const head = readPatchHead(bytes), { n, nRaw } = head, t = table.length / 3;
+  const head = readPatchHead(bytes),
+    { n, nRaw } = head,
+    t = table.length / 3;
   need(n <= t, "COUNT", `${n} places, the table has ${t}`);
   const raw = new Uint8Array(nRaw);
   lz4Decode(bytes.subarray(HEAD_BYTES), raw, 0, nRaw);
 
-  const place = planes(raw, 0, n), corner = planes(raw, 4 * n, 3 * n);
+  const place = planes(raw, 0, n),
+    corner = planes(raw, 4 * n, 3 * n);
   for (let i = 0; i < n; i++) {
     const before = i ? place[i - 1] : 0;
     place[i] = before + unfold(place[i]);
@@ -70,10 +79,14 @@ export function applyPatch(bytes, table, nVertex) {
  * @returns {Shown}
  */
 export function shownOf(table, nVertex) {
-  const seen = new Uint8Array(nVertex), triangles = new Uint32Array(table.length);
-  let to = 0, nSeen = 0;
+  const seen = new Uint8Array(nVertex),
+    triangles = new Uint32Array(table.length);
+  let to = 0,
+    nSeen = 0;
   for (let e = 0; e < table.length; e += 3) {
-    const a = table[e], b = table[e + 1], c = table[e + 2];
+    const a = table[e],
+      b = table[e + 1],
+      c = table[e + 2];
     if ((a | b | c) === 0) continue;
     triangles[to] = a;
     triangles[to + 1] = b;

@@ -35,7 +35,13 @@ export function rowsOf(plan, status) {
   const why = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_whys?.[i] ?? ""]));
   const fixed = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), plan.row_fixed?.[i] === 1]));
   const now = status?.rows?.length ? status : plan;
-  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({ name, part, why: why.get(key(name, part)) ?? "", fixed: fixed.get(key(name, part)) ?? plan.row_fixed !== undefined, planned: why.has(key(name, part)) }); // what came while it runs goes with who looks
+  const row = (/** @type {string} */ name, /** @type {number} */ part) => ({
+    name,
+    part,
+    why: why.get(key(name, part)) ?? "",
+    fixed: fixed.get(key(name, part)) ?? plan.row_fixed !== undefined,
+    planned: why.has(key(name, part)),
+  }); // what came while it runs goes with who looks
   const on = (now.rows ?? []).map((name, i) => ({ ...row(name, now.row_parts?.[i] ?? 0), on: true, ms: i }));
   const off = (status?.off ?? []).map((o) => ({ ...row(o.row, o.part), on: false, ms: null }));
   return [...on, ...off];
@@ -49,7 +55,10 @@ export function rowsOf(plan, status) {
 export function bodyLines(states, parts) {
   return states.map((s) => {
     const said = s.frozen ? [s.why || "It left its bounds."] : [];
-    if (s.rescues) said.push(`${count(s.rescues)} ${s.rescues === 1 ? "rescue" : "rescues"}, ${(s.rescue_ms ?? 0).toFixed(s.rescue_ms && s.rescue_ms < 1 ? 3 : 1)} ms in all.`);
+    if (s.rescues)
+      said.push(
+        `${count(s.rescues)} ${s.rescues === 1 ? "rescue" : "rescues"}, ${(s.rescue_ms ?? 0).toFixed(s.rescue_ms && s.rescue_ms < 1 ? 3 : 1)} ms in all.`,
+      );
     const name = parts[s.part]?.name ?? String(s.part);
     return { name, frozen: s.frozen === true, mark: s.frozen ? "stopped" : s.asleep ? "asleep" : "", said };
   });
@@ -76,7 +85,8 @@ export function barsOf(ms) {
 
 /** why a row has no switch @param {Row} row */
 export function fixedWhy({ planned }) {
-  return planned ? "It cannot be switched off: it moves the body, shows it, or alone holds it together."
+  return planned
+    ? "It cannot be switched off: it moves the body, shows it, or alone holds it together."
     : "It cannot be switched off: it came while the scene runs, and goes with what called for it.";
 }
 
@@ -124,7 +134,8 @@ export class PlanPanel {
       if (switches) row.append(this.switchOf(it));
       const title = row.insertCell();
       title.textContent = name.replaceAll("_", " ");
-      if (parts.length > 1 && parts[part]) title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
+      if (parts.length > 1 && parts[part])
+        title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
       const cell = row.insertCell();
       cell.className = "bar";
       const bar = document.createElement("i");
@@ -138,7 +149,8 @@ export class PlanPanel {
   /** @param {Row} row */
   switchOf(row) {
     const { name, part, on, fixed } = row;
-    const cell = document.createElement("td"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
+    const cell = document.createElement("td"),
+      box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
     cell.className = "switch";
     box.setAttribute("aria-label", `${name} is part of the plan`);
     box.disabled = fixed;
@@ -163,19 +175,26 @@ export class PlanPanel {
     const told = JSON.stringify(lines);
     if (told === this.told) return;
     this.told = told;
-    this.bodies.replaceChildren(...lines.map(({ name, frozen, mark, said }) => {
-      const item = document.createElement("li"), title = document.createElement("b");
-      item.className = mark;
-      if (frozen) item.classList.add("frozen");
-      title.textContent = name;
-      item.append(title, mark ? ` ${mark}` : "", ...said.map((text) => Object.assign(document.createElement("p"), { textContent: text })));
-      if (frozen) {
-        const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
-        reset.onclick = () => this.order("reset", name);
-        item.append(reset);
-      }
-      return item;
-    }));
+    this.bodies.replaceChildren(
+      ...lines.map(({ name, frozen, mark, said }) => {
+        const item = document.createElement("li"),
+          title = document.createElement("b");
+        item.className = mark;
+        if (frozen) item.classList.add("frozen");
+        title.textContent = name;
+        item.append(
+          title,
+          mark ? ` ${mark}` : "",
+          ...said.map((text) => Object.assign(document.createElement("p"), { textContent: text })),
+        );
+        if (frozen) {
+          const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
+          reset.onclick = () => this.order("reset", name);
+          item.append(reset);
+        }
+        return item;
+      }),
+    );
   }
 
   /**
@@ -185,7 +204,10 @@ export class PlanPanel {
    */
   status(s, here, parts) {
     this.figure("steps per second", s.paused ? "paused" : s.step_rate_hz.toFixed(0));
-    this.figure("time goes", s.paused ? "–" : s.slowdown <= 1.02 ? "in real time" : s.slowdown.toFixed(2) + " × slower");
+    this.figure(
+      "time goes",
+      s.paused ? "–" : s.slowdown <= 1.02 ? "in real time" : s.slowdown.toFixed(2) + " × slower",
+    );
     this.figure("one step", s.step_ms.toFixed(2) + " ms");
     this.figure("sub-steps", String(s.substeps));
     this.figure("round trip", here.rtt_ms > 0 ? here.rtt_ms.toFixed(1) + " ms" : "–");
@@ -215,13 +237,19 @@ export class PlanPanel {
 
   /** @param {{id: number, name: string, role: string, tool: number | null, colour: number}[]} list @param {number} me */
   people(list, me) {
-    this.members.replaceChildren(...list.map((member) => {
-      const item = document.createElement("li"), name = document.createElement("span"), role = document.createElement("small");
-      item.style.color = "#" + member.colour.toString(16).padStart(6, "0");
-      name.textContent = member.name + (member.id === me ? " (you)" : "");
-      role.textContent = "  " + (member.tool === null || member.tool < 0 ? (member.role === "viewer" ? "looking" : "no tool") : member.role);
-      item.append(name, role);
-      return item;
-    }));
+    this.members.replaceChildren(
+      ...list.map((member) => {
+        const item = document.createElement("li"),
+          name = document.createElement("span"),
+          role = document.createElement("small");
+        item.style.color = "#" + member.colour.toString(16).padStart(6, "0");
+        name.textContent = member.name + (member.id === me ? " (you)" : "");
+        role.textContent =
+          "  " +
+          (member.tool === null || member.tool < 0 ? (member.role === "viewer" ? "looking" : "no tool") : member.role);
+        item.append(name, role);
+        return item;
+      }),
+    );
   }
 }

@@ -13,12 +13,20 @@ export const TOOLS = Object.freeze({
   delete: { title: "Delete", places: 1, hints: ["Click a cell: it goes."] },
   divide: { title: "Divide", places: 1, hints: ["Click a cell: it is cut into smaller ones."] },
   merge: { title: "Merge", places: 2, hints: ["Click the first of two faces that become one.", "Now the other face."] },
-  bridge: { title: "Bridge", places: 2, hints: ["Click the first of two faces that a cell joins.", "Now the other face."] },
+  bridge: {
+    title: "Bridge",
+    places: 2,
+    hints: ["Click the first of two faces that a cell joins.", "Now the other face."],
+  },
   sharpen: { title: "Sharpen", places: 1, hints: ["Click near the edge, the vertex or the face."] },
   paint: { title: "Paint", places: 1, hints: ["Click where to paint."] },
   inflate: { title: "Inflate", places: 1, hints: ["Click what to blow up."] },
   deflate: { title: "Deflate", places: 1, hints: ["Click what to suck in."] },
-  curve: { title: "Curve", places: 2, hints: ["Click one end of a handle.", "Now the other end: its middle is pulled."] },
+  curve: {
+    title: "Curve",
+    places: 2,
+    hints: ["Click one end of a handle.", "Now the other end: its middle is pulled."],
+  },
   probe: { title: "Probe", places: 1, hints: ["Click where to look up the material."] },
 });
 
@@ -39,9 +47,11 @@ export const PAINTS = Object.freeze({
  */
 export function liftOf(a, b, middle, lift_m) {
   const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-  const along = b.map((v, i) => v - a[i]), out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
+  const along = b.map((v, i) => v - a[i]),
+    out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
   const share = dot(along, along) > 0 ? dot(out, along) / dot(along, along) : 0;
-  const across = out.map((v, i) => v - share * along[i]), length = Math.hypot(...across);
+  const across = out.map((v, i) => v - share * along[i]),
+    length = Math.hypot(...across);
   return length > 1e-9 ? across.map((v) => (lift_m * v) / length) : [0, 0, lift_m];
 }
 
@@ -63,7 +73,8 @@ export function orderOf(tool, settings, places) {
     Object.assign(args, { radius_m: settings.radius_m, young_factor, density_factor });
   }
   if (FORCES.includes(tool)) args.radius_m = settings.radius_m;
-  if (tool === "inflate" || tool === "deflate") args.pressure_Pa = tool === "inflate" ? settings.pressure_Pa : -settings.pressure_Pa;
+  if (tool === "inflate" || tool === "deflate")
+    args.pressure_Pa = tool === "inflate" ? settings.pressure_Pa : -settings.pressure_Pa;
   if (tool === "curve") {
     args.stiffness_N_m = settings.stiffness_N_m;
     [args.dx_m, args.dy_m, args.dz_m] = liftOf(places[0], places[1], settings.middle, settings.lift_m);
@@ -86,7 +97,8 @@ export function cutOrder(axis, part, box) {
 
 /** a box around another one and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */
 export function boxAround(box, x) {
-  const low = [...box.low], high = [...box.high];
+  const low = [...box.low],
+    high = [...box.high];
   for (let i = 0; i < x.length; i++) {
     low[i % 3] = Math.min(low[i % 3], x[i]);
     high[i % 3] = Math.max(high[i % 3], x[i]);
@@ -102,7 +114,8 @@ function stiffness(pascal) {
 
 /** what came of an order, in short @param {{verb: string, text: string, args: Record<string, number>}} answer of the server */
 export function said({ verb, text, args }) {
-  if (verb === "probe" && args.young_Pa !== undefined) return `${stiffness(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
+  if (verb === "probe" && args.young_Pa !== undefined)
+    return `${stiffness(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
   if (args?.cells === undefined) return text;
   const title = TOOLS[verb]?.title ?? verb[0].toUpperCase() + verb.slice(1);
   return `${title}: ${args.cells} cells${args.made_ms === undefined ? "" : `, ${Math.round(args.made_ms)} ms`}`;

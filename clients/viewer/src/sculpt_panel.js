@@ -36,7 +36,8 @@ export class SculptPanel {
     this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
     this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
     this.mark(this.paints, "stiffer");
-    for (const verb of ["keep", "undo", "redo"]) this.button("sculpt-" + verb).onclick = () => this.give({ verb, args: {} });
+    for (const verb of ["keep", "undo", "redo"])
+      this.button("sculpt-" + verb).onclick = () => this.give({ verb, args: {} });
     for (const ending of ["obj", "stl", "ply"]) this.button("sculpt-" + ending).onclick = () => save(ending);
     for (const id of ["distance", "radius", "sharp"]) this.range(id).oninput = () => this.showValues();
     for (const id of ["pressure", "lift"]) this.range(id).oninput = () => this.moveForce();
@@ -62,7 +63,8 @@ export class SculptPanel {
    * @returns {Map<string, HTMLButtonElement>}
    */
   fill(id, of, chosen) {
-    const group = /** @type {HTMLElement} */ (this.page.getElementById(id)), buttons = new Map();
+    const group = /** @type {HTMLElement} */ (this.page.getElementById(id)),
+      buttons = new Map();
     for (const [name, { title }] of Object.entries(of)) {
       const button = this.page.createElement("button");
       button.textContent = title;
@@ -77,7 +79,9 @@ export class SculptPanel {
       if (!e.key.startsWith("Arrow")) return;
       e.preventDefault();
       e.stopPropagation();
-      const all = [...buttons.values()], now = all.findIndex((b) => b.tabIndex === 0), step = e.key === "ArrowRight" || e.key === "ArrowDown" ? 1 : -1;
+      const all = [...buttons.values()],
+        now = all.findIndex((b) => b.tabIndex === 0),
+        step = e.key === "ArrowRight" || e.key === "ArrowDown" ? 1 : -1;
       const next = all[(now + step + all.length) % all.length];
       next.click();
       next.focus();
@@ -99,7 +103,9 @@ export class SculptPanel {
     this.places = [];
     this.mark(this.tools, tool);
     for (const row of this.page.querySelectorAll("#sculpt [data-for]")) {
-      /** @type {HTMLElement} */ (row).hidden = !/** @type {HTMLElement} */ (row).dataset.for?.split(" ").includes(tool);
+      /** @type {HTMLElement} */ (row).hidden = !(
+        /** @type {HTMLElement} */ (row).dataset.for?.split(" ").includes(tool)
+      );
     }
     this.hint();
   }
@@ -129,9 +135,15 @@ export class SculptPanel {
     const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
     const what = /** @type {HTMLSelectElement} */ (this.page.getElementById("sculpt-what"));
     return {
-      distance_m: part("distance") * 0.5 * this.size, scale: 1, radius_m: part("radius") * 0.5 * this.size, paint,
-      sharp: Math.round(part("sharp") * 10) / 2, sharpWhat: Number(what.value),
-      pressure_Pa: 10 ** (1 + 3 * part("pressure")), lift_m: part("lift") * 0.5 * this.size, stiffness_N_m: STIFFNESS_N_M,
+      distance_m: part("distance") * 0.5 * this.size,
+      scale: 1,
+      radius_m: part("radius") * 0.5 * this.size,
+      paint,
+      sharp: Math.round(part("sharp") * 10) / 2,
+      sharpWhat: Number(what.value),
+      pressure_Pa: 10 ** (1 + 3 * part("pressure")),
+      lift_m: part("lift") * 0.5 * this.size,
+      stiffness_N_m: STIFFNESS_N_M,
       middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
     };
   }
@@ -142,7 +154,8 @@ export class SculptPanel {
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-distance-value")).textContent = mm(distance_m);
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-radius-value")).textContent = mm(radius_m);
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-sharp-value")).textContent = String(sharp);
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-pressure-value")).textContent = Math.round(pressure_Pa) + " Pa";
+    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-pressure-value")).textContent =
+      Math.round(pressure_Pa) + " Pa";
     /** @type {HTMLElement} */ (this.page.getElementById("sculpt-lift-value")).textContent = mm(lift_m);
   }
 
@@ -241,7 +254,10 @@ export class SculptPanel {
   }
 
   busy() {
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt")).setAttribute("aria-busy", String(this.underWay !== null));
+    /** @type {HTMLElement} */ (this.page.getElementById("sculpt")).setAttribute(
+      "aria-busy",
+      String(this.underWay !== null),
+    );
   }
 
   /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} it was one of them */

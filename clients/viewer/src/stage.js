@@ -24,13 +24,21 @@ function softwareDraws() {
  */
 function makeStudio(renderer) {
   const studio = new THREE.Scene();
-  const panel = (/** @type {number} */ strength, /** @type {string} */ colour, /** @type {number[]} */ at, /** @type {number[]} */ size) => {
+  const panel = (
+    /** @type {number} */ strength,
+    /** @type {string} */ colour,
+    /** @type {number[]} */ at,
+    /** @type {number[]} */ size,
+  ) => {
     const material = new THREE.MeshBasicMaterial({ color: new THREE.Color(colour).multiplyScalar(strength) });
     const mesh = new THREE.Mesh(new THREE.BoxGeometry(size[0], size[1], size[2]), material);
     mesh.position.set(at[0], at[1], at[2]);
     studio.add(mesh);
   };
-  const room = new THREE.Mesh(new THREE.SphereGeometry(10, 24, 16), new THREE.MeshBasicMaterial({ color: 0x20272e, side: THREE.BackSide }));
+  const room = new THREE.Mesh(
+    new THREE.SphereGeometry(10, 24, 16),
+    new THREE.MeshBasicMaterial({ color: 0x20272e, side: THREE.BackSide }),
+  );
   studio.add(room);
   panel(9, "#fff4e6", [0, 2, 7], [6, 4, 0.2]); // above
   panel(5, "#dcebff", [-7, 0, 2], [0.2, 4, 5]); // cool side
@@ -39,7 +47,9 @@ function makeStudio(renderer) {
   const generator = new THREE.PMREMGenerator(renderer);
   const texture = generator.fromScene(studio, 0.035).texture;
   generator.dispose();
-  for (const { geometry, material } of /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.Material>[]} */ (studio.children)) {
+  for (const { geometry, material } of /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.Material>[]} */ (
+    studio.children
+  )) {
     geometry.dispose();
     material.dispose();
   }
@@ -96,7 +106,8 @@ export class Stage {
 
   home() {
     const narrow = Math.min(1, this.camera.aspect);
-    this.distance = (0.5 / HOME_PART * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
+    this.distance =
+      ((0.5 / HOME_PART) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
     this.azimuth = -0.6;
     this.elevation = 0.42;
     this.dirty = true;
@@ -107,7 +118,8 @@ export class Stage {
   }
 
   resize() {
-    const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1;
+    const width = this.canvas.clientWidth || 1,
+      height = this.canvas.clientHeight || 1;
     this.renderer.setPixelRatio(this.pixelRatio());
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
@@ -123,8 +135,12 @@ export class Stage {
   }
 
   placePicture() {
-    const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, covered = this.left + this.right;
-    this.camera.zoom = covered ? Math.max(LEAST_ZOOM, Math.min(1, (width - covered) / Math.min(width, HOME_PART * height))) : 1;
+    const width = this.canvas.clientWidth || 1,
+      height = this.canvas.clientHeight || 1,
+      covered = this.left + this.right;
+    this.camera.zoom = covered
+      ? Math.max(LEAST_ZOOM, Math.min(1, (width - covered) / Math.min(width, HOME_PART * height)))
+      : 1;
     if (this.left === this.right) this.camera.clearViewOffset();
     else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, 0, width, height);
     this.camera.updateProjectionMatrix();
@@ -154,7 +170,8 @@ export class Stage {
 
   /** move the point looked at by pixels @param {number} dx @param {number} dy */
   pan(dx, dy) {
-    const perPixel = (2 / this.camera.zoom * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
+    const perPixel =
+      ((2 / this.camera.zoom) * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
     const e = this.camera.matrixWorld.elements;
     this.target.x += (-dx * e[0] + dy * e[4]) * perPixel;
     this.target.y += (-dx * e[1] + dy * e[5]) * perPixel;
@@ -175,11 +192,23 @@ export class Stage {
     this.camera.updateMatrixWorld();
     // the lights go with the camera's side, so that the lit side is the one looked at
     const right = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
-    this.key.position.copy(this.target).addScaledVector(this.up, 1.2).addScaledVector(right, -0.7).addScaledVector(away, 0.9);
+    this.key.position
+      .copy(this.target)
+      .addScaledVector(this.up, 1.2)
+      .addScaledVector(right, -0.7)
+      .addScaledVector(away, 0.9);
     this.key.target.position.copy(this.target);
-    this.rim.position.copy(this.target).addScaledVector(this.up, 0.5).addScaledVector(right, 1.1).addScaledVector(away, -1.0);
+    this.rim.position
+      .copy(this.target)
+      .addScaledVector(this.up, 0.5)
+      .addScaledVector(right, 1.1)
+      .addScaledVector(away, -1.0);
     this.rim.target.position.copy(this.target);
-    this.fill.position.copy(this.target).addScaledVector(away, 1).addScaledVector(this.up, -0.6).addScaledVector(right, 0.35);
+    this.fill.position
+      .copy(this.target)
+      .addScaledVector(away, 1)
+      .addScaledVector(this.up, -0.6)
+      .addScaledVector(right, 0.35);
     this.fill.target.position.copy(this.target);
     this.fill.target.updateMatrixWorld();
     this.key.target.updateMatrixWorld();

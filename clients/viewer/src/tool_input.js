@@ -68,8 +68,15 @@ export class ToolInput {
     const press = this.mode === "press" || e.button === 2 || e.shiftKey;
     const into = hit.point.clone().sub(this.stage.camera.position).normalize();
     this.drag = {
-      id: e.pointerId, grab: !press, into, start: performance.now(), depth: press ? 1.3 * this.radius : 0, deeper: 0,
-      plane: new THREE.Plane().setFromNormalAndCoplanarPoint(into, hit.point), x: e.clientX, y: e.clientY,
+      id: e.pointerId,
+      grab: !press,
+      into,
+      start: performance.now(),
+      depth: press ? 1.3 * this.radius : 0,
+      deeper: 0,
+      plane: new THREE.Plane().setFromNormalAndCoplanarPoint(into, hit.point),
+      x: e.clientX,
+      y: e.clientY,
     };
     this.touchedOnce();
     this.tick();
@@ -79,10 +86,12 @@ export class ToolInput {
   move(e) {
     const last = this.pointers.get(e.pointerId);
     if (!last) {
-      if (e.pointerType === "mouse") this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
+      if (e.pointerType === "mouse")
+        this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
       return;
     }
-    const dx = e.clientX - last.x, dy = e.clientY - last.y;
+    const dx = e.clientX - last.x,
+      dy = e.clientY - last.y;
     if (this.pointers.size === 1 && this.drag) {
       this.drag.x = e.clientX;
       this.drag.y = e.clientY;
@@ -92,7 +101,8 @@ export class ToolInput {
       else this.stage.orbit(dx, dy);
     } else if (this.pointers.size === 2) {
       const other = /** @type {{x: number, y: number}} */ ([...this.pointers].find(([id]) => id !== e.pointerId)?.[1]);
-      const before = Math.hypot(last.x - other.x, last.y - other.y), after = Math.hypot(e.clientX - other.x, e.clientY - other.y);
+      const before = Math.hypot(last.x - other.x, last.y - other.y),
+        after = Math.hypot(e.clientX - other.x, e.clientY - other.y);
       if (before > 1 && after > 1) this.stage.zoom(before / after);
       this.stage.pan(dx / 2, dy / 2);
     }
@@ -116,7 +126,8 @@ export class ToolInput {
     const clicked = this.clicked;
     if (clicked?.id === e.pointerId) {
       this.clicked = null;
-      if (e.type === "pointerup" && Math.hypot(e.clientX - clicked.x, e.clientY - clicked.y) < CLICK_PX) this.onClick(clicked.at);
+      if (e.type === "pointerup" && Math.hypot(e.clientX - clicked.x, e.clientY - clicked.y) < CLICK_PX)
+        this.onClick(clicked.at);
     }
     if (this.drag && this.drag.id === e.pointerId) this.letGo();
     if (this.pointers.size === 0) this.stage.canvas.classList.remove("busy");
@@ -147,7 +158,9 @@ export class ToolInput {
     if (!point) return;
     const t = Math.min(1, (performance.now() - drag.start) / (1000 * PRESS_S));
     // a press begins with the ball outside and goes in along the view; a pull begins on the surface
-    const depth = drag.grab ? drag.deeper : -1.2 * this.radius + (drag.depth + 0.6 * this.radius) * t * t * (3 - 2 * t) + drag.deeper;
+    const depth = drag.grab
+      ? drag.deeper
+      : -1.2 * this.radius + (drag.depth + 0.6 * this.radius) * t * t * (3 - 2 * t) + drag.deeper;
     point.addScaledVector(drag.into, depth);
     this.onTool({ position: point.toArray(), grab: drag.grab });
   }

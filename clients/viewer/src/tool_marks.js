@@ -8,12 +8,16 @@ import * as THREE from "./three.js";
  * @param {Tool[]} a @param {Tool[]} b @param {number} least
  */
 export function sameTools(a, b, least) {
-  const near = (/** @type {number[]} */ u, /** @type {number[]} */ v, /** @type {number} */ limit) => u.every((c, k) => Math.abs(c - v[k]) <= limit);
-  return a.length === b.length && a.every((t, i) => {
-    const u = b[i];
-    const same = t.flags === u.flags && t.holder === u.holder && t.colour === u.colour && t.radius === u.radius;
-    return same && near(t.position, u.position, least) && near(t.force, u.force, 0.005);
-  });
+  const near = (/** @type {number[]} */ u, /** @type {number[]} */ v, /** @type {number} */ limit) =>
+    u.every((c, k) => Math.abs(c - v[k]) <= limit);
+  return (
+    a.length === b.length &&
+    a.every((t, i) => {
+      const u = b[i];
+      const same = t.flags === u.flags && t.holder === u.holder && t.colour === u.colour && t.radius === u.radius;
+      return same && near(t.position, u.position, least) && near(t.force, u.force, 0.005);
+    })
+  );
 }
 
 export class ToolMarks {
@@ -32,7 +36,8 @@ export class ToolMarks {
     while (this.marks.length <= index) {
       const ball = new THREE.Mesh(
         new THREE.SphereGeometry(1, 32, 20),
-        new THREE.MeshPhysicalMaterial({ roughness: 0.25, metalness: 0.1, clearcoat: 1, clearcoatRoughness: 0.1 }));
+        new THREE.MeshPhysicalMaterial({ roughness: 0.25, metalness: 0.1, clearcoat: 1, clearcoatRoughness: 0.1 }),
+      );
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xffffff);
       const label = document.createElement("span");
       // the force mostly points into the tissue: draw its arrow over it
@@ -75,7 +80,8 @@ export class ToolMarks {
       mark.label.textContent = i === mine ? "you" : nameOf(tool.holder);
       mark.label.style.color = "#" + tool.colour.toString(16).padStart(6, "0");
     });
-    for (let i = tools.length; i < this.marks.length; i++) this.marks[i].shown = this.marks[i].ball.visible = this.marks[i].arrow.visible = false;
+    for (let i = tools.length; i < this.marks.length; i++)
+      this.marks[i].shown = this.marks[i].ball.visible = this.marks[i].arrow.visible = false;
   }
 
   /** after the camera was placed */

@@ -6,7 +6,15 @@ export const VERSION = 1;
 export const MAGIC = 0x314c4150;
 export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, PATCH: 5, POSE: 16, ACK: 17 });
 export const POSE_FLAG = Object.freeze({
-  CONTACT: 1, CLUTCHED: 2, FORCES_ON: 4, SATURATED: 8, STIFF_CLAMPED: 16, STALE: 32, ESTOP: 64, POSE_ONLY: 128, AWAY: 256,
+  CONTACT: 1,
+  CLUTCHED: 2,
+  FORCES_ON: 4,
+  SATURATED: 8,
+  STIFF_CLAMPED: 16,
+  STALE: 32,
+  ESTOP: 64,
+  POSE_ONLY: 128,
+  AWAY: 256,
 });
 export const TOOL_FLAG = Object.freeze({ HELD: 1, TOUCHES: 2, GRABS: 4, STALE: 8, AWAY: 16 });
 export const TOOL_MAX = 32;
@@ -44,7 +52,8 @@ class Reader {
   }
 
   u64() {
-    const low = this.u32(), high = this.u32();
+    const low = this.u32(),
+      high = this.u32();
     if (high >= 1 << 21) throw new WireError("RANGE", "u64 above 2^53");
     return high * 4294967296 + low;
   }
@@ -97,7 +106,11 @@ export function readHead(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   need(view.getUint32(0, true) === MAGIC, "MAGIC", "message does not begin with PAL1");
   const kind = view.getUint8(4);
-  need(Object.values(KIND).some((known) => known === kind), "KIND", `message kind ${kind}`);
+  need(
+    Object.values(KIND).some((known) => known === kind),
+    "KIND",
+    `message kind ${kind}`,
+  );
   return { kind, flags: view.getUint8(5), index: view.getUint16(6, true) };
 }
 
@@ -123,15 +136,34 @@ function indexOf(bytes, kind) {
 
 /** @param {Reader} r @returns {Tool} */
 function readTool(r) {
-  const holder = r.u16(), flags = r.u16(), colour = r.u32(), radius = r.f32();
-  const position = r.floats(3), quaternion = r.floats(4), force = r.floats(3);
-  const echoSeq = r.u32(), holdUs = r.u32(), echoStampUs = r.u64();
+  const holder = r.u16(),
+    flags = r.u16(),
+    colour = r.u32(),
+    radius = r.f32();
+  const position = r.floats(3),
+    quaternion = r.floats(4),
+    force = r.floats(3);
+  const echoSeq = r.u32(),
+    holdUs = r.u32(),
+    echoStampUs = r.u64();
   need(flags < 32, "FLAGS", `tool flags ${flags}`);
   need(radius >= 0 && colour <= 0xffffff, "RANGE", "tool radius or colour");
   return {
-    holder, flags, colour, radius, position, quaternion, force, echoSeq, holdUs, echoStampUs,
-    held: (flags & TOOL_FLAG.HELD) !== 0, touches: (flags & TOOL_FLAG.TOUCHES) !== 0,
-    grabs: (flags & TOOL_FLAG.GRABS) !== 0, stale: (flags & TOOL_FLAG.STALE) !== 0, away: (flags & TOOL_FLAG.AWAY) !== 0,
+    holder,
+    flags,
+    colour,
+    radius,
+    position,
+    quaternion,
+    force,
+    echoSeq,
+    holdUs,
+    echoStampUs,
+    held: (flags & TOOL_FLAG.HELD) !== 0,
+    touches: (flags & TOOL_FLAG.TOUCHES) !== 0,
+    grabs: (flags & TOOL_FLAG.GRABS) !== 0,
+    stale: (flags & TOOL_FLAG.STALE) !== 0,
+    away: (flags & TOOL_FLAG.AWAY) !== 0,
   };
 }
 
@@ -145,7 +177,9 @@ export function readTools(bytes) {
   need(n <= TOOL_MAX, "COUNT", `${n} tools`);
   exactly(bytes, 24 + 68 * n);
   const r = new Reader(bytes, 8);
-  const cycle = r.u32(), zero = r.u32(), simTimeUs = r.u64();
+  const cycle = r.u32(),
+    zero = r.u32(),
+    simTimeUs = r.u64();
   need(zero === 0, "RANGE", "reserved field");
   return { cycle, simTimeUs, tools: Array.from({ length: n }, () => readTool(r)) };
 }
@@ -160,7 +194,11 @@ export function readTools(bytes) {
 
 /** @param {Reader} r @returns {Patch} */
 function readPatch(r) {
-  const id = r.u16(), group = r.u16(), p = r.floats(3), n = r.floats(3), v = r.floats(3);
+  const id = r.u16(),
+    group = r.u16(),
+    p = r.floats(3),
+    n = r.floats(3),
+    v = r.floats(3);
   const [k1, k2, b, kt, muS, muD, radius] = r.floats(7);
   const passive = Math.min(k1, b, kt, muS, muD, radius) >= 0;
   need(passive && Math.abs(n[0] ** 2 + n[1] ** 2 + n[2] ** 2 - 1) <= 1e-3, "RANGE", "contact patch");
@@ -176,16 +214,37 @@ export function readHaptic(bytes) {
   const tool = indexOf(bytes, KIND.HAPTIC);
   need(bytes.length >= 140, "SHORT", `${bytes.length} bytes of 140`);
   const r = new Reader(bytes, 8);
-  const seq = r.u32(), flags = r.u32(), stampUs = r.u64(), echoStampUs = r.u64(), echoSeq = r.u32();
-  const holdUs = r.u32(), frameUs = r.u32(), nPatch = r.u32();
+  const seq = r.u32(),
+    flags = r.u32(),
+    stampUs = r.u64(),
+    echoStampUs = r.u64(),
+    echoSeq = r.u32();
+  const holdUs = r.u32(),
+    frameUs = r.u32(),
+    nPatch = r.u32();
   need(nPatch <= PATCH_MAX, "COUNT", `${nPatch} patches`);
   exactly(bytes, 140 + 68 * nPatch);
-  const origin = r.doubles(3), fRef = r.floats(3), hasGrip = r.u32();
+  const origin = r.doubles(3),
+    fRef = r.floats(3),
+    hasGrip = r.u32();
   const grip = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
   need(flags < 8, "FLAGS", `haptic flags ${flags}`);
   need(tool < TOOL_MAX && hasGrip <= 1 && grip.b >= 0, "RANGE", "tool or grip");
   const patches = Array.from({ length: nPatch }, () => readPatch(r));
-  return { tool, seq, flags, stampUs, echoStampUs, echoSeq, holdUs, frameUs, origin, fRef, grip: hasGrip ? grip : null, patches };
+  return {
+    tool,
+    seq,
+    flags,
+    stampUs,
+    echoStampUs,
+    echoSeq,
+    holdUs,
+    frameUs,
+    origin,
+    fRef,
+    grip: hasGrip ? grip : null,
+    patches,
+  };
 }
 
 /**
@@ -193,7 +252,8 @@ export function readHaptic(bytes) {
  * @returns {{bytes: Uint8Array<ArrayBuffer>, view: DataView}}
  */
 function begin(kind, index, length) {
-  const bytes = new Uint8Array(length), view = new DataView(bytes.buffer);
+  const bytes = new Uint8Array(length),
+    view = new DataView(bytes.buffer);
   view.setUint32(0, MAGIC, true);
   view.setUint8(4, kind);
   view.setUint16(6, index, true);
@@ -227,7 +287,8 @@ export function writePose(pose) {
   pose.position.forEach((v, i) => view.setFloat64(24 + 8 * i, v, true));
   (pose.quaternion ?? [1, 0, 0, 0]).forEach((v, i) => view.setFloat64(48 + 8 * i, v, true));
   [pose.velocity, pose.omega, pose.force, pose.torque].forEach((vector, k) =>
-    vector?.forEach((v, i) => view.setFloat32(80 + 12 * k + 4 * i, v, true)));
+    vector?.forEach((v, i) => view.setFloat32(80 + 12 * k + 4 * i, v, true)),
+  );
   view.setFloat32(128, pose.grip ?? 0, true);
   view.setUint32(132, pose.buttons ?? 0, true);
   view.setUint32(136, pose.modelSeq ?? 0, true);

@@ -7,10 +7,22 @@ function stand() {
   /** @type {string[]} */
   const did = [];
   const say = (/** @type {string} */ what) => () => did.push(what);
-  const view = { orbit: (/** @type {number} */ x, /** @type {number} */ y) => did.push(`orbit ${x} ${y}`), zoom: (/** @type {number} */ f) => did.push(f < 1 ? "nearer" : "away"), home: say("home") };
+  const view = {
+    orbit: (/** @type {number} */ x, /** @type {number} */ y) => did.push(`orbit ${x} ${y}`),
+    zoom: (/** @type {number} */ f) => did.push(f < 1 ? "nearer" : "away"),
+    home: say("home"),
+  };
   const find = keyMap({ " ": say("pause"), r: say("reset") }, view);
   const press = (/** @type {string} */ key, /** @type {any} */ more = {}) =>
-    find({ key, ctrlKey: false, metaKey: false, altKey: false, repeat: false, target: { tagName: "BODY" }, ...more })?.();
+    find({
+      key,
+      ctrlKey: false,
+      metaKey: false,
+      altKey: false,
+      repeat: false,
+      target: { tagName: "BODY" },
+      ...more,
+    })?.();
   return { did, press };
 }
 

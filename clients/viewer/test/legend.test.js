@@ -5,7 +5,15 @@ import { test } from "node:test";
 import { COLOURS, FIELDS, labels, missing, offered, rangeOf, roundDown, roundUp } from "../src/legend.js";
 
 test("rounds to numbers that read well, never past the value on the wrong side", () => {
-  for (const [v, up, down] of [[1, 1, 1], [1.01, 1.2, 1], [0.0173, 0.02, 0.015], [4400, 5000, 4000], [9.9, 10, 8], [1e-7, 1e-7, 1e-7], [0.3, 0.3, 0.3]])
+  for (const [v, up, down] of [
+    [1, 1, 1],
+    [1.01, 1.2, 1],
+    [0.0173, 0.02, 0.015],
+    [4400, 5000, 4000],
+    [9.9, 10, 8],
+    [1e-7, 1e-7, 1e-7],
+    [0.3, 0.3, 0.3],
+  ])
     assert.deepEqual([roundUp(v), roundDown(v)], [up, down], String(v));
   for (let v = 1e-6; v < 1e9; v *= 1.37) {
     assert.ok(roundUp(v) >= v * (1 - 1e-9) && roundUp(v) <= 1.5 * v, `up ${v}`);
@@ -14,10 +22,11 @@ test("rounds to numbers that read well, never past the value on the wrong side",
 });
 
 test("the range follows a long pull and no value lies beyond it", () => {
-  let range = null, changes = 0;
+  let range = null,
+    changes = 0;
   for (let mm = 0; mm <= 120; mm += 0.5) {
     const next = rangeOf("displacement", 0, mm / 1000, range);
-    assert.ok(next.high >= mm / 1000 * (1 - 1e-9) && next.low === 0, `${mm} mm`);
+    assert.ok(next.high >= (mm / 1000) * (1 - 1e-9) && next.low === 0, `${mm} mm`);
     changes += range !== null && next.high !== range.high ? 1 : 0;
     range = next;
   }
@@ -77,7 +86,9 @@ test("both ends are said in one unit that suits the larger", () => {
 });
 
 test("only what the session gives is offered, and why there is no more", () => {
-  const springs = { fields: ["displacement", "stiffness"] }, plain = { fields: ["displacement"] }, fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
+  const springs = { fields: ["displacement", "stiffness"] },
+    plain = { fields: ["displacement"] },
+    fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
   assert.deepEqual(offered([fem]), ["displacement", "von_mises", "energy"]);
   assert.deepEqual(offered([springs]), ["displacement", "stiffness"]);
   assert.deepEqual(offered([plain]), ["displacement"]);

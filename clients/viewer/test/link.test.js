@@ -37,7 +37,9 @@ class FakeSocket {
   }
   /** @param {any} data */
   say(data) {
-    this.onmessage?.({ data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data) });
+    this.onmessage?.({
+      data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data),
+    });
   }
   /** messages of one kind that were sent @param {number} kind */
   binary(kind) {
@@ -50,8 +52,12 @@ class FakeSocket {
 
 function stand() {
   const stand = {
-    time: 1000, /** @type {FakeSocket[]} */ sockets: [], /** @type {any[]} */ posted: [], /** @type {{call: () => void, ms: number}[]} */ waiting: [],
-    /** @type {(value: any) => void} */ giveAsset: () => {}, /** @type {string[]} */ asked: [],
+    time: 1000,
+    /** @type {FakeSocket[]} */ sockets: [],
+    /** @type {any[]} */ posted: [],
+    /** @type {{call: () => void, ms: number}[]} */ waiting: [],
+    /** @type {(value: any) => void} */ giveAsset: () => {},
+    /** @type {string[]} */ asked: [],
     of: (/** @type {string} */ type) => stand.posted.filter((m) => m.type === type),
     /** @type {any} */ link: null,
   };
@@ -116,10 +122,16 @@ test("keeps the newest frame until its asset has come, then shows it", async () 
 });
 
 test("keeps the newest field until its asset has come, drops one of an older epoch", async () => {
-  const s = stand(), field = load("field.bin"), head = readFieldHead(field), n = 301;
+  const s = stand(),
+    field = load("field.bin"),
+    head = readFieldHead(field),
+    n = 301;
   s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
   s.sockets[0].accept();
-  s.sockets[0].say({ ...HELLO, parts: Array.from({ length: head.part + 1 }, () => ({ epoch: head.epoch, asset: "/asset/ab" })) });
+  s.sockets[0].say({
+    ...HELLO,
+    parts: Array.from({ length: head.part + 1 }, () => ({ epoch: head.epoch, asset: "/asset/ab" })),
+  });
   s.sockets[0].say(field);
   assert.equal(s.of("field").length, 0);
   // as if an asset of as many vertices had come
@@ -142,7 +154,8 @@ test("acknowledges every cycle, frames decoded or not", async () => {
   const { s } = await joined();
   s.sockets[0].say(load("tools.bin"));
   s.sockets[0].say(load("tools.bin"));
-  const acks = s.sockets[0].binary(KIND.ACK), cycle = readTools(load("tools.bin")).cycle;
+  const acks = s.sockets[0].binary(KIND.ACK),
+    cycle = readTools(load("tools.bin")).cycle;
   assert.equal(acks.length, 2);
   assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
 });
@@ -219,10 +232,16 @@ test("another topology: the old part goes on until the new asset is here, then f
   s.giveAsset(load("asset.bin").buffer);
   await turn();
   await turn();
-  const old = load("frame_bend.bin"), fresh = load("frame_bend.bin"), view = new DataView(fresh.buffer, fresh.byteOffset);
-  const epoch = view.getUint32(8, true) + 1, frames = () => s.of("frame").filter((m) => m.part === part).length;
+  const old = load("frame_bend.bin"),
+    fresh = load("frame_bend.bin"),
+    view = new DataView(fresh.buffer, fresh.byteOffset);
+  const epoch = view.getUint32(8, true) + 1,
+    frames = () => s.of("frame").filter((m) => m.part === part).length;
   view.setUint32(8, epoch, true);
-  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/cd" })) });
+  s.sockets[0].say({
+    type: "topology",
+    parts: Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/cd" })),
+  });
   s.sockets[0].say(old); // was on its way
   assert.equal(frames(), 1);
   s.sockets[0].say(fresh);
@@ -230,7 +249,13 @@ test("another topology: the old part goes on until the new asset is here, then f
   s.giveAsset(load("asset.bin").buffer);
   await turn();
   await turn();
-  assert.deepEqual(s.of("part").filter((m) => m.part === part).map((m) => m.epoch), [epoch - 1, epoch]);
+  assert.deepEqual(
+    s
+      .of("part")
+      .filter((m) => m.part === part)
+      .map((m) => m.epoch),
+    [epoch - 1, epoch],
+  );
   assert.equal(frames(), 2);
   s.sockets[0].say(old);
   assert.equal(frames(), 2);
@@ -239,8 +264,12 @@ test("another topology: the old part goes on until the new asset is here, then f
 
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
   const { s, part } = await joined();
-  const first = s.giveAsset, epoch = s.link.wanted.get(part);
-  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch: epoch + 1, asset: "/asset/cd" })) });
+  const first = s.giveAsset,
+    epoch = s.link.wanted.get(part);
+  s.sockets[0].say({
+    type: "topology",
+    parts: Array.from({ length: part + 1 }, () => ({ epoch: epoch + 1, asset: "/asset/cd" })),
+  });
   const second = s.giveAsset;
   second(load("asset.bin").buffer);
   await turn();
@@ -270,7 +299,8 @@ test("a message that cannot be read closes the connection, an old connection is 
 });
 
 test("normals of a tetrahedron point away from its middle", () => {
-  const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]), n = new Float32Array(12);
+  const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
+    n = new Float32Array(12);
   vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
   for (let i = 0; i < 4; i++) {
     let outward = 0;

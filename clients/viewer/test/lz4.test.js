@@ -8,7 +8,10 @@ import { WireError } from "../src/wire.js";
 function expand(block, n) {
   const dst = new Uint8Array(n + 8).fill(99);
   lz4Decode(Uint8Array.from(block), dst, 4, 4 + n);
-  assert.ok([...dst.subarray(0, 4), ...dst.subarray(4 + n)].every((v) => v === 99), "nothing is written outside");
+  assert.ok(
+    [...dst.subarray(0, 4), ...dst.subarray(4 + n)].every((v) => v === 99),
+    "nothing is written outside",
+  );
   return [...dst.subarray(4, 4 + n)];
 }
 
@@ -25,7 +28,8 @@ test("literals of every length", () => {
 test("matches that overlap what they write, near, far and long", () => {
   for (const distance of [1, 2, 3, 7, 16, 30])
     for (const length of [4, 18, 19, 24, 25, 60, 273, 274, 600]) {
-      const seed = count(30, 5), extra = length - 4 < 15 ? [] : [...new Array(Math.floor((length - 19) / 255)).fill(255), (length - 19) % 255];
+      const seed = count(30, 5),
+        extra = length - 4 < 15 ? [] : [...new Array(Math.floor((length - 19) / 255)).fill(255), (length - 19) % 255];
       const block = [(15 << 4) | Math.min(15, length - 4), 15, ...seed, distance, 0, ...extra, 1 << 4, 77];
       const wanted = [...seed];
       for (let i = 0; i < length; i++) wanted.push(wanted[wanted.length - distance]);

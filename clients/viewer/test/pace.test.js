@@ -6,7 +6,9 @@ import { Pace } from "../src/pace.js";
 /** draws for `ms` at 60 turns a second, each picture costs cost(sharpness); gives how many and the time spent on them */
 function run(pace, ms, cost) {
   const begin = pace.restUntil;
-  let n = 0, spent = 0, done = Infinity;
+  let n = 0,
+    spent = 0,
+    done = Infinity;
   for (let t = begin; t < begin + ms; t += 1) {
     if (t >= done) {
       pace.done(t);
@@ -23,7 +25,8 @@ function run(pace, ms, cost) {
 }
 
 test("a quick machine draws every turn, all pixels", () => {
-  const pace = new Pace(0.3), { n } = run(pace, 1700, () => 4);
+  const pace = new Pace(0.3),
+    { n } = run(pace, 1700, () => 4);
   assert.equal(n, 100);
   assert.equal(pace.sharpness, 1);
 });

@@ -27,12 +27,18 @@ const planes = (values) => [0, 8, 16, 24].flatMap((shift) => values.map((v) => (
  * @returns {Uint8Array}
  */
 function writePatch({ part = 0, epoch, revision = 1, places, corners }) {
-  const block = literal([...planes(places.map((p, i) => fold((p - (i ? places[i - 1] : 0)) | 0))), ...planes(corners.map((c, e) => fold((c - (e < 3 ? 0 : corners[e - 3])) | 0)))]);
-  const bytes = new Uint8Array(32 + block.length), view = new DataView(bytes.buffer);
+  const block = literal([
+    ...planes(places.map((p, i) => fold((p - (i ? places[i - 1] : 0)) | 0))),
+    ...planes(corners.map((c, e) => fold((c - (e < 3 ? 0 : corners[e - 3])) | 0))),
+  ]);
+  const bytes = new Uint8Array(32 + block.length),
+    view = new DataView(bytes.buffer);
   view.setUint32(0, MAGIC, true);
   view.setUint8(4, KIND.PATCH);
   view.setUint16(6, part, true);
-  [epoch, places.length, revision, 0, 16 * places.length, block.length].forEach((v, i) => view.setUint32(8 + 4 * i, v, true));
+  [epoch, places.length, revision, 0, 16 * places.length, block.length].forEach((v, i) =>
+    view.setUint32(8 + 4 * i, v, true),
+  );
   bytes.set(block, 32);
   return bytes;
 }
@@ -40,7 +46,8 @@ function writePatch({ part = 0, epoch, revision = 1, places, corners }) {
 const N = 300;
 /** a table of 40 places, every fourth taken */
 const table = () => Uint32Array.from({ length: 120 }, (_, e) => (e % 12 < 3 ? (7 * e + 1) % N : 0));
-const good = () => writePatch({ part: 2, epoch: 5, revision: 9, places: [0, 3, 39], corners: [4, 5, 6, 0, 0, 0, 299, 0, 298] });
+const good = () =>
+  writePatch({ part: 2, epoch: 5, revision: 9, places: [0, 3, 39], corners: [4, 5, 6, 0, 0, 0, 299, 0, 298] });
 
 /** numbers below n from a seed @param {number} seed */
 function random(seed) {
@@ -51,7 +58,9 @@ function random(seed) {
 }
 
 test("changes the places it names and no other", () => {
-  const x = table(), head = applyPatch(good(), x, N), wanted = table();
+  const x = table(),
+    head = applyPatch(good(), x, N),
+    wanted = table();
   wanted.set([4, 5, 6], 0);
   wanted.set([0, 0, 0], 9);
   wanted.set([299, 0, 298], 117);
@@ -60,7 +69,9 @@ test("changes the places it names and no other", () => {
 });
 
 test("a thousand random changes give the table they were taken from", () => {
-  const below = random(5), mine = table(), theirs = table();
+  const below = random(5),
+    mine = table(),
+    theirs = table();
   for (let k = 0; k < 1000; k++) {
     const places = [...new Set(Array.from({ length: 1 + below(12) }, () => below(40)))].sort((a, b) => a - b);
     const corners = places.flatMap(() => (below(3) ? [below(N), below(N), below(N)] : [0, 0, 0]));
@@ -89,7 +100,20 @@ test("refuses places out of order or of no table, corners of no vertex, and coun
 });
 
 test("refuses wrong kinds, flags, parts, revisions and lengths", () => {
-  for (const [at, value, code] of [[0, 0, "MAGIC"], [4, 1, "KIND"], [4, 99, "KIND"], [5, 1, "FLAGS"], [6, 16, "RANGE"], [12, 0, "COUNT"], [12, 4, "COUNT"], [15, 255, "COUNT"], [22, 32, "RANGE"], [24, 49, "COUNT"], [28, 0, "LONG"], [28, 255, "SHORT"]]) {
+  for (const [at, value, code] of [
+    [0, 0, "MAGIC"],
+    [4, 1, "KIND"],
+    [4, 99, "KIND"],
+    [5, 1, "FLAGS"],
+    [6, 16, "RANGE"],
+    [12, 0, "COUNT"],
+    [12, 4, "COUNT"],
+    [15, 255, "COUNT"],
+    [22, 32, "RANGE"],
+    [24, 49, "COUNT"],
+    [28, 0, "LONG"],
+    [28, 255, "SHORT"],
+  ]) {
     const bytes = good();
     bytes[Number(at)] = Number(value);
     assert.throws(() => readPatchHead(bytes), { code }, `byte ${at}`);
@@ -98,11 +122,13 @@ test("refuses wrong kinds, flags, parts, revisions and lengths", () => {
 
 test("cut, lengthened or changed anywhere it is a refusal that leaves the table, or a table whose corners are vertices", () => {
   const bytes = good();
-  for (let n = 0; n < bytes.length; n++) assert.throws(() => applyPatch(bytes.slice(0, n), table(), N), WireError, `cut to ${n}`);
+  for (let n = 0; n < bytes.length; n++)
+    assert.throws(() => applyPatch(bytes.slice(0, n), table(), N), WireError, `cut to ${n}`);
   assert.throws(() => applyPatch(new Uint8Array([...bytes, 0]), table(), N), WireError);
   for (let at = 0; at < bytes.length; at++)
     for (let value = 0; value < 256; value++) {
-      const broken = bytes.slice(), x = table();
+      const broken = bytes.slice(),
+        x = table();
       broken[at] = value;
       try {
         applyPatch(broken, x, N);
@@ -115,7 +141,9 @@ test("cut, lengthened or changed anywhere it is a refusal that leaves the table,
 });
 
 test("a message that states more than its bytes can hold takes no memory", () => {
-  const bytes = good(), view = new DataView(bytes.buffer), n = 2 ** 22;
+  const bytes = good(),
+    view = new DataView(bytes.buffer),
+    n = 2 ** 22;
   view.setUint32(12, n, true);
   view.setUint32(24, 16 * n, true);
   assert.throws(() => readPatchHead(bytes), { code: "COUNT" });
@@ -130,8 +158,10 @@ test("shows the triangles without empty places, and the vertices in them", () =>
 });
 
 test("normals of visible vertices are those of the whole mesh, hidden ones are left alone", () => {
-  const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]), triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
-  const all = new Float32Array(15), some = new Float32Array(15).fill(7);
+  const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
+    triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
+  const all = new Float32Array(15),
+    some = new Float32Array(15).fill(7);
   vertexNormals(x, triangles, all);
   vertexNormals(x, triangles, some, new Uint32Array([0, 2, 3, 4]));
   assert.deepEqual([...some.subarray(3, 6)], [7, 7, 7]);
@@ -140,15 +170,21 @@ test("normals of visible vertices are those of the whole mesh, hidden ones are l
 
 test("says what is active in a sentence, with the body's name only among several", () => {
   const active = [{ part: 1, nodes: 133, springs: 385, of_nodes: 450, of_springs: 1344 }];
-  assert.deepEqual(activeLines(active, [{ name: "liver" }, { name: "stomach" }]), ["stomach: 133 of 450 nodes, 385 of 1344 springs"]);
-  assert.deepEqual(activeLines([{ ...active[0], part: 0, of_nodes: 100002 }], [{ name: "stomach" }]), ["133 of 100,002 nodes, 385 of 1344 springs"]);
+  assert.deepEqual(activeLines(active, [{ name: "liver" }, { name: "stomach" }]), [
+    "stomach: 133 of 450 nodes, 385 of 1344 springs",
+  ]);
+  assert.deepEqual(activeLines([{ ...active[0], part: 0, of_nodes: 100002 }], [{ name: "stomach" }]), [
+    "133 of 100,002 nodes, 385 of 1344 springs",
+  ]);
   assert.deepEqual(activeLines([], [{ name: "liver" }]), []);
 });
 
 /** @param {string} name */
 const load = (name) => new Uint8Array(readFileSync(new URL(`../../../tests/data/golden/${name}`, import.meta.url)));
 const turn = () => new Promise((resolve) => setImmediate(resolve));
-const frame = load("frame_bend.bin"), epoch = new DataView(frame.buffer).getUint32(8, true), part = new DataView(frame.buffer).getUint16(6, true);
+const frame = load("frame_bend.bin"),
+  epoch = new DataView(frame.buffer).getUint32(8, true),
+  part = new DataView(frame.buffer).getUint16(6, true);
 const asset = decodeAsset(load("asset.bin"));
 
 /** a connection that has heard hello and waits for the asset of the golden frames */
@@ -159,9 +195,16 @@ function stand() {
   const socket = { readyState: 1, closed: 0, send() {}, close: (/** @type {number} */ code) => (socket.closed = code) };
   /** @type {(bytes: any) => void} */
   let give = () => {};
-  const link = new Link({ open: () => socket, get: () => new Promise((resolve) => (give = resolve)), post: (m) => posted.push(m), now: () => 0, later: () => {} });
+  const link = new Link({
+    open: () => socket,
+    get: () => new Promise((resolve) => (give = resolve)),
+    post: (m) => posted.push(m),
+    now: () => 0,
+    later: () => {},
+  });
   link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  const say = (/** @type {any} */ m) => socket.onmessage({ data: m instanceof Uint8Array ? m.slice().buffer : JSON.stringify(m) });
+  const say = (/** @type {any} */ m) =>
+    socket.onmessage({ data: m instanceof Uint8Array ? m.slice().buffer : JSON.stringify(m) });
   const parts = (/** @type {number} */ e) => Array.from({ length: part + 1 }, () => ({ epoch: e, asset: "/asset/ab" }));
   say({ type: "hello", session: "s", parts: parts(epoch), you: { id: 1, tool: 0 } });
   const giveAsset = async () => {
@@ -169,7 +212,13 @@ function stand() {
     await turn();
     await turn();
   };
-  return { socket, say, parts, giveAsset, of: (/** @type {string} */ type) => posted.filter((m) => m.type === type && m.part === part) };
+  return {
+    socket,
+    say,
+    parts,
+    giveAsset,
+    of: (/** @type {string} */ type) => posted.filter((m) => m.type === type && m.part === part),
+  };
 }
 
 /** the asset's table with these places changed @param {Record<number, number[]>} changes */
