@@ -23,24 +23,24 @@ import {
 /** what a page shows of the accuracy panel */
 const shown = (page) =>
   page.evaluate(() => {
-    const { cost, state } = window.palpate,
+    const { accuracy, state } = window.palpate,
       body = [...state.bodies.values()][0],
-      at = (id) => document.querySelector("#cost-" + id);
+      at = (id) => document.querySelector("#accuracy-" + id);
     return {
       visible: !at("panel").hidden,
-      points: cost.points.length,
-      front: cost.front.map((p) => p.index),
-      marks: document.querySelectorAll("#cost-plot circle.point").length,
-      line: document.querySelectorAll("#cost-plot polyline.front").length,
-      live: document.querySelectorAll("#cost-plot .live, #cost-plot .live-line").length,
-      neighbours: document.querySelectorAll("#cost-knob-list button").length,
-      estimate: cost.estimate,
+      points: accuracy.points.length,
+      front: accuracy.front.map((p) => p.index),
+      marks: document.querySelectorAll("#accuracy-plot circle.point").length,
+      line: document.querySelectorAll("#accuracy-plot polyline.front").length,
+      live: document.querySelectorAll("#accuracy-plot .live, #accuracy-plot .live-line").length,
+      neighbours: document.querySelectorAll("#accuracy-neighbour-list button").length,
+      estimate: accuracy.estimate,
       slider: Number(at("slider").value),
       most: Number(at("slider").max),
       choice: at("choice").textContent,
-      said: at("say").textContent,
-      busy: cost.underWay !== null,
-      setting: at("setting").textContent,
+      said: at("message").textContent,
+      busy: accuracy.pending !== null,
+      setting: at("configuration").textContent,
       epoch: body.epoch,
       drawn: body.mesh.visible && body.shown,
       tick: state.status?.tick ?? 0,
@@ -49,23 +49,26 @@ const shown = (page) =>
 /** what a page shows of the plan */
 const plan = (page) =>
   page.evaluate(() => ({
-    on: [...document.querySelectorAll("#rows tr:not(.off)")].map((r) => r.textContent),
-    off: [...document.querySelectorAll("#rows tr.off")].map((r) => r.textContent),
-    switches: document.querySelectorAll("#rows input").length,
-    why: document.querySelector("#rows tr")?.title ?? "",
-    rows: window.palpate.state.rows,
+    on: [...document.querySelectorAll("#components tr:not(.off)")].map((r) => r.textContent),
+    off: [...document.querySelectorAll("#components tr.off")].map((r) => r.textContent),
+    switches: document.querySelectorAll("#components input").length,
+    why: document.querySelector("#components tr")?.title ?? "",
+    rows: window.palpate.state.components,
     row_ms: window.palpate.state.status?.row_ms.length ?? 0,
-    unwatched: document.querySelector("#unwatched").textContent,
+    unwatched: document.querySelector("#idle").textContent,
     off_wire: window.palpate.state.status?.off ?? [],
   }));
 /** moves the slider to a place and lets it go, as a hand does; what the panel shows at that moment: a switch may take 40 ms */
 const slide = (page, place) =>
   page.evaluate((value) => {
-    const slider = document.querySelector("#cost-slider");
+    const slider = document.querySelector("#accuracy-slider");
     slider.value = String(value);
     slider.dispatchEvent(new Event("input"));
     slider.dispatchEvent(new Event("change"));
-    return { busy: window.palpate.cost.underWay !== null, said: document.querySelector("#cost-say").textContent };
+    return {
+      busy: window.palpate.accuracy.pending !== null,
+      said: document.querySelector("#accuracy-message").textContent,
+    };
   }, place);
 /** colours that a page offers and shows; every notice that it gave since the first call */
 const colours = (page) =>
@@ -87,8 +90,8 @@ const colours = (page) =>
       legend: !document.querySelector("#legend").hidden,
       note: document.querySelector("#field-note").textContent,
       told: window.told,
-      values: [...state.bodies.values()][0].values !== null,
-      row: state.rows.includes("field_out"),
+      values: [...state.bodies.values()][0].colours.values !== null,
+      row: state.components.includes("field_out"),
     };
   });
 const choose = async (page, name) => {
@@ -112,11 +115,11 @@ const places = (page) =>
     return {
       organ: [Math.min(...xs), Math.max(...xs)],
       hint: [hint.left, hint.right],
-      free: [box("#cost-panel").right, box("#panel").left],
+      free: [box("#accuracy-panel").right, box("#panel").left],
       dirty: stage.dirty,
     };
   });
-const flip = (page, row) => page.click(`#rows input[aria-label="${row} is part of the plan"]`);
+const flip = (page, row) => page.click(`#components input[aria-label="Component ${row}"]`);
 
 /** the study's page as a file: a row's button puts a command on the clipboard that writes this row's scene */
 async function pressRow(browser, file) {
@@ -210,7 +213,7 @@ try {
   );
   check(
     "a pulled body has an error, of parts",
-    loaded.estimate?.error_m > 1e-7 && (await ada.locator("#cost-parts li").count()) >= 1,
+    loaded.estimate?.error_m > 1e-7 && (await ada.locator("#accuracy-parts li").count()) >= 1,
     JSON.stringify(loaded.estimate).slice(0, 300),
   );
   await until(
@@ -243,7 +246,11 @@ try {
     const own = /springs/.test(before.setting) ? "stiffness" : "von_mises";
     await choose(ada, own);
     const making = await slide(ada, place);
-    check(`let go at ${what}, the panel says what is made`, making.busy && /^Making /.test(making.said), making.said);
+    check(
+      `let go at ${what}, the panel says what is made`,
+      making.busy && /^Preparing /.test(making.said),
+      making.said,
+    );
     const after = await until(
       () => shown(ada),
       (s) =>
@@ -283,7 +290,7 @@ try {
         ? offer.field === "none" &&
             offer.chosen === "none" &&
             !offer.legend &&
-            offer.told.some((text) => /not there with this method/.test(text))
+            offer.told.some((text) => /not available with this method/.test(text))
         : offer.field === own && offer.legend,
       `${before.setting} -> ${after.setting}: ${offer.told.join(" | ")}`,
     );
@@ -321,7 +328,7 @@ try {
       near = left(before);
     if (!near) break;
     pressed.add(near.knob);
-    const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.knob }).first(),
+    const button = ada.locator("#accuracy-neighbour-list button:enabled", { hasText: near.knob }).first(),
       title = await button.getAttribute("title");
     await button.click();
     const after = await until(
@@ -335,12 +342,12 @@ try {
     );
     check(
       "it says what jumped, and against which bound",
-      /^Switched: energy [+−][\d.]+ %, moves .* of .* allowed, .* a frame, made in/.test(after.said),
+      /^Switched: energy [+−][\d.]+ %, surface moves .* \(bound .*\), .* per frame, prepared in/.test(after.said),
       after.said,
     );
   }
   check("there were knobs to press", pressed.size >= 2, [...pressed].join());
-  await ada.locator("#cost-panel").screenshot({ path: join(pictures, "accuracy_panel.png") });
+  await ada.locator("#accuracy-panel").screenshot({ path: join(pictures, "accuracy_panel.png") });
   await ada.keyboard.press("p");
   for (const width of [1000, 1100, 1600]) {
     await ada.setViewportSize({ width, height: 800 });
@@ -385,7 +392,7 @@ try {
   check("who looks on sees that it is off", seenOff.off.length === 1, seenOff.off.join());
   await ada.screenshot({ path: join(pictures, "accuracy_row_off.png") });
   await until(
-    () => ada.isEnabled(`#rows input[aria-label="${name} is part of the plan"]`),
+    () => ada.isEnabled(`#components input[aria-label="Component ${name}"]`),
     (e) => e,
   );
   await flip(ada, name);
@@ -394,7 +401,7 @@ try {
     (p) => p.off.length === 0 && p.row_ms === rows.on.length,
   );
   check("on again: the plan is what it was", on.rows.join() === rows.rows.join(), on.rows.join(" "));
-  check("what nobody looks at is said not to be computed", /colours/.test(on.unwatched), on.unwatched);
+  check("what nobody looks at is said not to be computed", /field values/.test(on.unwatched), on.unwatched);
   check("nothing was complained of in the browsers' consoles", troubles.length === 0, troubles.slice(0, 3).join(" | "));
 } catch (error) {
   check("the test ran to its end", false, String(error.stack ?? error));

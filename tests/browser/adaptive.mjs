@@ -156,7 +156,9 @@ try {
   const hit = await ada.evaluate(({ x, y }) => {
     const { input, stage, state } = window.palpate,
       found = input.pick(stage.ray(x, y));
-    return found ? Math.hypot(...found.point.toArray().map((v, i) => v - state.tools[state.myTool].position[i])) : null;
+    return found
+      ? Math.hypot(...found.point.toArray().map((v, i) => v - state.tools[state.ownTool].position[i]))
+      : null;
   }, pixel);
   check(
     "the tool is where the pointer meets the tissue",
@@ -170,7 +172,7 @@ try {
     () =>
       ada.evaluate(() => {
         const body = [...window.palpate.state.bodies.values()][0];
-        return { values: body.values, most: body.moved() };
+        return { values: body.colours.values, most: body.maxDisplacement() };
       }),
     (f) => f.values && Math.abs(f.values.high - f.most) < 0.1 * f.most,
   );

@@ -101,7 +101,7 @@ export async function open(browser, address, name, viewport) {
 
 /** largest displacement of what a page shows, m */
 export const moved = (page) =>
-  page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.moved())));
+  page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.maxDisplacement())));
 
 /** a pixel on the organ near the middle of the picture */
 export const organPixel = (page) =>

@@ -24,9 +24,9 @@ const figures = (page) =>
     return {
       field: state.field,
       range: state.range,
-      values: body?.values ?? null,
-      mix: body?.uniforms.mix.value,
-      rows: state.rows,
+      values: body?.colours.values ?? null,
+      mix: body?.colours.uniforms.mix.value,
+      components: state.components,
       wanted: state.status?.rows ?? [],
       low: document.querySelector("#legend-low").textContent,
       high: document.querySelector("#legend-high").textContent,
@@ -66,7 +66,7 @@ async function look(name, scene, wanted, offered = wanted) {
     check(`${name}: what is missing is said`, (f.note !== "") === !wanted.includes("von_mises"), f.note);
     check(
       `${name}: nobody asked, so there is no row, no legend, no colour`,
-      !f.rows.includes("field_out") && !f.legend && f.mix === 0 && f.wanted.length === 0,
+      !f.components.includes("field_out") && !f.legend && f.mix === 0 && f.wanted.length === 0,
     );
     const pixel = await until(
       () => organPixel(page),
@@ -77,11 +77,11 @@ async function look(name, scene, wanted, offered = wanted) {
       await choose(page, field);
       f = await until(
         () => figures(page),
-        (g) => g.values && g.values.high > 0.3 * g.range.high && g.rows.includes("field_out"),
+        (g) => g.values && g.values.high > 0.3 * g.range.high && g.components.includes("field_out"),
       );
       check(
         `${name}: ${field} comes when asked for, with its row in the plan`,
-        f.values !== null && f.rows.includes("field_out") && f.legend && f.mix === 1,
+        f.values !== null && f.components.includes("field_out") && f.legend && f.mix === 1,
         `${f.low} to ${f.high} ${f.unit}, values ${f.values?.low.toPrecision(3)} to ${f.values?.high.toPrecision(3)}`,
       );
       check(
@@ -108,11 +108,11 @@ async function look(name, scene, wanted, offered = wanted) {
     await choose(page, "none");
     f = await until(
       () => figures(page),
-      (g) => !g.rows.includes("field_out"),
+      (g) => !g.components.includes("field_out"),
     );
     check(
       `${name}: looked away, the row and the colours are gone`,
-      !f.rows.includes("field_out") && !f.legend && f.mix === 0 && f.values === null,
+      !f.components.includes("field_out") && !f.legend && f.mix === 0 && f.values === null,
       f.rows.join(" "),
     );
     // paused: values come at once all the same

@@ -33,7 +33,7 @@ try {
     () => ada.evaluate(() => window.palpate.state.members.size),
     (n) => n === 2,
   );
-  const holders = await Promise.all([ada, ben].map((page) => page.evaluate(() => window.palpate.state.myTool)));
+  const holders = await Promise.all([ada, ben].map((page) => page.evaluate(() => window.palpate.state.ownTool)));
   check(
     "each of two browsers holds a tool of its own",
     holders[0] >= 0 && holders[1] >= 0 && holders[0] !== holders[1],
@@ -77,7 +77,7 @@ try {
     () =>
       ada.evaluate(() => {
         const { state } = window.palpate;
-        return Math.hypot(...(state.tools[state.myTool]?.force ?? [0, 0, 0]));
+        return Math.hypot(...(state.tools[state.ownTool]?.force ?? [0, 0, 0]));
       }),
     (f) => f > 0.05,
   );

@@ -15,7 +15,7 @@ const shown = (page) =>
       triangles: body.nCorner / 3,
       epoch: body.epoch,
       drawn: body.mesh.visible && body.shown,
-      said: document.querySelector("#sculpt-say").textContent,
+      said: document.querySelector("#sculpt-message").textContent,
       busy: document.querySelector("#sculpt").getAttribute("aria-busy"),
     };
   });

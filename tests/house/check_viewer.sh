@@ -5,6 +5,7 @@
 set -u
 tree=$(cd "$(dirname "$0")/../.." && pwd)
 build=${2:-$tree/build}
+build=$(cd "$build" && pwd) || exit 2
 packages=$build/viewer_packages
 case ${1-} in
 types)
@@ -29,7 +30,7 @@ format | reformat)
         $(find clients/viewer tests -name node_modules -prune -o \( -name '*.js' -o -name '*.mjs' \) -print | sort) \
         clients/viewer/index.html clients/viewer/style.css clients/viewer/package.json clients/viewer/jsconfig.json
     ;;
-test) cd "$tree/clients/viewer" && exec node --test test/ ;;
+test) cd "$tree/clients/viewer" && exec node --test test/*.test.js ;;
 *)
     echo "usage: check_viewer.sh types|test|format|reformat [BUILD]" >&2
     exit 2

@@ -232,7 +232,7 @@ export class FrameDecoder {
   }
 
   /**
-   * Positions anew, through the affine map.
+   * Applies the affine map to all positions.
    * @param {number[]} a @param {number} step @param {Float32Array} positions
    */
   move(a, step, positions) {

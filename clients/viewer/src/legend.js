@@ -1,8 +1,8 @@
-// What colours mean: fields by name, the range of the colour map, numbers as people read them. Pure.
+// The legend: fields, the range of the colour map, the text of its ends. Pure.
 
 /**
- * viridis (Smith and van der Walt 2015) without its darkest eighth, which would drown in the backdrop: nine stops whose
- * lightness grows evenly, told apart with any colour vision
+ * viridis (Smith and van der Walt 2015) without its darkest eighth, which the background would hide: nine stops of evenly
+ * increasing lightness, distinguishable with any colour vision
  */
 export const COLOURS = Object.freeze([
   "#472e7c",
@@ -17,14 +17,14 @@ export const COLOURS = Object.freeze([
 ]);
 
 /**
- * Fields that this page can show. `least` is the smallest range worth colouring, so that a body at rest shows no noise;
- * units from small to large with their size in SI; `signed`: less than 0 is as good as more, the middle colour is 0.
- * @type {Record<string, {title: string, least: number, units: [string, number][], signed?: boolean}>}
+ * Fields that this page can show. `min`: smallest range of the colours, so that a body at rest shows no noise; units from
+ * small to large with their size in SI; `signed`: values on both sides of 0, which has the middle colour.
+ * @type {Record<string, {title: string, min: number, units: [string, number][], signed?: boolean}>}
  */
 export const FIELDS = Object.freeze({
   displacement: {
     title: "Displacement",
-    least: 1e-4,
+    min: 1e-4,
     units: [
       ["µm", 1e-6],
       ["mm", 1e-3],
@@ -33,7 +33,7 @@ export const FIELDS = Object.freeze({
   },
   von_mises: {
     title: "Von Mises stress",
-    least: 1,
+    min: 1,
     units: [
       ["Pa", 1],
       ["kPa", 1e3],
@@ -43,7 +43,7 @@ export const FIELDS = Object.freeze({
   },
   energy: {
     title: "Strain energy density",
-    least: 1e-3,
+    min: 1e-3,
     units: [
       ["mJ/m³", 1e-3],
       ["J/m³", 1],
@@ -53,7 +53,7 @@ export const FIELDS = Object.freeze({
   },
   stiffness: {
     title: "Edge stiffness k_d",
-    least: 1e-9,
+    min: 1e-9,
     units: [
       ["nJ", 1e-9],
       ["µJ", 1e-6],
@@ -61,12 +61,12 @@ export const FIELDS = Object.freeze({
       ["J", 1],
     ],
   },
-  strain: { title: "Largest strain", least: 1e-3, units: [["%", 1e-2]] },
-  distortion: { title: "Volume distortion", least: 1e-3, units: [["%", 1e-2]], signed: true },
+  strain: { title: "Largest strain", min: 1e-3, units: [["%", 1e-2]] },
+  distortion: { title: "Volume distortion", min: 1e-3, units: [["%", 1e-2]], signed: true },
 });
 
 const STEPS = [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10];
-const KEEP = 0.45; // a range stays while the values reach this part of it
+const KEEP = 0.45; // a range is kept while the values reach this share of it
 
 /** the smallest round number that is not below v @param {number} v > 0 */
 export function roundUp(v) {
@@ -83,17 +83,17 @@ export function roundDown(v) {
 }
 
 /**
- * Range of the colour map for values between low and high: round numbers that follow the values without flickering.
- * It begins at 0 unless all values lie in the upper half; of a signed field it goes as far below 0 as above.
+ * Range of the colour map for values between low and high: round numbers that follow the values with hysteresis. It begins
+ * at 0 unless all values lie in the upper half; the range of a signed field is symmetric.
  * @param {string} field @param {number} low @param {number} high
- * @param {{low: number, high: number} | null} before the range until now
+ * @param {{low: number, high: number} | null} before former range
  * @returns {{low: number, high: number}}
  */
 export function rangeOf(field, low, high, before) {
-  const least = FIELDS[field]?.least ?? 1e-9,
+  const min = FIELDS[field]?.min ?? 1e-9,
     signed = FIELDS[field]?.signed ?? false;
-  const top = Math.max(high, signed ? -low : high, least);
-  const holds = before && top <= before.high && (top >= KEEP * before.high || before.high <= roundUp(least));
+  const top = Math.max(high, signed ? -low : high, min);
+  const holds = before && top <= before.high && (top >= KEEP * before.high || before.high <= roundUp(min));
   const to = holds ? before.high : roundUp(top);
   if (signed) return { low: -to, high: to };
   const floor = low > 0.55 * to ? roundDown(low) : 0;
@@ -116,21 +116,20 @@ export function labels(field, range) {
   return { low: digits(range.low / size).replace("-", "−"), high: plus + digits(range.high / size), unit };
 }
 
-/** fields that some part of the session gives and this page knows @param {{fields?: string[]}[]} parts @returns {string[]} */
+/** fields that a part of the session has and this page knows @param {{fields?: string[]}[]} parts @returns {string[]} */
 export function offered(parts) {
   return Object.keys(FIELDS).filter((name) => parts.some((part) => part.fields?.includes(name)));
 }
 
 /**
- * Why there is less to choose than elsewhere: one sentence, empty when nothing is missing.
+ * Why fields are missing: one sentence, empty if none is.
  * @param {{fields?: string[]}[]} parts
  */
 export function missing(parts) {
   const names = offered(parts);
-  if (names.length === 0) return "This server sends no fields.";
-  if (!names.includes("von_mises") || !names.includes("energy"))
-    return "Stress and energy need a model of finite elements.";
+  if (names.length === 0) return "This session has no fields.";
+  if (!names.includes("von_mises") || !names.includes("energy")) return "Stress and energy require finite elements.";
   return parts.some((part) => names.some((name) => !part.fields?.includes(name)))
-    ? "Not every body has every field."
+    ? "Some bodies do not have all fields."
     : "";
 }

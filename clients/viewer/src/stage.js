@@ -2,13 +2,13 @@
 import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
 
-const LEAST_RATIO = 0.4; // drawn pixels per pixel of the page, where drawing is slow
-const HOME_PART = 0.94; // of the picture's height that the scene's longest line takes at first
-const LEAST_ZOOM = 0.45; // beside panels
-const POLL_MS = 2; // between questions whether a picture is there
+const RATIO_MIN = 0.4; // drawn pixels per page pixel, where drawing is slow
+const HOME_SHARE = 0.94; // of the picture's height: initial size of the scene's diagonal
+const ZOOM_MIN = 0.45; // beside panels
+const POLL_MS = 2; // between checks whether a picture is finished
 
-/** does the processor draw in place of a graphics card? Some browsers say so, others only name what draws */
-function softwareDraws() {
+/** is there no graphics card? Some browsers report it, others only name the renderer */
+function isSoftwareRenderer() {
   const context = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
   if (!context) return true;
   const named = context.getExtension("WEBGL_debug_renderer_info");
@@ -18,7 +18,7 @@ function softwareDraws() {
 }
 
 /**
- * A studio of soft light panels, rendered once into an environment map: wet tissue needs something to reflect.
+ * Environment map of soft light panels, rendered once: glossy tissue needs something to reflect.
  * @param {THREE.WebGLRenderer} renderer
  * @returns {THREE.Texture}
  */
@@ -60,7 +60,7 @@ export class Stage {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    const software = softwareDraws();
+    const software = isSoftwareRenderer();
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.0;
@@ -72,21 +72,21 @@ export class Stage {
     this.distance = 1;
     this.azimuth = -0.6; // around up, rad
     this.elevation = 0.42;
-    this.size = 0.3; // of the scene, m
+    this.size = 0.3; // diagonal of the scene, m
     this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
     this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
-    this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the eye and below: no side looked at is black
+    this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the camera and below: no visible side is black
     this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
     this.scene.environment = makeStudio(this.renderer);
     this.scene.environmentIntensity = 0.8;
-    this.left = this.right = 0; // pixels that panels cover
+    this.left = this.right = 0; // margins that panels cover, pixels
     this.dirty = true;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    this.pace = new Pace(LEAST_RATIO / ratio, software ? 0.6 / ratio : 1);
+    this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
     new ResizeObserver(() => this.resize()).observe(canvas);
-    // a window that moves to a screen of other pixels keeps its size
+    // moving to a screen with another pixel ratio keeps the size
     window.addEventListener("resize", () => this.resize());
-    // three.js brings back what it was given; what was drawn into a texture is lost with the context
+    // three.js restores what it was given; a texture that was drawn is lost with the context
     canvas.addEventListener("webglcontextrestored", () => {
       this.scene.environment?.dispose();
       this.scene.environment = makeStudio(this.renderer);
@@ -95,7 +95,7 @@ export class Stage {
     this.resize();
   }
 
-  /** a box of the scene's rest shape to look at @param {number[][]} box @param {number[]} up */
+  /** looks at a box, of the scene's rest shape @param {number[][]} box @param {number[]} up */
   frameBox(box, up) {
     const [low, high] = box;
     this.up.fromArray(up).normalize();
@@ -107,14 +107,14 @@ export class Stage {
   home() {
     const narrow = Math.min(1, this.camera.aspect);
     this.distance =
-      ((0.5 / HOME_PART) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
+      ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
     this.azimuth = -0.6;
     this.elevation = 0.42;
     this.dirty = true;
   }
 
   pixelRatio() {
-    return Math.max(LEAST_RATIO, this.pace.sharpness * Math.min(window.devicePixelRatio || 1, 2));
+    return Math.max(RATIO_MIN, this.pace.resolution * Math.min(window.devicePixelRatio || 1, 2));
   }
 
   resize() {
@@ -123,23 +123,26 @@ export class Stage {
     this.renderer.setPixelRatio(this.pixelRatio());
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.placePicture();
+    this.updateProjection();
   }
 
-  /** what is looked at stands in the middle of what panels leave free, and fits there @param {number} left @param {number} right pixels that they cover */
-  beside(left, right) {
+  /**
+   * The scene stands in the middle of what panels leave free, and fits there.
+   * @param {number} left @param {number} right covered margins, pixels
+   */
+  setMargins(left, right) {
     if (left === this.left && right === this.right) return;
     this.left = left;
     this.right = right;
-    this.placePicture();
+    this.updateProjection();
   }
 
-  placePicture() {
+  updateProjection() {
     const width = this.canvas.clientWidth || 1,
       height = this.canvas.clientHeight || 1,
       covered = this.left + this.right;
     this.camera.zoom = covered
-      ? Math.max(LEAST_ZOOM, Math.min(1, (width - covered) / Math.min(width, HOME_PART * height)))
+      ? Math.max(ZOOM_MIN, Math.min(1, (width - covered) / Math.min(width, HOME_SHARE * height)))
       : 1;
     if (this.left === this.right) this.camera.clearViewOffset();
     else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, 0, width, height);
@@ -162,13 +165,13 @@ export class Stage {
     this.dirty = true;
   }
 
-  /** @param {number} factor above 1 goes away */
+  /** @param {number} factor of the distance */
   zoom(factor) {
     this.distance = Math.max(0.15 * this.size, Math.min(12 * this.size, this.distance * factor));
     this.dirty = true;
   }
 
-  /** move the point looked at by pixels @param {number} dx @param {number} dy */
+  /** moves the target point by pixels @param {number} dx @param {number} dy */
   pan(dx, dy) {
     const perPixel =
       ((2 / this.camera.zoom) * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
@@ -190,7 +193,7 @@ export class Stage {
     this.camera.lookAt(this.target);
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-    // the lights go with the camera's side, so that the lit side is the one looked at
+    // the lights move with the camera, so that the visible side is lit
     const right = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
     this.key.position
       .copy(this.target)
@@ -215,7 +218,7 @@ export class Stage {
     this.rim.target.updateMatrixWorld();
   }
 
-  /** is the last picture there, and its pause over? */
+  /** is the last picture finished, and its pause over? */
   ready() {
     return this.pace.ready(performance.now());
   }
@@ -227,19 +230,19 @@ export class Stage {
     this.placeCamera();
     this.pace.begin(performance.now());
     this.renderer.render(this.scene, this.camera);
-    // drawing goes on after render returns: the fence tells when it is over
+    // drawing continues after render returns: the fence signals its end
     const gl = /** @type {WebGL2RenderingContext} */ (this.renderer.getContext());
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
-    const ask = () => {
+    const poll = () => {
       if (fence && !gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
-        setTimeout(ask, POLL_MS);
+        setTimeout(poll, POLL_MS);
         return;
       }
       gl.deleteSync(fence);
       if (this.pace.done(performance.now())) this.resize();
     };
-    setTimeout(ask, POLL_MS);
+    setTimeout(poll, POLL_MS);
   }
 
   /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
@@ -260,7 +263,7 @@ export class Stage {
   }
 }
 
-/** @returns {THREE.Texture} a quiet vertical gradient */
+/** @returns {THREE.Texture} a dark vertical gradient */
 function makeBackdrop() {
   const canvas = document.createElement("canvas");
   canvas.width = 2;

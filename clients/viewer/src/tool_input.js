@@ -1,37 +1,37 @@
-// Mouse and finger: on the organ they move the tool, beside it they move the camera. Two fingers zoom and pan.
+// Mouse and touch: on the organ they move the tool, beside it the camera. Two fingers zoom and pan.
 import * as THREE from "./three.js";
 
 /**
- * What a drag asks of the tool: position m, grab, or away.
- * @typedef {{position: number[], grab: boolean} | null} ToolWish
+ * What a drag asks of the tool: position in m and grasp; null: lifted away.
+ * @typedef {{position: number[], grab: boolean} | null} ToolTarget
  */
 
-const CLICK_PX = 6; // a button that is let go farther away has turned the view
-const PRESS_S = 0.35; // time in which a press goes in
+const CLICK_PX = 6; // a longer motion is not a click but turns the view
+const PRESS_S = 0.35; // duration in which a press reaches its depth
 
 export class ToolInput {
   /**
    * @param {import("./stage.js").Stage} stage
-   * @param {(ray: THREE.Ray) => {point: THREE.Vector3, normal: THREE.Vector3, distance: number} | null} pick
-   * @param {(wish: ToolWish) => void} onTool called on every change
+   * @param {(ray: THREE.Ray) => import("./picking.js").Hit | null} pick
+   * @param {(target: ToolTarget) => void} onTarget called on every change
    */
-  constructor(stage, pick, onTool) {
+  constructor(stage, pick, onTarget) {
     this.stage = stage;
     this.pick = pick;
-    this.onTool = onTool;
-    /** @type {"pull" | "press" | "sculpt"} */
+    this.onTarget = onTarget;
+    /** @type {import("./controls.js").Mode} */
     this.mode = "pull";
-    /** @type {(at: number[]) => void} called with the place that is clicked while sculpting */
+    /** @type {(position: number[]) => void} called with the point that is clicked while sculpting, m */
     this.onClick = () => {};
-    /** @type {{id: number, at: number[], x: number, y: number} | null} where a press of the button began */
-    this.clicked = null;
+    /** @type {{id: number, at: number[], x: number, y: number} | null} point where the button went down */
+    this.clickStart = null;
     this.enabled = false;
     this.radius = 0.01;
     /** @type {Map<number, {x: number, y: number}>} */
     this.pointers = new Map();
     /** @type {{id: number, grab: boolean, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
     this.drag = null;
-    this.touchedOnce = () => {};
+    this.onFirstDrag = () => {};
     const c = stage.canvas;
     c.addEventListener("pointerdown", (e) => this.down(e));
     c.addEventListener("pointermove", (e) => this.move(e));
@@ -51,14 +51,14 @@ export class ToolInput {
     c.setPointerCapture(e.pointerId);
     this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
     if (this.pointers.size > 1) {
-      this.letGo();
-      this.clicked = null;
+      this.release();
+      this.clickStart = null;
       return;
     }
-    this.clicked = null;
+    this.clickStart = null;
     if (this.mode === "sculpt") {
       const at = e.button === 0 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
-      if (at) this.clicked = { id: e.pointerId, at: at.point.toArray(), x: e.clientX, y: e.clientY };
+      if (at) this.clickStart = { id: e.pointerId, at: at.point.toArray(), x: e.clientX, y: e.clientY };
       c.classList.add("busy");
       return;
     }
@@ -78,7 +78,7 @@ export class ToolInput {
       x: e.clientX,
       y: e.clientY,
     };
-    this.touchedOnce();
+    this.onFirstDrag();
     this.tick();
   }
 
@@ -110,7 +110,7 @@ export class ToolInput {
     last.y = e.clientY;
   }
 
-  /** is the mouse over the organ? looked up at most 15 times a second @param {PointerEvent} e */
+  /** is the mouse over the organ? Checked at most 15 times a second @param {PointerEvent} e */
   hover(e) {
     const now = performance.now();
     if (now - (this.hoverAt ?? 0) > 66) {
@@ -123,20 +123,20 @@ export class ToolInput {
   /** @param {PointerEvent} e */
   up(e) {
     this.pointers.delete(e.pointerId);
-    const clicked = this.clicked;
-    if (clicked?.id === e.pointerId) {
-      this.clicked = null;
-      if (e.type === "pointerup" && Math.hypot(e.clientX - clicked.x, e.clientY - clicked.y) < CLICK_PX)
-        this.onClick(clicked.at);
+    const clickStart = this.clickStart;
+    if (clickStart?.id === e.pointerId) {
+      this.clickStart = null;
+      if (e.type === "pointerup" && Math.hypot(e.clientX - clickStart.x, e.clientY - clickStart.y) < CLICK_PX)
+        this.onClick(clickStart.at);
     }
-    if (this.drag && this.drag.id === e.pointerId) this.letGo();
+    if (this.drag && this.drag.id === e.pointerId) this.release();
     if (this.pointers.size === 0) this.stage.canvas.classList.remove("busy");
   }
 
-  letGo() {
+  release() {
     if (!this.drag) return;
     this.drag = null;
-    this.onTool(null);
+    this.onTarget(null);
   }
 
   /** @param {WheelEvent} e */
@@ -149,7 +149,7 @@ export class ToolInput {
     } else this.stage.zoom(Math.exp(amount * 0.0012));
   }
 
-  /** where the tool shall be now; also called while nothing moves, because a press goes in over time */
+  /** updates the target; also called while the pointer rests, because a press deepens over time */
   tick() {
     const drag = this.drag;
     if (!drag) return;
@@ -157,11 +157,11 @@ export class ToolInput {
     const point = ray.intersectPlane(drag.plane, new THREE.Vector3());
     if (!point) return;
     const t = Math.min(1, (performance.now() - drag.start) / (1000 * PRESS_S));
-    // a press begins with the ball outside and goes in along the view; a pull begins on the surface
+    // a press begins with the ball outside and moves in along the view; a pull begins on the surface
     const depth = drag.grab
       ? drag.deeper
       : -1.2 * this.radius + (drag.depth + 0.6 * this.radius) * t * t * (3 - 2 * t) + drag.deeper;
     point.addScaledVector(drag.into, depth);
-    this.onTool({ position: point.toArray(), grab: drag.grab });
+    this.onTarget({ position: point.toArray(), grab: drag.grab });
   }
 }

@@ -1,21 +1,25 @@
-// Everybody's tools: a ball in the member's colour, an arrow for the force on it, a name beside it.
+// The tools of all members: a ball in the member's colour, an arrow for the force on it, a name beside it.
+import { cssColour } from "./plan_panel.js";
 import * as THREE from "./three.js";
+
+const SAME_N = 0.005; // forces that differ by less have the same arrow
+const ARROW_MIN_N = 0.02; // smallest force with an arrow
 
 /** @typedef {import("./wire.js").Tool} Tool */
 
 /**
- * Do two states of the tools look alike: same flags, holders and colours, places within `least` m, forces within 5 mN?
- * @param {Tool[]} a @param {Tool[]} b @param {number} least
+ * Do two states of the tools look alike: same flags, holders and colours, positions within `limit` m, forces within 5 mN?
+ * @param {Tool[]} a @param {Tool[]} b @param {number} limit
  */
-export function sameTools(a, b, least) {
-  const near = (/** @type {number[]} */ u, /** @type {number[]} */ v, /** @type {number} */ limit) =>
-    u.every((c, k) => Math.abs(c - v[k]) <= limit);
+export function sameTools(a, b, limit) {
+  const near = (/** @type {number[]} */ u, /** @type {number[]} */ v, /** @type {number} */ difference) =>
+    u.every((c, k) => Math.abs(c - v[k]) <= difference);
   return (
     a.length === b.length &&
     a.every((t, i) => {
       const u = b[i];
       const same = t.flags === u.flags && t.holder === u.holder && t.colour === u.colour && t.radius === u.radius;
-      return same && near(t.position, u.position, least) && near(t.force, u.force, 0.005);
+      return same && near(t.position, u.position, limit) && near(t.force, u.force, SAME_N);
     })
   );
 }
@@ -40,7 +44,7 @@ export class ToolMarks {
       );
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xffffff);
       const label = document.createElement("span");
-      // the force mostly points into the tissue: draw its arrow over it
+      // the force mostly points into the tissue: its arrow is drawn over it
       for (const piece of [arrow.line, arrow.cone]) {
         piece.renderOrder = 1;
         /** @type {THREE.Material} */ (piece.material).depthTest = false;
@@ -64,7 +68,7 @@ export class ToolMarks {
       mark.shown = tool.held && !tool.away;
       mark.ball.visible = mark.shown;
       const force = Math.hypot(...tool.force);
-      mark.arrow.visible = mark.shown && force > 0.02;
+      mark.arrow.visible = mark.shown && force > ARROW_MIN_N;
       if (!mark.shown) return;
       mark.at.fromArray(tool.position);
       mark.ball.position.copy(mark.at);
@@ -78,13 +82,13 @@ export class ToolMarks {
         mark.arrow.setColor(tool.colour);
       }
       mark.label.textContent = i === mine ? "you" : nameOf(tool.holder);
-      mark.label.style.color = "#" + tool.colour.toString(16).padStart(6, "0");
+      mark.label.style.color = cssColour(tool.colour);
     });
     for (let i = tools.length; i < this.marks.length; i++)
       this.marks[i].shown = this.marks[i].ball.visible = this.marks[i].arrow.visible = false;
   }
 
-  /** after the camera was placed */
+  /** after the camera has moved */
   placeLabels() {
     for (const mark of this.marks) {
       const p = mark.shown ? this.stage.project(mark.at) : null;

@@ -1,4 +1,4 @@
-// Keys: what they do, which a focused element keeps, and that a held key sends no flood.
+// Keys: actions, keys that a focused element uses itself, repetition of held keys.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { keyMap } from "../src/keys.js";
@@ -26,7 +26,7 @@ function stand() {
   return { did, press };
 }
 
-test("letters act in either case, with a modifier they are the browser's", () => {
+test("letters act in either case; with a modifier they belong to the browser", () => {
   const { did, press } = stand();
   press("R");
   press("r", { ctrlKey: true });
@@ -41,14 +41,14 @@ test("space presses the focused button instead of pausing", () => {
   assert.deepEqual(did, ["pause"]);
 });
 
-test("what is typed into a text field is text", () => {
+test("keys typed into a text field are text", () => {
   const { did, press } = stand();
   for (const key of ["r", " ", "ArrowLeft", "-"]) press(key, { target: { tagName: "INPUT", type: "text" } });
-  for (const key of ["r", " ", "ArrowDown"]) press(key, { target: { tagName: "SELECT" } }); // nor is what chooses from a list
+  for (const key of ["r", " ", "ArrowDown"]) press(key, { target: { tagName: "SELECT" } }); // letters choose from a list
   assert.deepEqual(did, []);
 });
 
-test("a held key turns the view again and again, and resets once", () => {
+test("a held arrow key keeps turning the view, a held letter acts once", () => {
   const { did, press } = stand();
   press("ArrowLeft");
   press("ArrowLeft", { repeat: true });

@@ -1,10 +1,10 @@
-// What colours mean: round ranges that follow the values without flickering, units, what is offered.
+// The legend: round ranges that follow the values with hysteresis, units, fields on offer.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { COLOURS, FIELDS, labels, missing, offered, rangeOf, roundDown, roundUp } from "../src/legend.js";
 
-test("rounds to numbers that read well, never past the value on the wrong side", () => {
+test("rounds up to a number not below the value and down to one not above", () => {
   for (const [v, up, down] of [
     [1, 1, 1],
     [1.01, 1.2, 1],
@@ -21,7 +21,7 @@ test("rounds to numbers that read well, never past the value on the wrong side",
   }
 });
 
-test("the range follows a long pull and no value lies beyond it", () => {
+test("the range of a long pull contains every value", () => {
   let range = null,
     changes = 0;
   for (let mm = 0; mm <= 120; mm += 0.5) {
@@ -34,7 +34,7 @@ test("the range follows a long pull and no value lies beyond it", () => {
   assert.ok(changes < 40, `${changes} changes`);
 });
 
-test("values that swing by half leave the range alone, values that fall far do not", () => {
+test("values that vary by half keep the range, a large drop changes it", () => {
   let range = rangeOf("von_mises", 0, 900, null);
   assert.equal(range.high, 1000);
   for (let k = 0; k < 50; k++) range = rangeOf("von_mises", 0, 700 + 250 * Math.sin(k), range);
@@ -43,8 +43,8 @@ test("values that swing by half leave the range alone, values that fall far do n
   assert.equal(range.high, 300);
 });
 
-test("a body at rest shows no noise", () => {
-  assert.equal(rangeOf("displacement", 0, 3e-9, null).high, FIELDS.displacement.least);
+test("a body at rest has the smallest range", () => {
+  assert.equal(rangeOf("displacement", 0, 3e-9, null).high, FIELDS.displacement.min);
   const range = rangeOf("von_mises", 0, 1e-12, null);
   assert.equal(range.high, 1);
   assert.deepEqual(rangeOf("von_mises", 0, 0.2, range), range);
@@ -63,7 +63,7 @@ test("a range begins at 0 unless all values lie in its upper half", () => {
   }
 });
 
-test("a signed field has 0 in the middle, whichever sign is the larger", () => {
+test("the range of a signed field is symmetric", () => {
   assert.deepEqual(rangeOf("distortion", -0.013, 0.002, null), { low: -0.015, high: 0.015 });
   assert.deepEqual(rangeOf("distortion", -0.001, 0.19, null), { low: -0.2, high: 0.2 });
   assert.deepEqual(rangeOf("distortion", 0, 0, null), { low: -1e-3, high: 1e-3 });
@@ -74,7 +74,7 @@ test("a signed field has 0 in the middle, whichever sign is the larger", () => {
   assert.deepEqual(labels("strain", { low: 0, high: 0.12 }), { low: "0", high: "12", unit: "%" });
 });
 
-test("both ends are said in one unit that suits the larger", () => {
+test("both ends have the unit of the larger one", () => {
   assert.deepEqual(labels("displacement", { low: 0, high: 0.012 }), { low: "0", high: "12", unit: "mm" });
   assert.deepEqual(labels("displacement", { low: 0, high: 2.5e-4 }), { low: "0", high: "250", unit: "µm" });
   assert.deepEqual(labels("von_mises", { low: 800, high: 1200 }), { low: "0.8", high: "1.2", unit: "kPa" });
@@ -85,7 +85,7 @@ test("both ends are said in one unit that suits the larger", () => {
   assert.deepEqual(labels("stiffness", rangeOf("stiffness", 4e-6, 9e-6, null)), { low: "0", high: "10", unit: "µJ" });
 });
 
-test("only what the session gives is offered, and why there is no more", () => {
+test("only fields of the session are offered, with the reason why others are missing", () => {
   const springs = { fields: ["displacement", "stiffness"] },
     plain = { fields: ["displacement"] },
     fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
@@ -96,11 +96,11 @@ test("only what the session gives is offered, and why there is no more", () => {
   assert.equal(missing([fem]), "");
   assert.match(missing([springs]), /finite elements/);
   assert.match(missing([plain]), /finite elements/);
-  assert.match(missing([springs, fem]), /every body/);
+  assert.match(missing([springs, fem]), /Some bodies/);
   assert.match(missing([{}]), /no fields/);
 });
 
-test("colours grow lighter from stop to stop, and the page's legend shows the same", () => {
+test("colours grow lighter from stop to stop, and the legend of style.css has the same", () => {
   const light = COLOURS.map((c) => {
     const [r, g, b] = [1, 3, 5].map((i) => (parseInt(c.slice(i, i + 2), 16) / 255) ** 2.2);
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;

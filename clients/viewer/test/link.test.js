@@ -6,6 +6,7 @@ import { test } from "node:test";
 import { readFieldHead } from "../src/field_decoder.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
+import { hello, part as partInfo } from "./fixtures/messages.js";
 import { KIND, POSE_FLAG, readHead, readTools } from "../src/wire.js";
 
 /** @param {string} name */
@@ -78,8 +79,6 @@ function stand() {
   return stand;
 }
 
-const HELLO = { type: "hello", session: "liver", parts: [{ epoch: 0, asset: "/asset/ab" }], you: { id: 1, tool: 0 } };
-
 /** a connection that has joined; the part's epoch is that of the golden frames */
 async function joined() {
   const s = stand();
@@ -87,8 +86,8 @@ async function joined() {
   s.sockets[0].accept();
   const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
   const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
-  const parts = Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/ab" }));
-  s.sockets[0].say({ ...HELLO, parts });
+  const parts = Array.from({ length: part + 1 }, () => partInfo({ epoch }));
+  s.sockets[0].say(hello({ parts }));
   return { s, part };
 }
 
@@ -128,10 +127,8 @@ test("keeps the newest field until its asset has come, drops one of an older epo
     n = 301;
   s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
   s.sockets[0].accept();
-  s.sockets[0].say({
-    ...HELLO,
-    parts: Array.from({ length: head.part + 1 }, () => ({ epoch: head.epoch, asset: "/asset/ab" })),
-  });
+  const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
+  s.sockets[0].say(hello({ parts }));
   s.sockets[0].say(field);
   assert.equal(s.of("field").length, 0);
   // as if an asset of as many vertices had come
@@ -180,14 +177,14 @@ test("a resting tool is said again until the page has been silent for 3 s", asyn
   s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
   for (let k = 0; k < 58; k++) {
     s.time += 50;
-    s.link.beat();
+    s.link.repeatPose();
   }
   const poses = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
   assert.equal(poses.length, 59);
   assert.ok(poses.every((v) => v.getUint32(132, true) === 1));
   for (let k = 0; k < 10; k++) {
     s.time += 50;
-    s.link.beat();
+    s.link.repeatPose();
   }
   const last = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
   assert.equal(last.length, 61); // one more at 2950 ms, then one that lifts the tool
@@ -215,7 +212,7 @@ test("a server whose asset cannot be read is asked again ever more slowly", asyn
   const pauses = [];
   for (let i = 0; i < 4; i++) {
     s.sockets[i].accept();
-    s.sockets[i].say(HELLO);
+    s.sockets[i].say(hello());
     s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
     await turn();
     assert.equal(s.sockets[i].closed, 4900);
@@ -240,7 +237,7 @@ test("another topology: the old part goes on until the new asset is here, then f
   view.setUint32(8, epoch, true);
   s.sockets[0].say({
     type: "topology",
-    parts: Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/cd" })),
+    parts: Array.from({ length: part + 1 }, () => partInfo({ epoch, asset: "/asset/cd" })),
   });
   s.sockets[0].say(old); // was on its way
   assert.equal(frames(), 1);
@@ -265,10 +262,10 @@ test("another topology: the old part goes on until the new asset is here, then f
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
   const { s, part } = await joined();
   const first = s.giveAsset,
-    epoch = s.link.wanted.get(part);
+    epoch = s.link.requested.get(part);
   s.sockets[0].say({
     type: "topology",
-    parts: Array.from({ length: part + 1 }, () => ({ epoch: epoch + 1, asset: "/asset/cd" })),
+    parts: Array.from({ length: part + 1 }, () => partInfo({ epoch: epoch + 1, asset: "/asset/cd" })),
   });
   const second = s.giveAsset;
   second(load("asset.bin").buffer);
@@ -294,7 +291,7 @@ test("a message that cannot be read closes the connection, an old connection is 
   assert.equal(s.sockets[0].closed, 4900);
   s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
   const n = s.posted.length;
-  s.sockets[0].say(HELLO);
+  s.sockets[0].say(hello());
   assert.equal(s.posted.length, n);
 });
 

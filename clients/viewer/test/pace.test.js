@@ -1,9 +1,9 @@
-// Pace: a machine that draws slowly keeps half of its time, gives up sharpness down to the least, and gets it back.
+// Pace: slow drawing keeps half of the time free, lowers the resolution to a minimum, and raises it again.
 import assert from "node:assert/strict";
 import test from "node:test";
 import { Pace } from "../src/pace.js";
 
-/** draws for `ms` at 60 turns a second, each picture costs cost(sharpness); gives how many and the time spent on them */
+/** draws for `ms` at 60 turns per second, each picture costs cost(resolution); returns their number and share of time */
 function run(pace, ms, cost) {
   const begin = pace.restUntil;
   let n = 0,
@@ -16,7 +16,7 @@ function run(pace, ms, cost) {
     }
     if ((t - begin) % 17 !== 0 || !pace.ready(t)) continue;
     pace.begin(t);
-    const c = cost(pace.sharpness);
+    const c = cost(pace.resolution);
     done = t + c;
     spent += c;
     n++;
@@ -24,14 +24,14 @@ function run(pace, ms, cost) {
   return { n, share: spent / ms };
 }
 
-test("a quick machine draws every turn, all pixels", () => {
+test("fast drawing uses every turn and all pixels", () => {
   const pace = new Pace(0.3),
     { n } = run(pace, 1700, () => 4);
   assert.equal(n, 100);
-  assert.equal(pace.sharpness, 1);
+  assert.equal(pace.resolution, 1);
 });
 
-test("a first picture that takes seconds, as its shaders are made, holds up none after it", () => {
+test("a first picture that takes seconds to compile shaders delays the next by at most 700 ms", () => {
   const pace = new Pace(1);
   pace.begin(0);
   pace.done(8000);
@@ -39,7 +39,7 @@ test("a first picture that takes seconds, as its shaders are made, holds up none
   assert.equal(pace.ready(8701), true);
 });
 
-test("pictures take at most half of the time, up to seconds for one", () => {
+test("pictures take at most half of the time", () => {
   for (const c of [12, 20, 40, 200, 700]) {
     const { n, share } = run(new Pace(1), 20000, () => c);
     assert.ok(share <= 0.5 + (2 * c) / 20000, `${c} ms: ${share}`);
@@ -48,7 +48,7 @@ test("pictures take at most half of the time, up to seconds for one", () => {
   }
 });
 
-test("one slow picture changes nothing, three do", () => {
+test("three slow pictures in a row lower the resolution, one does not", () => {
   const pace = new Pace(0.3);
   const picture = (ms) => {
     pace.begin(0);
@@ -57,22 +57,22 @@ test("one slow picture changes nothing, three do", () => {
   assert.equal(picture(900), false);
   assert.equal(picture(5), false);
   assert.deepEqual([picture(112), picture(112), picture(112)], [false, false, true]);
-  assert.equal(pace.sharpness, 0.5);
+  assert.equal(pace.resolution, 0.5);
 });
 
-test("sharpness settles where pictures cost little enough, or at the least", () => {
+test("the resolution settles where pictures are fast enough, or at its minimum", () => {
   const pace = new Pace(0.2);
   run(pace, 20000, (s) => Math.round(5 + 120 * s * s));
-  assert.ok(5 + 120 * pace.sharpness ** 2 <= 29 && pace.sharpness > 0.3, String(pace.sharpness));
+  assert.ok(5 + 120 * pace.resolution ** 2 <= 29 && pace.resolution > 0.3, String(pace.resolution));
   const hopeless = new Pace(0.2);
   run(hopeless, 60000, () => 300);
-  assert.equal(hopeless.sharpness, 0.2);
-  // what had slowed it is over
+  assert.equal(hopeless.resolution, 0.2);
+  // drawing is fast again
   run(hopeless, 60000, () => 3);
-  assert.equal(hopeless.sharpness, 1);
+  assert.equal(hopeless.resolution, 1);
 });
 
-test("no second picture before the first is there, unless it never comes", () => {
+test("a picture waits for the end of the one before, at most 3 s", () => {
   const pace = new Pace(0.3);
   pace.begin(100);
   assert.equal(pace.ready(2000), false);

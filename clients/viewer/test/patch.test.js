@@ -6,8 +6,9 @@ import { decodeAsset } from "../src/asset.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
 import { applyPatch, readPatchHead, shownOf } from "../src/patch_decoder.js";
-import { activeLines } from "../src/plan_panel.js";
+import { activeText } from "../src/plan_list.js";
 import { KIND, MAGIC, WireError } from "../src/wire.js";
+import { hello, part as partInfo } from "./fixtures/messages.js";
 
 /** the shortest LZ4 block that holds these bytes as they are @param {number[]} bytes */
 function literal(bytes) {
@@ -170,13 +171,13 @@ test("normals of visible vertices are those of the whole mesh, hidden ones are l
 
 test("says what is active in a sentence, with the body's name only among several", () => {
   const active = [{ part: 1, nodes: 133, springs: 385, of_nodes: 450, of_springs: 1344 }];
-  assert.deepEqual(activeLines(active, [{ name: "liver" }, { name: "stomach" }]), [
+  assert.deepEqual(activeText(active, [{ name: "liver" }, { name: "stomach" }]), [
     "stomach: 133 of 450 nodes, 385 of 1344 springs",
   ]);
-  assert.deepEqual(activeLines([{ ...active[0], part: 0, of_nodes: 100002 }], [{ name: "stomach" }]), [
+  assert.deepEqual(activeText([{ ...active[0], part: 0, of_nodes: 100002 }], [{ name: "stomach" }]), [
     "133 of 100,002 nodes, 385 of 1344 springs",
   ]);
-  assert.deepEqual(activeLines([], [{ name: "liver" }]), []);
+  assert.deepEqual(activeText([], [{ name: "liver" }]), []);
 });
 
 /** @param {string} name */
@@ -205,8 +206,8 @@ function stand() {
   link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
   const say = (/** @type {any} */ m) =>
     socket.onmessage({ data: m instanceof Uint8Array ? m.slice().buffer : JSON.stringify(m) });
-  const parts = (/** @type {number} */ e) => Array.from({ length: part + 1 }, () => ({ epoch: e, asset: "/asset/ab" }));
-  say({ type: "hello", session: "s", parts: parts(epoch), you: { id: 1, tool: 0 } });
+  const parts = (/** @type {number} */ e) => Array.from({ length: part + 1 }, () => partInfo({ epoch: e }));
+  say(hello({ parts: parts(epoch) }));
   const giveAsset = async () => {
     give(load("asset.bin").buffer);
     await turn();

@@ -1,8 +1,8 @@
-// Orders of sculpting as the panel builds them, and surfaces as files.
+// Commands of sculpting as the panel builds them, and surfaces as files.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { joined, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
-import { boxAround, cutOrder, FORCES, liftOf, orderOf, PAINTS, said, TOOLS } from "../src/sculpt_orders.js";
+import { joinSurfaces, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
+import { answerText, boxAround, commandOf, cutCommand, FORCES, liftOf, PAINTS, TOOLS } from "../src/sculpt_commands.js";
 
 const SET = {
   distance_m: 0.02,
@@ -17,14 +17,14 @@ const SET = {
   middle: [0, 0, 0],
 };
 
-test("a click becomes an order with the place and what the tool is set to", () => {
-  assert.deepEqual(orderOf("extrude", SET, [[1, 2, 3]]), {
+test("a click becomes a command with the point and the settings of the tool", () => {
+  assert.deepEqual(commandOf("extrude", SET, [[1, 2, 3]]), {
     verb: "extrude",
     args: { x_m: 1, y_m: 2, z_m: 3, distance_m: 0.02, scale: 1 },
   });
-  assert.deepEqual(orderOf("delete", SET, [[1, 2, 3]]), { verb: "delete", args: { x_m: 1, y_m: 2, z_m: 3 } });
-  assert.deepEqual(orderOf("sharpen", SET, [[1, 2, 3]])?.args, { x_m: 1, y_m: 2, z_m: 3, sharp: 2.5, what: 1 });
-  assert.deepEqual(orderOf("paint", { ...SET, paint: "softer" }, [[0, 0, 0]])?.args, {
+  assert.deepEqual(commandOf("delete", SET, [[1, 2, 3]]), { verb: "delete", args: { x_m: 1, y_m: 2, z_m: 3 } });
+  assert.deepEqual(commandOf("sharpen", SET, [[1, 2, 3]])?.args, { x_m: 1, y_m: 2, z_m: 3, sharp: 2.5, what: 1 });
+  assert.deepEqual(commandOf("paint", { ...SET, paint: "softer" }, [[0, 0, 0]])?.args, {
     x_m: 0,
     y_m: 0,
     z_m: 0,
@@ -34,12 +34,12 @@ test("a click becomes an order with the place and what the tool is set to", () =
   });
 });
 
-test("what joins two faces waits for the second click", () => {
+test("a tool that joins two faces needs two clicks", () => {
   for (const tool of ["merge", "bridge"]) {
-    assert.equal(orderOf(tool, SET, [[1, 2, 3]]), null);
+    assert.equal(commandOf(tool, SET, [[1, 2, 3]]), null);
     assert.equal(TOOLS[tool].hints.length, 2);
     assert.deepEqual(
-      orderOf(tool, SET, [
+      commandOf(tool, SET, [
         [1, 2, 3],
         [4, 5, 6],
       ]),
@@ -48,16 +48,16 @@ test("what joins two faces waits for the second click", () => {
   }
 });
 
-test("what sucks in is what blows up, with the other sign", () => {
+test("deflate is inflate with negative pressure", () => {
   const at = { x_m: 1, y_m: 2, z_m: 3, radius_m: 0.03 };
-  assert.deepEqual(orderOf("inflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: 200 } });
-  assert.deepEqual(orderOf("deflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: -200 } });
+  assert.deepEqual(commandOf("inflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: 200 } });
+  assert.deepEqual(commandOf("deflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: -200 } });
 });
 
-test("a handle wants two ends and goes outward across itself", () => {
-  assert.equal(orderOf("curve", SET, [[-1, 0, 2]]), null);
+test("a curve needs two ends and is pulled outward, perpendicular to itself", () => {
+  assert.equal(commandOf("curve", SET, [[-1, 0, 2]]), null);
   assert.deepEqual(
-    orderOf("curve", SET, [
+    commandOf("curve", SET, [
       [-1, 0, 2],
       [1, 0, 2],
     ]),
@@ -81,50 +81,50 @@ test("a handle wants two ends and goes outward across itself", () => {
   for (const lift of [0.05, -0.02]) {
     const d = liftOf([1, 0, 2], [2, 3, 1], [0.2, 0.1, -0.4], lift);
     assert.ok(Math.abs(Math.hypot(...d) - Math.abs(lift)) < 1e-12);
-    assert.ok(Math.abs(d[0] * 1 + d[1] * 3 + d[2] * -1) < 1e-12); // across the handle
-    assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward, or inward
+    assert.ok(Math.abs(d[0] * 1 + d[1] * 3 + d[2] * -1) < 1e-12); // perpendicular to the curve
+    assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward if lift > 0, else inward
   }
-  assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any way will do
-  for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].places);
+  assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any direction
+  for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].points);
 });
 
-test("a stroke and its opposite leave the material as it was", () => {
+test("a stroke and its opposite restore the material", () => {
   for (const key of /** @type {const} */ (["young_factor", "density_factor"])) {
     const all = Object.values(PAINTS).reduce((product, paint) => product * paint[key], 1);
     assert.ok(Math.abs(all - 1) < 1e-12);
   }
 });
 
-test("a cut lies in the box across its axis", () => {
+test("a cut is a plane within the box, perpendicular to its axis", () => {
   const box = { low: [-1, 0, 2], high: [1, 4, 3] };
-  assert.deepEqual(cutOrder("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
-  assert.deepEqual(cutOrder("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
-  assert.deepEqual(cutOrder("none", 0.5, box), { verb: "uncut", args: {} });
+  assert.deepEqual(cutCommand("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
+  assert.deepEqual(cutCommand("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
+  assert.deepEqual(cutCommand("none", 0.5, box), { verb: "uncut", args: {} });
   assert.deepEqual(boxAround(box, Float32Array.of(-2, 1, 2.5, 0, 5, 2)), { low: [-2, 0, 2], high: [1, 5, 3] });
 });
 
-test("answers are said in short", () => {
+test("answers are displayed in short", () => {
   assert.equal(
-    said({ verb: "probe", text: "", args: { young_Pa: 15000, poisson: 0.4, density_kg_m3: 1234.56 } }),
+    answerText({ verb: "probe", text: "", args: { young_Pa: 15000, poisson: 0.4, density_kg_m3: 1234.56 } }),
     "15 kPa, 1230 kg/m³",
   );
   assert.equal(
-    said({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, made_ms: 12.6 } }),
+    answerText({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, made_ms: 12.6 } }),
     "Extrude: 9 cells, 13 ms",
   );
-  assert.equal(said({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
-  assert.equal(said({ verb: "other", text: "done", args: {} }), "done");
+  assert.equal(answerText({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
+  assert.equal(answerText({ verb: "other", text: "done", args: {} }), "done");
 });
 
-/** a tetrahedron whose vertex 1 no triangle has */
-const PIECE = {
+/** a tetrahedron whose vertex 1 is in no triangle */
+const SURFACE = {
   positions: [0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1],
   triangles: [0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4],
 };
 
-test("only vertices of triangles are written, pieces one after the other", () => {
-  const one = joined([PIECE]),
-    two = joined([PIECE, PIECE]);
+test("only vertices of triangles are written, surfaces one after the other", () => {
+  const one = joinSurfaces([SURFACE]),
+    two = joinSurfaces([SURFACE, SURFACE]);
   assert.equal(one.positions.length, 12);
   assert.ok(!one.positions.includes(9));
   assert.equal(two.positions.length, 24);
@@ -134,7 +134,7 @@ test("only vertices of triangles are written, pieces one after the other", () =>
   );
   for (let e = 0; e < 12; e++)
     for (let d = 0; d < 3; d++)
-      assert.equal(one.positions[3 * one.triangles[e] + d], PIECE.positions[3 * PIECE.triangles[e] + d]);
+      assert.equal(one.positions[3 * one.triangles[e] + d], SURFACE.positions[3 * SURFACE.triangles[e] + d]);
 });
 
 /** sixfold volume @param {number[][][]} triangles */
@@ -149,7 +149,7 @@ const volume = (triangles) =>
   );
 
 test("OBJ, STL and PLY hold the same surface", () => {
-  const tenth = { positions: PIECE.positions.map((v) => Math.fround(v / 10)), triangles: PIECE.triangles };
+  const tenth = { positions: SURFACE.positions.map((v) => Math.fround(v / 10)), triangles: SURFACE.triangles };
   const lines = toObj([tenth]).split("\n"),
     v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
   const obj = lines
