@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed". What failed is shown where
+# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed, N skipped". What failed is shown where
 # it failed, whole, and once more in short right before that line.
 # usage: deploy/test.sh [--fast]     --fast: the release build's tests only, no sanitizers, fuzzers or browser
 # PALPATE_BUILD names another build folder.
@@ -17,11 +17,11 @@ case ${1-} in
 esac
 
 install_missing run test || exit 1
-install_missing scan || say "tests of the scan say that it is not there and are left out"
-install_missing mpi || say "calibration over MPI is not built and its test says so"
+install_missing scan || say "tests of the scan are skipped: it cannot be had"
+install_missing mpi || say "calibration over MPI is not built and its test is skipped"
 fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
 
-passed=0 failed=0 left_out=0
+passed=0 failed=0 skipped=0
 digest=$build/digest.log
 : >"$digest"
 
@@ -87,7 +87,7 @@ count() { # PRESET: its tests, once both have run
     rm "$build/ctest_waits_$preset.log"
     grep -E "$result" "$log"
     n_pass=$(grep -cE "$result.* Passed " "$log")
-    n_left=$(grep -cE "$result.*\*\*\*Skipped" "$log")
+    n_skip=$(grep -cE "$result.*\*\*\*Skipped" "$log")
     # "7/9 Test #3: room/test_name ....***Failed": the words before the dots are the name
     bad=$(grep -E "$result.*(\*\*\*|Not Run)" "$log" | grep -v '\*\*\*Skipped' | sed -E "s|$result([^ ]+) .*|\1|")
     n_fail=$(echo "$bad" | grep -c .)
@@ -102,8 +102,8 @@ count() { # PRESET: its tests, once both have run
     fi
     passed=$((passed + n_pass))
     failed=$((failed + n_fail))
-    left_out=$((left_out + n_left))
-    say "$preset: $n_pass passed, $n_fail failed"
+    skipped=$((skipped + n_skip))
+    say "$preset: $n_pass passed, $n_fail failed, $n_skip skipped"
 }
 say "building release"
 build_release -D PAL_BUILD_TESTS=ON
@@ -164,7 +164,7 @@ if [ -z "$fast" ]; then
         done
     fi
 fi
-[ "$left_out" -eq 0 ] || say "$left_out left out (each says why in $build/ctest_*.log)"
+[ "$skipped" -eq 0 ] || say "$skipped skipped (each says why in $build/ctest_*.log)"
 cat "$digest"
-echo "$passed passed, $failed failed"
+echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

@@ -124,18 +124,18 @@ typedef struct pal_wire_hello {
 /* how much of a part that adapts is in use */
 typedef struct pal_wire_active {
     uint32_t part;
-    uint32_t n_node, n_spring;         /* now                                      */
-    uint32_t n_all_node, n_all_spring; /* and if all of it were of its finest level */
+    uint32_t n_node, n_spring;            /* now                                      */
+    uint32_t n_all_node, n_finest_spring; /* and if all of it were of its finest level */
 } pal_wire_active;
 
 /* a part of which there is something to tell; what is false, empty or 0 is not on the wire */
 typedef struct pal_wire_part_state {
     uint32_t part;
-    bool frozen;                  /* its guard has stopped it; `reset` with its body as target brings it back */
-    bool asleep;                  /* at rest: its rows do not run                                     */
-    char why[PAL_WIRE_WHY_BYTES]; /* it was stopped, one sentence                                  */
-    uint64_t n_rescue;            /* steps that would have gone wrong without a guard, total         */
-    double rescue_ms;             /* what they took, total                                           */
+    bool frozen;                     /* its guard has stopped it; `reset` with its body as target brings it back */
+    bool asleep;                     /* at rest: its rows do not run                                     */
+    char reason[PAL_WIRE_WHY_BYTES]; /* it was stopped, one sentence                                  */
+    uint64_t n_rescue;               /* steps that would have gone wrong without a guard, total         */
+    double rescue_ms;                /* what they took, total                                           */
 } pal_wire_part_state;
 /* a row that was switched off and could be switched on */
 typedef struct pal_wire_off {
@@ -161,7 +161,7 @@ typedef struct pal_wire_status {
     uint32_t n_skipped;             /* cycles not sent to this member because it had no credit, total */
     uint64_t n_late;                /* steps that began late                                          */
     uint64_t n_refused;             /* poses and commands refused by the session                      */
-    char note[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
+    char diag[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
     uint32_t n_active;              /* parts that adapt; 0: not on the wire                     */
     pal_wire_active active[PAL_WIRE_PART_MAX];
     uint32_t n_row_part; /* with n_row_name                                           */
@@ -250,12 +250,12 @@ typedef struct pal_wire_estimate {
     double age_s;   /* steps in which the body was awake since that state                     */
     double ms;      /* of a live step, median of the last second                              */
     double own_ms;  /* processor time that the estimate took                                  */
-    double most_m;  /* largest displacement then                                              */
+    double max_m;   /* largest displacement then                                              */
     double error_m; /* largest error of a displacement, of these parts together:              */
     double discretisation_m, algebraic_m, time_m, model_m;
     double zz_percent;              /* error over solution, in energy                          */
     bool locking;                   /* the estimate is known to be too small                   */
-    char note[PAL_WIRE_TEXT_BYTES]; /* what is not known and why, or ""                        */
+    char diag[PAL_WIRE_TEXT_BYTES]; /* what is not known and why, or ""                        */
     uint32_t n_neighbour;
     pal_wire_neighbour neighbour[PAL_WIRE_NEIGHBOUR_MAX];
 } pal_wire_estimate;

@@ -74,13 +74,13 @@ static const pal_control_field active_fields[] = {
     {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
     {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
     {"of_nodes", U32, true, AT(pal_wire_active, n_all_node), 0, 0, 0, NULL},
-    {"of_springs", U32, true, AT(pal_wire_active, n_all_spring), 0, 0, 0, NULL},
+    {"of_springs", U32, true, AT(pal_wire_active, n_finest_spring), 0, 0, 0, NULL},
     END};
 static const pal_control_field state_fields[] = {
     {"part", U32, true, AT(pal_wire_part_state, part), 0, 0, 0, NULL},
     {"frozen", BOOL, false, AT(pal_wire_part_state, frozen), 0, 0, 0, NULL},
     {"asleep", BOOL, false, AT(pal_wire_part_state, asleep), 0, 0, 0, NULL},
-    {"why", SAID, false, AT(pal_wire_part_state, why), PAL_WIRE_WHY_BYTES, 0, 0, NULL},
+    {"why", SAID, false, AT(pal_wire_part_state, reason), PAL_WIRE_WHY_BYTES, 0, 0, NULL},
     {"rescues", U64, false, AT(pal_wire_part_state, n_rescue), 0, 0, 0, NULL},
     {"rescue_ms", F64, false, AT(pal_wire_part_state, rescue_ms), 0, 0, 0, NULL},
     END};
@@ -106,7 +106,7 @@ static const pal_control_field status_fields[] = {
     {"skipped", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
     {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
     {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
-    {"note", TEXT, false, AT(pal_wire_status, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"note", TEXT, false, AT(pal_wire_status, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
      PAL_WIRE_PART_MAX, active_fields},
     {"row_parts", NUMBERS, false, AT(pal_wire_status, row_part), 0, AT(pal_wire_status, n_row_part), PAL_WIRE_ROW_MAX,
@@ -187,7 +187,7 @@ static const pal_control_field estimate_fields[] = {
     {"age_s", KNOWN, false, AT(pal_wire_estimate, age_s), 0, 0, 0, NULL},
     {"ms", KNOWN, false, AT(pal_wire_estimate, ms), 0, 0, 0, NULL},
     {"own_ms", F64, true, AT(pal_wire_estimate, own_ms), 0, 0, 0, NULL},
-    {"most_m", KNOWN, false, AT(pal_wire_estimate, most_m), 0, 0, 0, NULL},
+    {"most_m", KNOWN, false, AT(pal_wire_estimate, max_m), 0, 0, 0, NULL},
     {"error_m", KNOWN, false, AT(pal_wire_estimate, error_m), 0, 0, 0, NULL},
     {"discretisation_m", KNOWN, false, AT(pal_wire_estimate, discretisation_m), 0, 0, 0, NULL},
     {"algebraic_m", KNOWN, false, AT(pal_wire_estimate, algebraic_m), 0, 0, 0, NULL},
@@ -195,7 +195,7 @@ static const pal_control_field estimate_fields[] = {
     {"model_m", KNOWN, false, AT(pal_wire_estimate, model_m), 0, 0, 0, NULL},
     {"zz_percent", KNOWN, false, AT(pal_wire_estimate, zz_percent), 0, 0, 0, NULL},
     {"locking", BOOL, false, AT(pal_wire_estimate, locking), 0, 0, 0, NULL},
-    {"note", SAID, false, AT(pal_wire_estimate, note), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"note", SAID, false, AT(pal_wire_estimate, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"neighbours", OBJECTS, false, AT(pal_wire_estimate, neighbour), sizeof(pal_wire_neighbour),
      AT(pal_wire_estimate, n_neighbour), PAL_WIRE_NEIGHBOUR_MAX, neighbour_fields},
     END};

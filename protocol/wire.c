@@ -272,10 +272,10 @@ size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h)
     put32(&dst, h->n_patch);
     put_doubles(&dst, h->origin_m, 3);
     put_floats(&dst, h->f_ref_N, 3);
-    put32(&dst, h->has_grip);
-    put_floats(&dst, h->grip_x0_m, 3);
-    put_floats(&dst, h->grip_f0_N, 3);
-    put_floats(&dst, h->grip_k_N_m, 6);
+    put32(&dst, h->has_grasp);
+    put_floats(&dst, h->grasp_x0_m, 3);
+    put_floats(&dst, h->grasp_f0_N, 3);
+    put_floats(&dst, h->grasp_k_N_m, 6);
     put_floats(&dst, &h->grip_b_N_s_m, 1);
     for (uint32_t i = 0; i < h->n_patch; i++) {
         const pal_wire_patch *p = &h->patch[i];
@@ -339,16 +339,16 @@ int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *ou
     if (refusal) return refusal;
     finite &= take_doubles(&bytes, h.origin_m, 3);
     finite &= take_floats(&bytes, h.f_ref_N, 3);
-    h.has_grip = take32(&bytes);
-    finite &= take_floats(&bytes, h.grip_x0_m, 3);
-    finite &= take_floats(&bytes, h.grip_f0_N, 3);
-    finite &= take_floats(&bytes, h.grip_k_N_m, 6);
+    h.has_grasp = take32(&bytes);
+    finite &= take_floats(&bytes, h.grasp_x0_m, 3);
+    finite &= take_floats(&bytes, h.grasp_f0_N, 3);
+    finite &= take_floats(&bytes, h.grasp_k_N_m, 6);
     finite &= take_floats(&bytes, &h.grip_b_N_s_m, 1);
     for (uint32_t i = 0; i < h.n_patch; i++) finite &= take_patch(&bytes, &h.patch[i]);
 
     if (!finite) return PAL_REFUSAL_NAN;
     if (h.flags & ~(uint32_t)PAL_WIRE_HAPTIC_FLAGS) return PAL_REFUSAL_FLAGS;
-    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grip > 1 || h.grip_b_N_s_m < 0) return PAL_REFUSAL_RANGE;
+    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grasp > 1 || h.grip_b_N_s_m < 0) return PAL_REFUSAL_RANGE;
     for (uint32_t i = 0; i < h.n_patch; i++)
         if (!good_patch(&h.patch[i])) return PAL_REFUSAL_RANGE;
     if (h.stamp_us >= STAMP_MAX || h.echo_stamp_us >= STAMP_MAX) return PAL_REFUSAL_RANGE;

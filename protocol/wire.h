@@ -164,10 +164,10 @@ typedef struct pal_wire_haptic {
     uint32_t frame_us; /* usual distance of two models                   */
     uint32_t n_patch;
     double origin_m[3];
-    float f_ref_N[3];  /* force of the simulation on the tool, for display and checks; never rendered */
-    uint32_t has_grip; /* 1: grip_* hold a bilateral spring              */
-    float grip_x0_m[3], grip_f0_N[3];
-    float grip_k_N_m[6]; /* xx xy xz yy yz zz                              */
+    float f_ref_N[3];   /* force of the simulation on the tool, for display and checks; never rendered */
+    uint32_t has_grasp; /* 1: grip_* hold a bilateral spring              */
+    float grasp_x0_m[3], grasp_f0_N[3];
+    float grasp_k_N_m[6]; /* xx xy xz yy yz zz                              */
     float grip_b_N_s_m;
     pal_wire_patch patch[PAL_WIRE_PATCH_MAX];
 } pal_wire_haptic;

@@ -74,7 +74,7 @@ static void net_place(pal_bridge_net *n)
 static void net_asset(void *user, const pal_stored_asset *asset)
 {
     pal_bridge_net *n = user;
-    if (asset->failed) pal_log(PAL_LOG_WARN, "asset", "%s: %s", asset->path, asset->why);
+    if (asset->failed) pal_log(PAL_LOG_WARN, "asset", "%s: %s", asset->path, asset->reason);
     if (asset == n->asset) net_place(n);
 }
 
@@ -126,13 +126,13 @@ static void ws_message(void *user, pal_link *link, const pal_wire_head *head, co
     }
 }
 
-static void ws_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+static void ws_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     (void)link;
     pal_bridge_net *n = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
-    snprintf(n->count.why, sizeof n->count.why, "%d %.100s", code, why);
-    pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, why);
+    snprintf(n->count.reason, sizeof n->count.reason, "%d %.100s", code, reason);
+    pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, reason);
 }
 
 /* models on LCM; a server that counts from the start again after a pause is another session */
@@ -150,9 +150,9 @@ static void lcm_model(void *user, const char *channel, const void *bytes, size_t
     net_model(n, &haptic);
 }
 
-static void lcm_refused(void *user, const char *channel, pal_walk why)
+static void lcm_refused(void *user, const char *channel, pal_walk reason)
 {
-    (void)channel, (void)why;
+    (void)channel, (void)reason;
     ((pal_bridge_net *)user)->count.n_refused++;
 }
 
@@ -300,7 +300,7 @@ static void net_send_status(void *user)
     if (n->n_status++ % 10 == 0) net_send_config(n);
 }
 
-static pal_err net_open_ws(pal_bridge_net *n, pal_note *note)
+static pal_err net_open_ws(pal_bridge_net *n, pal_diagnostic *diag)
 {
     static const pal_link_events events = {ws_state, ws_control, ws_message, NULL};
     n->store = pal_asset_store_create(n->loop, n->o.server, net_asset, n);
@@ -311,20 +311,20 @@ static pal_err net_open_ws(pal_bridge_net *n, pal_note *note)
                                    .tool = n->o.tool,
                                    .events = &events,
                                    .user = n};
-    return pal_link_open(n->loop, &link, note, &n->link);
+    return pal_link_open(n->loop, &link, diag, &n->link);
 }
 
-static pal_err net_open_lcm(pal_bridge_net *n, pal_note *note)
+static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
 {
     static const pal_lcm_events events = {lcm_model, lcm_refused};
     char channel[PAL_LCM_CHANNEL_MAX + 1];
-    PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, note, &n->lcm));
+    PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, diag, &n->lcm));
     net_channel(n, channel, "HMODEL");
     return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
 }
 
 pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,
-                            const pal_bridge_net_options *options, pal_note *note, pal_bridge_net **out)
+                            const pal_bridge_net_options *options, pal_diagnostic *diag, pal_bridge_net **out)
 {
     pal_bridge_net *n = calloc(1, sizeof *n);
     if (!n) return PAL_ERR_MEMORY;
@@ -337,7 +337,7 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     n->placed = bus || options->has_origin;
     if (bus && n->o.tool < 0) n->o.tool = 0;
     if (bus) n->count.tool = n->o.tool;
-    pal_err err = bus ? net_open_lcm(n, note) : net_open_ws(n, note);
+    pal_err err = bus ? net_open_lcm(n, diag) : net_open_ws(n, diag);
     if (!err && (!pal_link_every(loop, POSE_PERIOD_US, net_send_pose, n) ||
                  !pal_link_every(loop, EVENT_PERIOD_US, net_send_events, n) ||
                  !pal_link_every(loop, STATUS_PERIOD_US, net_send_status, n)))

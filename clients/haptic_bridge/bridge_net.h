@@ -1,7 +1,7 @@
 /* The network side of a bridge: poses and forces out at 250 Hz, haptic models in, by websocket or LCM. It sees the
  * servo only through its trios, ring and flags. Thread: [net]. */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_BRIDGE_NET_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_BRIDGE_NET_H
+#ifndef PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
+#define PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
 #include "clients/haptic_bridge/servo_thread.h"
 #include "clients/link/link.h"
 
@@ -23,13 +23,13 @@ typedef struct pal_bridge_net_counts {
     uint64_t n_pose, n_model, n_event, n_refused;
     pal_jitter rtt; /* own clock now - echoed stamp - time held by the server  */
     double seconds_joined;
-    char last_event[96], why[128];
+    char last_event[96], reason[128];
 } pal_bridge_net_counts;
 
 /* borrows loop, servo and thread (may be NULL: no timing). With a websocket and no origin the workspace's centre is put
  * where the tool first touches the organ from `up`. REFUSED: URL; *out is set also then, to be closed */
 pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,
-                            const pal_bridge_net_options *options, pal_note *note, pal_bridge_net **out);
+                            const pal_bridge_net_options *options, pal_diagnostic *diag, pal_bridge_net **out);
 void pal_bridge_net_close(pal_bridge_net *net); /* after the loop is destroyed; NULL is fine */
 pal_bridge_net_counts pal_bridge_net_count(pal_bridge_net *net);
 const pal_servo_view *pal_bridge_net_view(const pal_bridge_net *net); /* newest view */

@@ -4,8 +4,8 @@
  * Units m, m/s, N, N m, s; axes of the device: x to the user, y right, z up; origin in the middle of its workspace.
  * Results of functions: 0 ok, > 0 warning, < 0 error (text by strerror).
  * Thread: probe, open, close, force_enable [load]; read and write [servo]; stop [any], async-safe. */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_H
+#ifndef PAL_HAPTIC_BRIDGE_DEVICE_H
+#define PAL_HAPTIC_BRIDGE_DEVICE_H
 #include <stddef.h>
 #include <stdint.h>
 
@@ -37,9 +37,9 @@ typedef struct pal_dev_state {
 } pal_dev_state;
 
 typedef struct pal_haptic_v1 {
-    uint32_t abi, size;                /* PAL_HAPTIC_ABI, sizeof of this table */
-    const char *name;                  /* "virtual"                              */
-    int (*probe)(char *why, size_t n); /* how many devices are there, or < 0 and the reason in why */
+    uint32_t abi, size;                   /* PAL_HAPTIC_ABI, sizeof of this table */
+    const char *name;                     /* "virtual"                              */
+    int (*probe)(char *reason, size_t n); /* how many devices are there, or < 0 and the reason in why */
     int (*open)(void **handle, const char *id, pal_dev_info *out); /* id: what follows "name:" */
     int (*read)(void *handle, pal_dev_state *state);
     int (*write)(void *handle, const double force_N[3], const double torque_N_m[3], double grip);

@@ -72,8 +72,8 @@ static void virtual_intend(virtual_state *s)
     if (s->script == STILL) return;
     if (!s->touched) {
         /* damping is no touch: the hand halts where it feels something, and has touched when it still does at rest */
-        const bool felt = pal_norm3(s->applied) > TOUCH_FELT_N;
-        if (!felt && s->time_s > s->wait_s)
+        const bool haptic_stiffness = pal_norm3(s->applied) > TOUCH_FELT_N;
+        if (!haptic_stiffness && s->time_s > s->wait_s)
             s->xd[2] = fmax(s->xd[2] - APPROACH_M_S * SUB_STEP_S, -0.9 * s->device->radius_m);
         if (s->n_felt >= TOUCH_TICKS) {
             s->touched = true;
@@ -128,14 +128,14 @@ void pal_virtual_advance(void *handle, double dt_s)
         s->time_s += SUB_STEP_S;
         s->rest_s -= SUB_STEP_S;
     }
-    const bool felt = pal_norm3(s->applied) > TOUCH_FELT_N && pal_norm3(s->v) < TOUCH_REST_M_S;
-    s->n_felt = felt ? s->n_felt + 1 : 0;
+    const bool haptic_stiffness = pal_norm3(s->applied) > TOUCH_FELT_N && pal_norm3(s->v) < TOUCH_REST_M_S;
+    s->n_felt = haptic_stiffness ? s->n_felt + 1 : 0;
     if (!off) pal_copy3(s->command, s->next);
 }
 
-static int virtual_probe(char *why, size_t n)
+static int virtual_probe(char *reason, size_t n)
 {
-    snprintf(why, n, "touch premium omega3 inverse3 falcon");
+    snprintf(reason, n, "touch premium omega3 inverse3 falcon");
     return (int)(sizeof virtual_devices / sizeof virtual_devices[0]);
 }
 

@@ -14,8 +14,8 @@
  *   lag     actuator time constant ms (1)
  *   clock   wall virtual (wall: read goes on to the present; virtual: only pal_virtual_advance moves it)
  *   fail    number of the first read that fails, as a broken cable would; from then on all fail (none) */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
+#ifndef PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
+#define PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #include "clients/haptic_bridge/device.h"
 
 const pal_haptic_v1 *pal_device_virtual(void);

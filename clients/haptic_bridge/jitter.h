@@ -1,7 +1,7 @@
 /* Log2 histogram of times with 32 steps per octave (3 % resolution), for period and lateness of a servo loop.
  * Adding is a few instructions without branches on memory; one thread writes. Reading a copy: any thread. */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_JITTER_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_JITTER_H
+#ifndef PAL_HAPTIC_BRIDGE_JITTER_H
+#define PAL_HAPTIC_BRIDGE_JITTER_H
 #include <stdint.h>
 
 enum { PAL_JITTER_BITS = 5, PAL_JITTER_STEPS = 1 << PAL_JITTER_BITS, PAL_JITTER_BINS = 38 * PAL_JITTER_STEPS };

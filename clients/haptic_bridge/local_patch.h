@@ -8,8 +8,8 @@
  * Where the tangent k1 + 2 k2 d would pass the device's clamp, F goes on with the clamp's slope.
  * Not here: friction, the bilateral grip and the energy gate; they belong to the energy tank.
  * Thread: [servo]; no heap, no locks. */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_LOCAL_PATCH_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_LOCAL_PATCH_H
+#ifndef PAL_HAPTIC_BRIDGE_LOCAL_PATCH_H
+#define PAL_HAPTIC_BRIDGE_LOCAL_PATCH_H
 #include "protocol/wire.h"
 
 #include <stdbool.h>

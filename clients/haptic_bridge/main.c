@@ -60,38 +60,39 @@ static int main_list(void)
 {
     const pal_haptic_v1 *backend;
     for (int i = 0; (backend = pal_device_backend(i)); i++) {
-        char why[256] = "";
-        const int n = backend->probe(why, sizeof why);
-        printf("%s: %s%s\n", backend->name, n < 0 ? "not available: " : "", why);
+        char reason[256] = "";
+        const int n = backend->probe(reason, sizeof reason);
+        printf("%s: %s%s\n", backend->name, n < 0 ? "not available: " : "", reason);
     }
     printf("hdapi, dhd, haply, input, plugin: not in this release\n");
     return 0;
 }
 
 /* "virtual:touch,key=value" and the flags become back end and id */
-static pal_err main_open_device(bridge *b, pal_note *note)
+static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
 {
     const size_t n_name = strcspn(b->device, ":");
     const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
     b->backend = pal_device_find(b->device, n_name);
     if (!b->backend)
-        return pal_note_set(note, PAL_ERR_REFUSED, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "no back end \"%.*s\" (--list-devices)", (int)n_name,
+                                  b->device);
     char id[256];
     const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
                            b->options ? b->options : "");
-    if (n >= (int)sizeof id) return pal_note_set(note, PAL_ERR_REFUSED, "device description is too long");
+    if (n >= (int)sizeof id) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "device description is too long");
     const int error = b->backend->open(&b->handle, id, &b->servo_options.info);
-    if (error < 0) return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", id, b->backend->strerror(NULL, error));
+    if (error < 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", id, b->backend->strerror(NULL, error));
     return PAL_ERR_OK;
 }
 
 /* axes of the device (x to the user, y right, z up) to the world: z to up */
-static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_note *note)
+static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagnostic *diag)
 {
     pal_servo_options *o = &b->servo_options;
     double ex[3], ey[3];
     if (!pal_client_triple(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "--up wants three numbers, not \"%s\"", b->up);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--up wants three numbers, not \"%s\"", b->up);
     const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
     pal_cross3(ey, net->up, other);
     pal_unit3(ey, ey, 1e-9);
@@ -100,7 +101,7 @@ static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_note *
         o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
     net->has_origin = b->origin != NULL;
     if (b->origin && !pal_client_triple(b->origin, o->origin_m))
-        return pal_note_set(note, PAL_ERR_REFUSED, "--origin wants three numbers, not \"%s\"", b->origin);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--origin wants three numbers, not \"%s\"", b->origin);
     return PAL_ERR_OK;
 }
 
@@ -173,15 +174,15 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
         (unsigned long long)v->n_stale);
 }
 
-static pal_err main_start(bridge *b, pal_note *note)
+static pal_err main_start(bridge *b, pal_diagnostic *diag)
 {
     pal_bridge_net_options net = {.server = b->server,
                                   .session = b->session,
                                   .name = b->name,
                                   .tool = strcmp(b->tool, "any") ? atoi(b->tool) : PAL_WIRE_TOOL_ANY};
     pal_servo_options *o = &b->servo_options;
-    PAL_TRY(main_workspace(b, &net, note));
-    PAL_TRY(main_open_device(b, note));
+    PAL_TRY(main_workspace(b, &net, diag));
+    PAL_TRY(main_open_device(b, diag));
     o->backend = b->backend;
     o->device = b->handle;
     o->rate_hz = b->rate_hz;
@@ -193,21 +194,21 @@ static pal_err main_start(bridge *b, pal_note *note)
     PAL_TRY(pal_servo_create(o, &b->servo));
     main_servo = b->servo;
     PAL_TRY(pal_link_loop_create(&b->loop));
-    pal_note refused = {""};
+    pal_diagnostic refused = {""};
     PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
     snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
     if (refused.text[0])
         pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
     net.servo = *o;
-    PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, note, &b->net));
+    PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, diag, &b->net));
     if (b->stdin_stop) PAL_TRY(pal_link_watch(b->loop, STDIN_FILENO, main_stdin, b));
     return pal_link_every(b->loop, 50000, main_watch, b->loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static int main_run(bridge *b)
 {
-    pal_note note = {""};
-    pal_err err = main_start(b, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = main_start(b, &diag);
     if (!err && b->seconds > 0) pal_link_run_for(b->loop, b->seconds);
     if (!err && b->seconds <= 0) pal_link_run(b->loop);
     pal_servo_timing timing = {0};
@@ -223,10 +224,11 @@ static int main_run(bridge *b)
     pal_bridge_net_close(b->net);
     pal_servo_destroy(b->servo);
     if (b->handle) b->backend->close(b->handle);
-    const char *reason = err ? (note.text[0] ? note.text : pal_err_text(err)) : NULL;
+    const char *reason = err ? (diag.text[0] ? diag.text : pal_err_text(err)) : NULL;
     char lost[192];
     if (!err && !counts.joined) {
-        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->server, counts.why[0] ? counts.why : "no answer");
+        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->server,
+                 counts.reason[0] ? counts.reason : "no answer");
         reason = lost;
     }
     if (b->json) main_json(b, &timing, &view, &counts, reason);
@@ -244,12 +246,12 @@ static int main_doctor(bridge *b)
     main_list();
     printf("limits: rtprio %llu%s, memlock %llu kB\n", (unsigned long long)priority.rlim_cur,
            geteuid() == 0 ? " (root)" : "", (unsigned long long)locked.rlim_cur / 1024);
-    pal_note note = {""};
-    pal_err err = main_open_device(b, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = main_open_device(b, &diag);
     pal_dev_state state;
-    if (!err && b->backend->read(b->handle, &state) < 0) err = pal_note_set(&note, PAL_ERR_IO, "no first pose");
+    if (!err && b->backend->read(b->handle, &state) < 0) err = pal_diagnostic_set(&diag, PAL_ERR_IO, "no first pose");
     if (err) {
-        printf("device: %s\n", note.text);
+        printf("device: %s\n", diag.text);
         return 1;
     }
     printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n",
@@ -261,14 +263,14 @@ static int main_doctor(bridge *b)
     o.rotation[0] = o.rotation[4] = o.rotation[8] = 1;
     pal_servo_timing timing = {0};
     err = pal_servo_create(&o, &b->servo);
-    if (!err) err = pal_servo_thread_start(b->servo, &o, &note, &b->thread);
+    if (!err) err = pal_servo_thread_start(b->servo, &o, &diag, &b->thread);
     if (!err) sleep(1);
     pal_servo_thread_stop(b->thread, &timing);
     pal_servo_destroy(b->servo);
     b->backend->close(b->handle);
     if (err) return 1;
     printf("real time: %s%s, memory %s; %llu ticks, %llu missed, lateness p50 %.0f p99.9 %.0f max %.0f us\n",
-           timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : note.text,
+           timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : diag.text,
            timing.rt_flags & PAL_RT_LOCKED ? "locked" : "not locked", (unsigned long long)timing.n_tick,
            (unsigned long long)timing.n_missed, pal_jitter_at_us(&timing.lateness, 0.5),
            pal_jitter_at_us(&timing.lateness, 0.999), (double)timing.lateness.max_ns * 1e-3);

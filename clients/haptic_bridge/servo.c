@@ -1,7 +1,7 @@
 #include "clients/haptic_bridge/servo.h"
 #include "clients/haptic_bridge/local_patch.h"
-#include "server/base/ring.h"
-#include "server/base/trio.h"
+#include "server/base/command_queue.h"
+#include "server/base/triple_buffer.h"
 #include "server/base/vec3.h"
 
 #include <stdatomic.h>
@@ -44,11 +44,11 @@ typedef struct servo_origin {
 struct pal_servo {
     pal_servo_options o;
     double cap_N;
-    pal_trio models, views, origins;
+    pal_triple_buffer models, views, origins;
     servo_model model_slot[3];
     pal_servo_view view_slot[3];
     servo_origin origin_slot[3];
-    pal_ring *events;
+    pal_command_queue *events;
     atomic_bool estop, rearm, stalled;
     _Atomic uint64_t ticks;
     /* the rest belongs to [servo] */
@@ -81,14 +81,14 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     s->o.scale = options->scale > 0 ? options->scale : 1;
     s->o.force_scale = options->force_scale > 0 ? options->force_scale : 1;
     s->cap_N = fmin(options->force_cap_N > 0 ? options->force_cap_N : USER_CAP_N, options->info.peak_N);
-    s->events = pal_ring_create(SERVO_EVENTS, sizeof(pal_servo_event));
+    s->events = pal_command_queue_create(SERVO_EVENTS, sizeof(pal_servo_event));
     if (!s->events) {
         free(s);
         return PAL_ERR_MEMORY;
     }
-    pal_trio_init(&s->models, &s->model_slot[0], &s->model_slot[1], &s->model_slot[2]);
-    pal_trio_init(&s->views, &s->view_slot[0], &s->view_slot[1], &s->view_slot[2]);
-    pal_trio_init(&s->origins, &s->origin_slot[0], &s->origin_slot[1], &s->origin_slot[2]);
+    pal_triple_buffer_init(&s->models, &s->model_slot[0], &s->model_slot[1], &s->model_slot[2]);
+    pal_triple_buffer_init(&s->views, &s->view_slot[0], &s->view_slot[1], &s->view_slot[2]);
+    pal_triple_buffer_init(&s->origins, &s->origin_slot[0], &s->origin_slot[1], &s->origin_slot[2]);
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
@@ -100,33 +100,33 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
 void pal_servo_destroy(pal_servo *servo)
 {
     if (!servo) return;
-    pal_ring_destroy(servo->events);
+    pal_command_queue_destroy(servo->events);
     free(servo);
 }
 
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns)
 {
-    servo_model *slot = pal_trio_slot(&servo->models);
+    servo_model *slot = pal_triple_buffer_slot(&servo->models);
     slot->generation = generation;
     slot->empty = false;
     slot->arrival_ns = arrival_ns;
     slot->haptic = *model;
-    pal_trio_publish(&servo->models);
+    pal_triple_buffer_publish(&servo->models);
 }
 
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation)
 {
-    servo_model *slot = pal_trio_slot(&servo->models);
+    servo_model *slot = pal_triple_buffer_slot(&servo->models);
     slot->generation = generation;
     slot->empty = true;
-    pal_trio_publish(&servo->models);
+    pal_triple_buffer_publish(&servo->models);
 }
 
 void pal_servo_put_origin(pal_servo *servo, const double origin_m[3])
 {
-    servo_origin *slot = pal_trio_slot(&servo->origins);
+    servo_origin *slot = pal_triple_buffer_slot(&servo->origins);
     pal_copy3(slot->m, origin_m);
-    pal_trio_publish(&servo->origins);
+    pal_triple_buffer_publish(&servo->origins);
 }
 
 void pal_servo_estop(pal_servo *servo)
@@ -147,17 +147,17 @@ uint64_t pal_servo_ticks(const pal_servo *servo)
 }
 const pal_servo_view *pal_servo_take_view(pal_servo *servo)
 {
-    return pal_trio_take(&servo->views);
+    return pal_triple_buffer_take(&servo->views);
 }
 bool pal_servo_take_event(pal_servo *servo, pal_servo_event *out)
 {
-    return pal_ring_get(servo->events, out);
+    return pal_command_queue_get(servo->events, out);
 }
 
 static void servo_event(pal_servo *s, pal_servo_event_kind kind, int code, double value, const char *text)
 {
     const pal_servo_event event = {(int16_t)kind, (int16_t)code, (float)value, text};
-    (void)pal_ring_put(s->events, &event);
+    (void)pal_command_queue_put(s->events, &event);
 }
 
 void pal_servo_set_degraded(pal_servo *servo, int level)
@@ -225,7 +225,7 @@ static bool servo_read(pal_servo *s, double dt)
 /* newest model of the newest generation, seq growing; older ones are dropped */
 static void servo_take_model(pal_servo *s)
 {
-    const servo_model *fresh = pal_trio_take(&s->models);
+    const servo_model *fresh = pal_triple_buffer_take(&s->models);
     s->model_changed = false;
     if (!fresh) return;
     const bool other = fresh->generation != s->model.generation;
@@ -423,9 +423,9 @@ static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
     v->model_seq = model ? s->model.haptic.seq : 0;
     v->model_stamp_us = model ? s->model.haptic.stamp_us : 0;
     v->model_age_us = age_us < 4e9 ? (uint32_t)age_us : UINT32_MAX;
-    pal_servo_view *slot = pal_trio_slot(&s->views);
+    pal_servo_view *slot = pal_triple_buffer_slot(&s->views);
     *slot = *v;
-    pal_trio_publish(&s->views);
+    pal_triple_buffer_publish(&s->views);
     atomic_fetch_add(&s->ticks, 1);
 }
 
@@ -445,7 +445,7 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     if (good) {
         s->bad_reads = 0;
         /* the place of the workspace may move only while nothing is felt */
-        const servo_origin *origin = pal_norm3(s->force_prev) < 0.01 ? pal_trio_take(&s->origins) : NULL;
+        const servo_origin *origin = pal_norm3(s->force_prev) < 0.01 ? pal_triple_buffer_take(&s->origins) : NULL;
         if (origin) {
             pal_copy3(s->o.origin_m, origin->m);
             s->has_position = false;

@@ -13,8 +13,8 @@
  * force down; contact stiffness <= device's / (scale force_scale), 300 N/m without real time; walls of 200 N/m at 95 %
  * of the workspace. World: x_w = origin + scale R (x_d - centre), F_d = force_scale R' F_w. While the clutch button is
  * down the world pose stands still and force is faded out. */
-#ifndef PAL_CLIENTS_HAPTIC_BRIDGE_SERVO_H
-#define PAL_CLIENTS_HAPTIC_BRIDGE_SERVO_H
+#ifndef PAL_HAPTIC_BRIDGE_SERVO_H
+#define PAL_HAPTIC_BRIDGE_SERVO_H
 #include "clients/haptic_bridge/device.h"
 #include "protocol/wire.h"
 #include "server/base/err.h"

@@ -1,6 +1,6 @@
 #include "clients/haptic_bridge/servo_thread.h"
 #include "server/base/clock.h"
-#include "server/base/trio.h"
+#include "server/base/triple_buffer.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -28,7 +28,7 @@ struct pal_servo_thread {
     atomic_uint n_watchdog;
     atomic_int rt_flags;
     uint64_t period_ns;
-    pal_trio timings;
+    pal_triple_buffer timings;
     pal_servo_timing slot[3], total;
     /* lateness of each of the last seconds, for the judgement */
     pal_jitter second[JUDGE_SECONDS];
@@ -61,9 +61,9 @@ static void thread_judge(pal_servo_thread *t)
     pal_servo_set_degraded(t->servo, level);
     t->total.rt_flags = atomic_load(&t->rt_flags) | (level == 1 ? PAL_RT_LIMITED : 0) | (level == 2 ? PAL_RT_OFF : 0);
     t->total.n_watchdog = atomic_load(&t->n_watchdog);
-    pal_servo_timing *slot = pal_trio_slot(&t->timings);
+    pal_servo_timing *slot = pal_triple_buffer_slot(&t->timings);
     *slot = t->total;
-    pal_trio_publish(&t->timings);
+    pal_triple_buffer_publish(&t->timings);
     t->now_second = (t->now_second + 1) % JUDGE_SECONDS;
     memset(&t->second[t->now_second], 0, sizeof t->second[0]);
     t->second_missed[t->now_second] = 0;
@@ -138,7 +138,7 @@ static pal_err thread_make(pthread_t *thread, void *(*run)(void *), void *user, 
     return failed ? PAL_ERR_MEMORY : PAL_ERR_OK;
 }
 
-pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *options, pal_note *note,
+pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *options, pal_diagnostic *diag,
                                pal_servo_thread **out)
 {
     pal_servo_thread *t = calloc(1, sizeof *t);
@@ -146,7 +146,7 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     t->servo = servo;
     t->options = *options;
     t->period_ns = (uint64_t)(1e9 / options->rate_hz);
-    pal_trio_init(&t->timings, &t->slot[0], &t->slot[1], &t->slot[2]);
+    pal_triple_buffer_init(&t->timings, &t->slot[0], &t->slot[1], &t->slot[2]);
     bool fifo = false, fifo_watch = false;
     const bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
     options->backend->force_enable(options->device, !options->pose_only);
@@ -165,9 +165,9 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     CPU_ZERO(&last);
     CPU_SET((size_t)(sysconf(_SC_NPROCESSORS_ONLN) - 1), &last);
     const bool pinned = fifo && pthread_setaffinity_np(t->loop, sizeof last, &last) == 0;
-    pal_note_set(note, PAL_ERR_OK, "%s%s%s", fifo ? "" : "no SCHED_FIFO (needs CAP_SYS_NICE or an rtprio limit) ",
-                 locked ? "" : "memory not locked (needs a memlock limit) ",
-                 fifo && !pinned ? "not pinned to a processor" : "");
+    pal_diagnostic_set(diag, PAL_ERR_OK, "%s%s%s", fifo ? "" : "no SCHED_FIFO (needs CAP_SYS_NICE or an rtprio limit) ",
+                       locked ? "" : "memory not locked (needs a memlock limit) ",
+                       fifo && !pinned ? "not pinned to a processor" : "");
     if (fifo) atomic_fetch_or(&t->rt_flags, PAL_RT_FIFO);
     *out = t;
     return PAL_ERR_OK;
@@ -187,5 +187,5 @@ void pal_servo_thread_stop(pal_servo_thread *thread, pal_servo_timing *timing)
 
 const pal_servo_timing *pal_servo_thread_timing(pal_servo_thread *thread)
 {
-    return pal_trio_take(&thread->timings);
+    return pal_triple_buffer_take(&thread->timings);
 }

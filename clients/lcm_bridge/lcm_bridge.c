@@ -19,7 +19,7 @@
 typedef struct bridge_tool {
     pal_lcm_bridge *bridge;
     pal_link *link; /* NULL: no member */
-    int index, held;
+    int index, fixed;
     double tokens;
     uint32_t seq;
     uint64_t last_ns;
@@ -84,8 +84,8 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
         epoch[i] = (int32_t)b->topology.part[i].epoch;
         asset[i] = b->topology.part[i].asset;
     }
-    char note[PAL_WIRE_TEXT_BYTES], channel[PAL_LCM_CHANNEL_MAX + 1];
-    memcpy(note, s->note, sizeof note);
+    char diag[PAL_WIRE_TEXT_BYTES], channel[PAL_LCM_CHANNEL_MAX + 1];
+    memcpy(diag, s->diag, sizeof diag);
     const palpate_session_status_t status = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                              .seq = (int32_t)++b->status_seq,
                                              .version = PAL_LCM_VERSION,
@@ -110,7 +110,7 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
                                              .n_part = (int8_t)n_part,
                                              .epoch = epoch,
                                              .asset = asset,
-                                             .note = note};
+                                             .diag = diag};
     pal_lcm_channel(channel, b->session, "STATUS", -1);
     b->status_ns = pal_clock_ns();
     if (!pal_lcm_link_publish(b->lcm, channel, palpate_session_status_t_get_type_info(), &status)) b->count.n_status++;
@@ -163,12 +163,12 @@ static void watcher_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_STATUS) bridge_status(b, &c->status);
 }
 
-static void watcher_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+static void watcher_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     (void)link;
     pal_lcm_bridge *b = user;
     if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) {
-        pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, why);
+        pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, reason);
         for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
     }
     if (state != PAL_LINK_ENDED) return;
@@ -197,19 +197,19 @@ static void tool_control(void *user, pal_link *link, const pal_control *c)
 {
     bridge_tool *tool = user;
     const pal_wire_hello *hello = pal_link_hello(link);
-    if (c->type == PAL_CONTROL_HELLO) tool->held = c->hello.you_tool;
+    if (c->type == PAL_CONTROL_HELLO) tool->fixed = c->hello.you_tool;
     if (c->type == PAL_CONTROL_MEMBERS && hello)
         for (uint32_t i = 0; i < c->members.n_member; i++)
-            if (c->members.member[i].id == hello->you_id) tool->held = c->members.member[i].tool;
+            if (c->members.member[i].id == hello->you_id) tool->fixed = c->members.member[i].tool;
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->problem.text);
 }
 
-static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     (void)link;
     bridge_tool *tool = user;
-    if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) tool->held = PAL_WIRE_TOOL_NONE;
-    if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, why);
+    if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) tool->fixed = PAL_WIRE_TOOL_NONE;
+    if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, reason);
 }
 
 static const pal_link_events tool_events = {tool_state, tool_control, tool_message, NULL};
@@ -224,7 +224,7 @@ static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
                                       .tool = tool->index,
                                       .events = &tool_events,
                                       .user = tool};
-    tool->held = PAL_WIRE_TOOL_NONE;
+    tool->fixed = PAL_WIRE_TOOL_NONE;
     tool->seq = 0;
     if (pal_link_open(b->loop, &options, NULL, &tool->link)) tool->link = NULL;
     b->count.n_tool += tool->link != NULL;
@@ -252,7 +252,7 @@ static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t
     tool->tokens = tool->tokens + POSE_RATE_HZ * 1e-9 * (double)silence;
     if (tool->tokens > POSE_BURST) tool->tokens = POSE_BURST;
     if (!tool->link) tool_open(b, tool);
-    if (!tool->link || tool->held != index || tool->tokens < 1) return;
+    if (!tool->link || tool->fixed != index || tool->tokens < 1) return;
     tool->tokens -= 1;
     pal_link_send_pose(tool->link, &pose);
 }
@@ -268,11 +268,11 @@ static void bridge_lcm_message(void *user, const char *channel, const void *byte
         b->count.n_state_refused++;
 }
 
-static void bridge_lcm_refused(void *user, const char *channel, pal_walk why)
+static void bridge_lcm_refused(void *user, const char *channel, pal_walk reason)
 {
     pal_lcm_bridge *b = user;
     b->count.n_state_refused++;
-    pal_log(PAL_LOG_DEBUG, "lcm_refused", "%.63s: %s", channel, pal_walk_text(why));
+    pal_log(PAL_LOG_DEBUG, "lcm_refused", "%.63s: %s", channel, pal_walk_text(reason));
 }
 
 /* four times a second: tools nobody moves are given back or asked for again, parts at rest repeated, status kept alive
@@ -288,7 +288,7 @@ static void bridge_tidy(void *user)
             pal_link_close(tool->link);
             tool->link = NULL;
             b->count.n_tool--;
-        } else if (pal_link_now(tool->link) == PAL_LINK_JOINED && tool->held != i) {
+        } else if (pal_link_now(tool->link) == PAL_LINK_JOINED && tool->fixed != i) {
             pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE, .tool = i});
         }
     }
@@ -298,7 +298,7 @@ static void bridge_tidy(void *user)
         bridge_status(b, NULL);
 }
 
-pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_note *note,
+pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_diagnostic *diag,
                             pal_lcm_bridge **out)
 {
     static const pal_link_events watcher_events = {watcher_state, watcher_control, watcher_message, NULL};
@@ -316,9 +316,9 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
                                    .tool = PAL_WIRE_TOOL_NONE,
                                    .events = &watcher_events,
                                    .user = b};
-    pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, note, &b->lcm);
+    pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, diag, &b->lcm);
     if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/TOOL/.*", palpate_tool_state_t_get_type_info());
-    if (!err) err = pal_link_open(loop, &link, note, &b->watcher);
+    if (!err) err = pal_link_open(loop, &link, diag, &b->watcher);
     if (!err && !pal_link_every(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
     if (err) {
         pal_link_close(b->watcher);

@@ -9,8 +9,8 @@
  * TOOL/<n>      tool_state_t: length walk, then version, range and finite numbers, seq growing Thread: [net].
  * A part that adapts is shown on LCM with the triangles of its asset: PATCH needs every one before it, datagrams may be
  * lost and listeners come late. */
-#ifndef PAL_CLIENTS_LCM_BRIDGE_LCM_BRIDGE_H
-#define PAL_CLIENTS_LCM_BRIDGE_LCM_BRIDGE_H
+#ifndef PAL_LCM_BRIDGE_LCM_BRIDGE_H
+#define PAL_LCM_BRIDGE_LCM_BRIDGE_H
 #include "clients/link/lcm_link.h"
 
 typedef struct pal_lcm_bridge pal_lcm_bridge;
@@ -28,7 +28,7 @@ typedef struct pal_lcm_bridge_counts {
 } pal_lcm_bridge_counts;
 
 /* REFUSED: a URL. Borrows loop. */
-pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_note *note,
+pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_diagnostic *diag,
                             pal_lcm_bridge **out);
 void pal_lcm_bridge_close(pal_lcm_bridge *bridge); /* after the loop is destroyed; NULL is fine */
 pal_lcm_bridge_counts pal_lcm_bridge_count(const pal_lcm_bridge *bridge);

@@ -49,14 +49,14 @@ int main(int argc, char **argv)
     pal_log_set_level(quiet || json ? PAL_LOG_WARN : PAL_LOG_INFO);
     signal(SIGINT, main_on_signal);
     signal(SIGTERM, main_on_signal);
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_link_loop *loop = NULL;
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
-    if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &note, &bridge);
+    if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &diag, &bridge);
     if (!err && !pal_link_every(loop, 50000, main_watch, loop)) err = PAL_ERR_MEMORY;
     if (err) {
-        fprintf(stderr, "palpate-lcm: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
     } else if (seconds > 0) {
         pal_link_run_for(loop, seconds);
     } else {

@@ -43,10 +43,10 @@ void pal_asset_store_destroy(pal_asset_store *store)
     free(store);
 }
 
-static void store_fail(store_entry *entry, const char *why)
+static void store_fail(store_entry *entry, const char *reason)
 {
     entry->shown.failed = true;
-    strncpy(entry->shown.why, why, sizeof entry->shown.why - 1);
+    strncpy(entry->shown.reason, reason, sizeof entry->shown.reason - 1);
 }
 
 /* the name must be the hash of the bytes, then the bytes must be an asset */
@@ -70,14 +70,14 @@ static void store_take(store_entry *entry, const uint8_t *bytes, size_t n_byte)
     entry->shown.ready = true;
 }
 
-static void store_got(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *why)
+static void store_got(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason)
 {
     store_entry *entry = user;
     entry->asked = false;
     if (status == 200)
         store_take(entry, bytes, n_byte);
     else
-        store_fail(entry, why && why[0] ? why : "server does not have it");
+        store_fail(entry, reason && reason[0] ? reason : "server does not have it");
     entry->store->changed(entry->store->user, &entry->shown);
 }
 

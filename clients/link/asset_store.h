@@ -1,7 +1,7 @@
 /* Assets of a server: fetched once per path, name checked against the content's hash, decoded and kept.
  * Also finds the place where a client first touches an organ. Thread: [net]. */
-#ifndef PAL_CLIENTS_LINK_ASSET_STORE_H
-#define PAL_CLIENTS_LINK_ASSET_STORE_H
+#ifndef PAL_LINK_ASSET_STORE_H
+#define PAL_LINK_ASSET_STORE_H
 #include "clients/link/link.h"
 #include "protocol/frame_codec.h"
 
@@ -11,7 +11,7 @@ typedef struct pal_asset_store pal_asset_store;
 typedef struct pal_stored_asset {
     char path[PAL_WIRE_NAME_BYTES];
     bool ready, failed;
-    char why[128];    /* of a failure: one sentence                       */
+    char reason[128]; /* of a failure: one sentence                       */
     size_t n_byte;    /* as sent                                          */
     pal_asset *asset; /* when ready                                       */
     pal_frame_decoder *decoder;

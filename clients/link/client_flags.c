@@ -21,9 +21,9 @@ static void flags_help(const pal_client_table *table)
     printf("  %-26s %s\n", "--help", "this text");
 }
 
-static int flags_refuse(const pal_client_table *table, const char *what, const char *why)
+static int flags_refuse(const pal_client_table *table, const char *what, const char *reason)
 {
-    fprintf(stderr, "%s: %s: %s (--help lists the flags)\n", table->program, what, why);
+    fprintf(stderr, "%s: %s: %s (--help lists the flags)\n", table->program, what, reason);
     return 2;
 }
 
@@ -40,11 +40,11 @@ static int flags_set(const pal_client_table *table, const pal_client_flag *flag,
         *(const char **)flag->out = text;
         return -1;
     }
-    char *end, why[96];
+    char *end, reason[96];
     const double value = strtod(text, &end);
     if (end == text || *end || !(value >= flag->low && value <= flag->high)) {
-        snprintf(why, sizeof why, "wants a number of %g to %g, not \"%.40s\"", flag->low, flag->high, text);
-        return flags_refuse(table, flag->name, why);
+        snprintf(reason, sizeof reason, "wants a number of %g to %g, not \"%.40s\"", flag->low, flag->high, text);
+        return flags_refuse(table, flag->name, reason);
     }
     *(double *)flag->out = value;
     return -1;

@@ -1,8 +1,8 @@
 /* Flags of the client programs: a table says what there is, the rest is refused by name.
  * `--name value` and `--name=value` are the same; a switch takes no value; an option with `bare` may stand alone and
  * then means that text. Every program has --help; exit codes are 0 ok, 1 refused or failed, 2 usage. Thread: [load]. */
-#ifndef PAL_CLIENTS_LINK_CLIENT_FLAGS_H
-#define PAL_CLIENTS_LINK_CLIENT_FLAGS_H
+#ifndef PAL_LINK_CLIENT_FLAGS_H
+#define PAL_LINK_CLIENT_FLAGS_H
 #include <stdbool.h>
 
 typedef enum pal_client_flag_kind { PAL_CLIENT_SWITCH, PAL_CLIENT_TEXT, PAL_CLIENT_NUMBER } pal_client_flag_kind;

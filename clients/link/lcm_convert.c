@@ -79,7 +79,7 @@ pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out
     memset(&m, 0, sizeof m);
     if (palpate_haptic_model_t_decode(bytes, 0, (int)n_byte, &m) < 0) return PAL_ERR_REFUSED;
     const bool good = m.version == PAL_LCM_VERSION && m.tool >= 0 && m.tool < PAL_WIRE_TOOL_MAX && m.npatch >= 0 &&
-                      m.npatch <= PAL_WIRE_PATCH_MAX && (m.has_grip == 0 || m.has_grip == 1) &&
+                      m.npatch <= PAL_WIRE_PATCH_MAX && (m.has_grasp == 0 || m.has_grasp == 1) &&
                       (m.flags & ~PAL_WIRE_HAPTIC_FLAGS) == 0;
     pal_wire_haptic h = {.tool = (uint16_t)m.tool,
                          .seq = (uint32_t)m.seq,
@@ -90,13 +90,13 @@ pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out
                          .hold_us = (uint32_t)m.hold_us,
                          .frame_us = (uint32_t)m.frame_us,
                          .n_patch = good ? (uint32_t)m.npatch : 0,
-                         .has_grip = (uint32_t)m.has_grip,
+                         .has_grasp = (uint32_t)m.has_grasp,
                          .grip_b_N_s_m = m.grip_b};
     COPY(h.origin_m, m.origin);
     COPY(h.f_ref_N, m.f_ref);
-    COPY(h.grip_x0_m, m.grip_x0);
-    COPY(h.grip_f0_N, m.grip_f0);
-    COPY(h.grip_k_N_m, m.grip_k);
+    COPY(h.grasp_x0_m, m.grip_x0);
+    COPY(h.grasp_f0_N, m.grip_f0);
+    COPY(h.grasp_k_N_m, m.grip_k);
     for (uint32_t i = 0; i < h.n_patch; i++) convert_patch(&m.patch[i], &h.patch[i]);
     palpate_haptic_model_t_decode_cleanup(&m);
     /* the protocol's own decoder has the last word on ranges */
@@ -119,15 +119,15 @@ void pal_lcm_from_haptic(const pal_wire_haptic *h, palpate_haptic_model_t *out, 
                                     .hold_us = (int32_t)h->hold_us,
                                     .frame_us = (int32_t)h->frame_us,
                                     .flags = (int32_t)h->flags,
-                                    .has_grip = (int8_t)h->has_grip,
+                                    .has_grasp = (int8_t)h->has_grasp,
                                     .grip_b = h->grip_b_N_s_m,
                                     .npatch = (int8_t)n,
                                     .patch = patch};
     COPY(out->origin, h->origin_m);
     COPY(out->f_ref, h->f_ref_N);
-    COPY(out->grip_x0, h->grip_x0_m);
-    COPY(out->grip_f0, h->grip_f0_N);
-    COPY(out->grip_k, h->grip_k_N_m);
+    COPY(out->grip_x0, h->grasp_x0_m);
+    COPY(out->grip_f0, h->grasp_f0_N);
+    COPY(out->grip_k, h->grasp_k_N_m);
     for (uint32_t i = 0; i < n; i++) {
         const pal_wire_patch *w = &h->patch[i];
         patch[i] = (palpate_contact_patch_t){.id = (int16_t)w->id,

@@ -1,7 +1,7 @@
 /* palpate.v1 structs to LCM messages of haptics.md 5 and back. The messages decoded here have passed the length walk;
  * what a message may not say (version, tool, counts, ranges) is refused here. Thread: any. */
-#ifndef PAL_CLIENTS_LINK_LCM_CONVERT_H
-#define PAL_CLIENTS_LINK_LCM_CONVERT_H
+#ifndef PAL_LINK_LCM_CONVERT_H
+#define PAL_LINK_LCM_CONVERT_H
 #include "palpate_haptic_model_t.h"
 #include "palpate_tool_state_t.h"
 #include "protocol/wire.h"

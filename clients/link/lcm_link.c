@@ -119,7 +119,7 @@ static void lcm_retry(void *user)
 }
 
 /* lcm:// is udpm://, with the default group when none is named, and a large receive buffer unless one is */
-static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, pal_note *note)
+static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, pal_diagnostic *diag)
 {
     const char *rest = NULL;
     *memory = !strcmp(url, "memq://");
@@ -129,28 +129,28 @@ static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, p
         strcpy(out, url);
         return PAL_ERR_OK;
     }
-    if (!rest) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not an lcm://, udpm:// or memq:// address", url);
+    if (!rest) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not an lcm://, udpm:// or memq:// address", url);
     const size_t n_host = strcspn(rest, "?");
     char host[128];
-    if (n_host >= sizeof host) return pal_note_set(note, PAL_ERR_REFUSED, "%s: too long", url);
+    if (n_host >= sizeof host) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: too long", url);
     memcpy(host, rest, n_host);
     host[n_host] = 0;
     const char *options = rest[n_host] ? rest + n_host + 1 : "ttl=0";
     char buffer[40] = "";
     if (!strstr(options, "recv_buf_size")) snprintf(buffer, sizeof buffer, "&recv_buf_size=%d", LCM_BUFFER_WANTED);
     const int n = snprintf(out, LCM_URL_BYTES, "udpm://%s?%s%s", n_host ? host : LCM_DEFAULT_GROUP, options, buffer);
-    return n < LCM_URL_BYTES ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_REFUSED, "%s: too long", url);
+    return n < LCM_URL_BYTES ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: too long", url);
 }
 
 pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
-                          pal_note *note, pal_lcm_link **out)
+                          pal_diagnostic *diag, pal_lcm_link **out)
 {
     pal_lcm_link *link = calloc(1, sizeof *link);
     if (!link) return PAL_ERR_MEMORY;
     link->buffer = malloc(PAL_LCM_DATAGRAM_MAX + 512);
     link->events = events;
     link->user = user;
-    pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, note) : PAL_ERR_MEMORY;
+    pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, diag) : PAL_ERR_MEMORY;
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;
     if (!err && link->loop && !pal_link_every(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link)) err = PAL_ERR_MEMORY;

@@ -3,8 +3,8 @@
  * LCM is a bus for one trusted LAN; a forged fragment can crash any of its subscribers, which is why it lives only in
  * palpate-lcm and palpate-bridge. Without a multicast route one warning names the command that adds it and the bus is
  * tried again every 5 s, everything else runs. Thread: [net]. */
-#ifndef PAL_CLIENTS_LINK_LCM_LINK_H
-#define PAL_CLIENTS_LINK_LCM_LINK_H
+#ifndef PAL_LINK_LCM_LINK_H
+#define PAL_LINK_LCM_LINK_H
 #include "clients/link/link.h"
 #include "lcmtypes/lcm_walk.h"
 #include "protocol/wire.h"
@@ -22,13 +22,13 @@ typedef struct pal_lcm_events {
     /* a message of a subscribed channel that passed the length walk; borrowed for the call */
     void (*message)(void *user, const char *channel, const void *bytes, size_t n_byte);
     /* a message that did not, or whose channel is not plain text; may be NULL */
-    void (*refused)(void *user, const char *channel, pal_walk why);
+    void (*refused)(void *user, const char *channel, pal_walk reason);
 } pal_lcm_events;
 
 /* url: "udpm://239.255.76.67:7667?ttl=0", "memq://", or "lcm://..." for udpm. REFUSED: not such a URL. A bus that
  * cannot be opened now is not an error (see above). Copies url, borrows loop and events. */
 pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
-                          pal_note *note, pal_lcm_link **out);
+                          pal_diagnostic *diag, pal_lcm_link **out);
 void pal_lcm_link_close(pal_lcm_link *link); /* after the loop is destroyed; NULL is fine */
 bool pal_lcm_link_up(const pal_lcm_link *link);
 

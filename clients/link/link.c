@@ -24,7 +24,7 @@ struct pal_link {
     pal_wire_role role;
     int tool;
     bool patches;
-    bool once, closing, up, held, pause_reading;
+    bool once, closing, up, fixed, pause_reading;
     double read_bytes_s, read_budget;
     uint64_t read_ns;
     const pal_link_events *events;
@@ -49,11 +49,11 @@ struct pal_link {
 
 static void link_connect(pal_link *link);
 
-static void link_tell(pal_link *link, pal_link_state state, const char *why)
+static void link_tell(pal_link *link, pal_link_state state, const char *reason)
 {
     link->state = state;
     if (!link->closing && link->events->state)
-        link->events->state(link->user, link, state, link->close_code, why ? why : "");
+        link->events->state(link->user, link, state, link->close_code, reason ? reason : "");
 }
 
 static void link_want_write(pal_link *link)
@@ -70,7 +70,7 @@ static void link_resume_fired(lws_sorted_usec_list_t *sul)
 {
     pal_link *link = lws_container_of(sul, pal_link, resume);
     link->pause_reading = false;
-    if (link->wsi && link->up && !link->held) lws_rx_flow_control(link->wsi, 1);
+    if (link->wsi && link->up && !link->fixed) lws_rx_flow_control(link->wsi, 1);
 }
 
 static void link_free(pal_link *link)
@@ -90,7 +90,7 @@ static bool link_may_return(int code)
 }
 
 /* the connection is gone: try again later, or end */
-static void link_lost(pal_link *link, const char *why)
+static void link_lost(pal_link *link, const char *reason)
 {
     link->wsi = NULL;
     link->up = link->has_pose = link->has_ack = false;
@@ -103,12 +103,12 @@ static void link_lost(pal_link *link, const char *why)
         return;
     }
     if (link->once || !link_may_return(link->close_code)) {
-        link_tell(link, PAL_LINK_ENDED, why);
+        link_tell(link, PAL_LINK_ENDED, reason);
         return;
     }
     lws_sul_schedule(link->loop->context, 0, &link->retry, link_retry_fired, (lws_usec_t)link->pause_ms * 1000);
     link->pause_ms = link->pause_ms * 2 < LINK_PAUSE_MOST_MS ? link->pause_ms * 2 : LINK_PAUSE_MOST_MS;
-    link_tell(link, PAL_LINK_LOST, why);
+    link_tell(link, PAL_LINK_LOST, reason);
 }
 
 static void link_connect(pal_link *link)
@@ -131,11 +131,11 @@ static void link_connect(pal_link *link)
     lws_client_connect_via_info(&info);
 }
 
-pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_note *note, pal_link **out)
+pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_diagnostic *diag, pal_link **out)
 {
     pal_link *link = calloc(1, sizeof *link);
     if (!link) return PAL_ERR_MEMORY;
-    pal_err err = link_address_parse(options->url, &link->address, note);
+    pal_err err = link_address_parse(options->url, &link->address, diag);
     if (err) {
         free(link);
         return err;
@@ -247,7 +247,7 @@ pal_err pal_link_send_control(pal_link *link, const pal_control *c)
 
 void pal_link_hold(pal_link *link, bool hold)
 {
-    link->held = hold;
+    link->fixed = hold;
     if (link->wsi && link->up && !link->pause_reading) lws_rx_flow_control(link->wsi, !hold);
 }
 
@@ -382,7 +382,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     join.join.patches = link->patches;
     pal_link_send_control(link, &join);
     link_tell(link, PAL_LINK_OPEN, "");
-    if (link->held) lws_rx_flow_control(wsi, 0);
+    if (link->fixed) lws_rx_flow_control(wsi, 0);
 }
 
 int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)

@@ -14,8 +14,8 @@
  *                   &link);
  *     pal_link_run(loop);           // until pal_link_stop
  *     pal_link_loop_destroy(loop);  // closes and frees links, timers, watches */
-#ifndef PAL_CLIENTS_LINK_LINK_H
-#define PAL_CLIENTS_LINK_LINK_H
+#ifndef PAL_LINK_LINK_H
+#define PAL_LINK_LINK_H
 #include "protocol/control.h"
 #include "protocol/wire.h"
 #include "server/base/err.h"
@@ -46,7 +46,7 @@ typedef enum pal_link_state {
 /* all called [net]; any of them may be NULL; bytes and messages are borrowed for the call */
 typedef struct pal_link_events {
     /* why: sentence for people; code: websocket close code, 0 when there is none */
-    void (*state)(void *user, pal_link *link, pal_link_state state, int code, const char *why);
+    void (*state)(void *user, pal_link *link, pal_link_state state, int code, const char *reason);
     /* every text message of the server, well-formed; hello too, before state JOINED */
     void (*control)(void *user, pal_link *link, const pal_control *c);
     /* every whole binary message with a known head of the server's kinds; the body is unchecked */
@@ -68,7 +68,7 @@ typedef struct pal_link_options {
 } pal_link_options;
 
 /* begins to connect; REFUSED: URL is not understood. [net] or before pal_link_run */
-pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_note *note, pal_link **out);
+pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_diagnostic *diag, pal_link **out);
 /* says goodbye (1000) and frees the link, no further events. [net] or after pal_link_run; NULL is fine */
 void pal_link_close(pal_link *link);
 
@@ -93,9 +93,9 @@ pal_link_counts pal_link_count(const pal_link *link);
 
 /* GET of a path on the server that url names: done is called once, status 200 with the whole body (borrowed), else the
  * status or 0 and the reason in why. REFUSED: URL; the body may have up to most bytes. [net] or before pal_link_run */
-typedef void (*pal_link_got)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *why);
+typedef void (*pal_link_got)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason);
 pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_got done, void *user,
-                     pal_note *note);
+                     pal_diagnostic *diag);
 
 /* calls fn every period_us after the call before has returned, so never more often than asked; ends with the loop or
  * pal_link_never. NULL: out of memory */

@@ -16,13 +16,13 @@ struct link_get {
 };
 
 /* tells the result once and frees; the connection may live a little longer without its object */
-static void link_get_end(link_get *get, int status, const char *why)
+static void link_get_end(link_get *get, int status, const char *reason)
 {
     link_get **place = &get->loop->gets;
     while (*place && *place != get) place = &(*place)->next;
     if (*place) *place = get->next;
     if (get->wsi) lws_set_opaque_user_data(get->wsi, NULL);
-    get->done(get->user, status, status == 200 ? get->bytes : NULL, status == 200 ? get->n_byte : 0, why);
+    get->done(get->user, status, status == 200 ? get->bytes : NULL, status == 200 ? get->n_byte : 0, reason);
     free(get->bytes);
     free(get);
 }
@@ -84,10 +84,10 @@ int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
 }
 
 pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_got done, void *user,
-                     pal_note *note)
+                     pal_diagnostic *diag)
 {
     link_address address;
-    PAL_TRY(link_address_parse(url, &address, note));
+    PAL_TRY(link_address_parse(url, &address, diag));
     link_get *get = calloc(1, sizeof *get);
     if (!get) return PAL_ERR_MEMORY;
     get->loop = loop;

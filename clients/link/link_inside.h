@@ -1,6 +1,6 @@
 /* What link.c, link_loop.c and link_get.c share; nobody else includes it. Thread: [net]. */
-#ifndef PAL_CLIENTS_LINK_LINK_INSIDE_H
-#define PAL_CLIENTS_LINK_LINK_INSIDE_H
+#ifndef PAL_LINK_LINK_INSIDE_H
+#define PAL_LINK_LINK_INSIDE_H
 #include "clients/link/link.h"
 
 #include <libwebsockets.h>
@@ -37,7 +37,7 @@ typedef struct link_address {
     char host[LINK_HOST_BYTES], path[LINK_PATH_BYTES];
     int port;
 } link_address;
-pal_err link_address_parse(const char *url, link_address *out, pal_note *note);
+pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);
 
 /* names of the local protocols; a connection's object is its opaque user data */
 #define LINK_LOCAL_GET   "pal-get"

@@ -182,31 +182,31 @@ pal_err pal_link_watch(pal_link_loop *loop, int fd, void (*fn)(void *user), void
     return PAL_ERR_OK;
 }
 
-pal_err link_address_parse(const char *url, link_address *out, pal_note *note)
+pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag)
 {
     const char *host = NULL;
     if (!strncmp(url, "ws://", 5)) host = url + 5;
     if (!strncmp(url, "http://", 7)) host = url + 7;
-    if (!host) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a ws:// or http:// address", url);
-    const size_t n_all = strcspn(host, "/"), n_path = strlen(host + n_all);
+    if (!host) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a ws:// or http:// address", url);
+    const size_t n_finest = strcspn(host, "/"), n_path = strlen(host + n_finest);
     const char *colon = NULL;
     const bool bracket = host[0] == '[';
-    const char *close = bracket ? memchr(host, ']', n_all) : NULL;
+    const char *close = bracket ? memchr(host, ']', n_finest) : NULL;
     const size_t after = close ? (size_t)(close - host) : 0;
-    colon = memchr(host + after, ':', n_all - after);
-    const size_t n_host = close ? after - 1 : (colon ? (size_t)(colon - host) : n_all);
+    colon = memchr(host + after, ':', n_finest - after);
+    const size_t n_host = close ? after - 1 : (colon ? (size_t)(colon - host) : n_finest);
     if (n_host == 0 || n_host >= sizeof out->host || n_path >= sizeof out->path || (bracket && !close))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: host or path is empty or too long", url);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: host or path is empty or too long", url);
     long port = 80;
     if (colon) {
         char *end;
         port = strtol(colon + 1, &end, 10);
-        if (end != host + n_all || port < 1 || port > 65535)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: port is not a number of 1 to 65535", url);
+        if (end != host + n_finest || port < 1 || port > 65535)
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: port is not a number of 1 to 65535", url);
     }
     memcpy(out->host, host + bracket, n_host);
     out->host[n_host] = 0;
-    memcpy(out->path, n_path > 1 ? host + n_all : "/ws", n_path > 1 ? n_path + 1 : 4);
+    memcpy(out->path, n_path > 1 ? host + n_finest : "/ws", n_path > 1 ? n_path + 1 : 4);
     out->port = (int)port;
     return PAL_ERR_OK;
 }

@@ -1,7 +1,7 @@
 /* A client's table of triangles of a part that adapts: the asset's, brought on by every PATCH. Patches may come before
  * the asset does. Thread: [net]. */
-#ifndef PAL_CLIENTS_LINK_PATCH_TABLE_H
-#define PAL_CLIENTS_LINK_PATCH_TABLE_H
+#ifndef PAL_LINK_PATCH_TABLE_H
+#define PAL_LINK_PATCH_TABLE_H
 #include "protocol/asset.h"
 #include "protocol/patch_codec.h"
 #include "server/base/err.h"

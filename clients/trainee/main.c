@@ -248,7 +248,7 @@ static const char *main_verdict(const totals *sum, int n_client, const char *fie
 
 static int main_run(crowd *c, const pal_trainee_options *base, double seconds, bool json, bool quiet)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_log_set_level(PAL_LOG_WARN);
     pal_err err = pal_link_loop_create(&c->loop);
     const int wanted = base->n_client;
@@ -260,7 +260,7 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
         if (i > 0) one.orders = NULL;
         snprintf(c->name[i], sizeof c->name[i], wanted > 1 ? "%.20s %d" : "%.31s", base->name, i + 1);
         one.name = c->name[i];
-        err = pal_trainee_open(c->loop, c->store, &one, &note, &c->trainee[i]);
+        err = pal_trainee_open(c->loop, c->store, &one, &diag, &c->trainee[i]);
         c->n += !err;
     }
     if (!err) {
@@ -271,7 +271,7 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
     for (int i = 0; i < c->n; i++) main_add(&sum, pal_trainee_look(c->trainee[i]));
     pal_link_loop_destroy(c->loop);
     const char *reason =
-        err ? (note.text[0] ? note.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field, base->orders);
+        err ? (diag.text[0] ? diag.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field, base->orders);
     if (json) main_json(&sum, wanted, !reason, reason);
     if (!json && !quiet && !err) main_table(&sum, wanted);
     if (reason) fprintf(stderr, "palpate-trainee: %s\n", reason);
@@ -284,13 +284,13 @@ static int main_run(crowd *c, const pal_trainee_options *base, double seconds, b
 /* orders and what to wait for, where they are given; an exit code */
 static int main_read(const char *sculpt, pal_orders *orders, const char *until, pal_until *seen)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (until && !*until) {
         fputs("palpate-trainee: --until \"\" waits for nothing: NAME=N,... is wanted\n", stderr);
         return 2;
     }
-    const int code = until && pal_until_read(seen, until, &note) ? 2 : sculpt && pal_orders_load(orders, sculpt, &note);
-    if (code) fprintf(stderr, "palpate-trainee: %s\n", note.text);
+    const int code = until && pal_until_read(seen, until, &diag) ? 2 : sculpt && pal_orders_load(orders, sculpt, &diag);
+    if (code) fprintf(stderr, "palpate-trainee: %s\n", diag.text);
     return code;
 }
 

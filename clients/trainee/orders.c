@@ -16,35 +16,35 @@ static pal_side find_side(const char *name)
 }
 
 /* one word of a line, "key=value"; false: why says what is wrong */
-static bool read_word(pal_order_line *to, char *word, const char **why)
+static bool read_word(pal_order_line *to, char *word, const char **reason)
 {
     char *value = strchr(word, '=');
-    *why = "is not key=value";
+    *reason = "is not key=value";
     if (!value || value == word) return false;
     *value++ = 0;
     if (!strcmp(word, "target")) {
-        *why = "is too long";
+        *reason = "is too long";
         return (size_t)snprintf(to->order.target, sizeof to->order.target, "%s", value) < sizeof to->order.target;
     }
     if (!strcmp(word, "at") || !strcmp(word, "at2")) {
-        *why = "is no side: top, bottom, front, back, left or right";
+        *reason = "is no side: top, bottom, front, back, left or right";
         pal_side side = find_side(value);
         to->at[word[2] == '2'] = side;
         return side < PAL_SIDE_COUNT;
     }
     char *end = value;
     double number = strtod(value, &end);
-    *why = "is no number";
+    *reason = "is no number";
     if (end == value || *end || !isfinite(number)) return false;
-    *why = "is one number too many";
+    *reason = "is one number too many";
     if (to->order.n_arg == PAL_WIRE_ARG_MAX) return false;
     pal_wire_arg *arg = &to->order.arg[to->order.n_arg++];
-    *why = "has too long a name";
+    *reason = "has too long a name";
     arg->value = number;
     return (size_t)snprintf(arg->key, sizeof arg->key, "%s", word) < sizeof arg->key;
 }
 
-static pal_err read_line(pal_order_line *to, char *text, const char *path, pal_note *note)
+static pal_err read_line(pal_order_line *to, char *text, const char *path, pal_diagnostic *diag)
 {
     const char *blank = " \t";
     char *rest = NULL, *end = NULL, *word;
@@ -54,26 +54,26 @@ static pal_err read_line(pal_order_line *to, char *text, const char *path, pal_n
     char *time = strtok_r(text, blank, &rest);
     to->t_s = time ? strtod(time, &end) : -1;
     if (!time || *end || !(to->t_s >= 0) || !isfinite(to->t_s))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: wants `SECONDS VERB key=value ...`", path, to->number);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: wants `SECONDS VERB key=value ...`", path, to->number);
     const char *verb = strtok_r(NULL, blank, &rest);
     if (!verb || (size_t)snprintf(to->order.verb, sizeof to->order.verb, "%s", verb) >= sizeof to->order.verb)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: has no verb", path, to->number);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: has no verb", path, to->number);
     while ((word = strtok_r(NULL, blank, &rest))) {
-        const char *why;
+        const char *reason;
         char shown[48];
         snprintf(shown, sizeof shown, "%.40s", word);
-        if (!read_word(to, word, &why))
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: \"%s\" %s", path, to->number, shown, why);
+        if (!read_word(to, word, &reason))
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: \"%s\" %s", path, to->number, shown, reason);
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_orders_load(pal_orders *orders, const char *path, pal_note *note)
+pal_err pal_orders_load(pal_orders *orders, const char *path, pal_diagnostic *diag)
 {
     *orders = (pal_orders){.line = calloc(PAL_ORDERS_MOST, sizeof *orders->line)};
     if (!orders->line) return PAL_ERR_MEMORY;
     FILE *file = fopen(path, "r");
-    pal_err err = file ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    pal_err err = file ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
     char text[512];
     for (int number = 1; !err && fgets(text, sizeof text, file); number++) {
         bool whole = strchr(text, '\n') || feof(file);
@@ -81,19 +81,21 @@ pal_err pal_orders_load(pal_orders *orders, const char *path, pal_note *note)
         if (text[strspn(text, " \t")] == 0 && whole) continue;
         pal_order_line *to = &orders->line[orders->n_line];
         if (!whole)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: is longer than %zu bytes", path, number, sizeof text - 2);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: is longer than %zu bytes", path, number,
+                                     sizeof text - 2);
         else if (orders->n_line == PAL_ORDERS_MOST)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: more than %d orders", path, number, PAL_ORDERS_MOST);
+            err =
+                pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: more than %d orders", path, number, PAL_ORDERS_MOST);
         if (err) break;
         to->number = number;
-        err = read_line(to, text, path, note);
+        err = read_line(to, text, path, diag);
         if (!err && orders->n_line > 0 && to->t_s < to[-1].t_s)
-            err =
-                pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: time %g s is before the line above", path, number, to->t_s);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: time %g s is before the line above", path, number,
+                                     to->t_s);
         orders->n_line++;
     }
     if (file) fclose(file);
-    if (!err && orders->n_line < 1) err = pal_note_set(note, PAL_ERR_REFUSED, "%s: has no order", path);
+    if (!err && orders->n_line < 1) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has no order", path);
     if (err) pal_orders_free(orders);
     return err;
 }

@@ -4,8 +4,8 @@
  * bottom, front, back, left or right (+z -z -y +y -x +x of the scene): there the surface is asked for x_m y_m z_m, with
  * at2 for x2_m y2_m z2_m. `target=NAME` names the body. An order waits until the one before has been answered.
  * Thread: any. */
-#ifndef PAL_CLIENTS_TRAINEE_ORDERS_H
-#define PAL_CLIENTS_TRAINEE_ORDERS_H
+#ifndef PAL_TRAINEE_ORDERS_H
+#define PAL_TRAINEE_ORDERS_H
 #include "protocol/control.h"
 #include "server/base/err.h"
 
@@ -47,7 +47,8 @@ typedef struct pal_order_told {
     uint32_t epoch, n_vertex; /* of the first part now       */
 } pal_order_told;
 
-pal_err pal_orders_load(pal_orders *orders, const char *path, pal_note *note); /* REFUSED names file and line; IO */
+pal_err pal_orders_load(pal_orders *orders, const char *path,
+                        pal_diagnostic *diag); /* REFUSED names file and line; IO */
 void pal_orders_free(pal_orders *orders);
 /* in the middle of the vertices that lie furthest to a side; false: no vertex */
 bool pal_side_point(const float *x, uint32_t n_vertex, pal_side side, double out[3]);

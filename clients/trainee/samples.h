@@ -1,6 +1,6 @@
 /* Numbers kept for percentiles; the first 1,048,576 are kept, all count for the maximum and mean. Thread: one. */
-#ifndef PAL_CLIENTS_TRAINEE_SAMPLES_H
-#define PAL_CLIENTS_TRAINEE_SAMPLES_H
+#ifndef PAL_TRAINEE_SAMPLES_H
+#define PAL_TRAINEE_SAMPLES_H
 #include <stddef.h>
 #include <stdint.h>
 

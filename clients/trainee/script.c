@@ -42,10 +42,10 @@ static void script_circle(pal_script *script, double radius, double depth)
     }
 }
 
-static pal_err script_file(pal_script *script, const char *path, pal_note *note)
+static pal_err script_file(pal_script *script, const char *path, pal_diagnostic *diag)
 {
     FILE *file = fopen(path, "r");
-    if (!file) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    if (!file) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
     char line[256];
     pal_err err = PAL_ERR_OK;
     for (int number = 1; !err && fgets(line, sizeof line, file); number++) {
@@ -59,20 +59,20 @@ static pal_err script_file(pal_script *script, const char *path, pal_note *note)
         if (sscanf(line, "%lf %lf %lf %lf %u %c", &key.t_s, &key.offset_m[0], &key.offset_m[1], &key.offset_m[2],
                    &buttons, &rest) != 5 ||
             !(key.t_s >= 0) || !isfinite(key.t_s) || !isfinite(o[0] + o[1] + o[2]))
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: wants `t_s x_m y_m z_m buttons`", path, number);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: wants `t_s x_m y_m z_m buttons`", path, number);
         else if (key.t_s <= before)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: time %g s does not grow", path, number, key.t_s);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: time %g s does not grow", path, number, key.t_s);
         else if (script->n_key == PAL_SCRIPT_KEYS)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s:%d: more than %d lines", path, number, PAL_SCRIPT_KEYS);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: more than %d lines", path, number, PAL_SCRIPT_KEYS);
         key.buttons = buttons;
         if (!err) script->key[script->n_key++] = key;
     }
     fclose(file);
-    if (!err && script->n_key < 1) err = pal_note_set(note, PAL_ERR_REFUSED, "%s: has no line", path);
+    if (!err && script->n_key < 1) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has no line", path);
     return err;
 }
 
-pal_err pal_script_load(pal_script *script, const char *name, double radius_m, double depth_m, pal_note *note)
+pal_err pal_script_load(pal_script *script, const char *name, double radius_m, double depth_m, pal_diagnostic *diag)
 {
     *script = (pal_script){0};
     script->idle = !strcmp(name, "idle");
@@ -85,7 +85,7 @@ pal_err pal_script_load(pal_script *script, const char *name, double radius_m, d
     else if (!strcmp(name, "circle"))
         script_circle(script, radius_m, depth_m);
     else
-        return script_file(script, name, note);
+        return script_file(script, name, diag);
     return PAL_ERR_OK;
 }
 

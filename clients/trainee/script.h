@@ -1,7 +1,7 @@
 /* What a scripted trainee's tool does: key points in time around the touched point, gone through linearly, repeated.
  * Offsets are metres along (e1, e2, up), up outward from the organ; 0 is the touched vertex at rest. Thread: any. */
-#ifndef PAL_CLIENTS_TRAINEE_SCRIPT_H
-#define PAL_CLIENTS_TRAINEE_SCRIPT_H
+#ifndef PAL_TRAINEE_SCRIPT_H
+#define PAL_TRAINEE_SCRIPT_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -21,7 +21,7 @@ typedef struct pal_script {
 
 /* name: idle, press, pull, circle, or a file with lines `t_s x_m y_m z_m buttons` (# begins a comment, times grow);
  * tool radius and depth of the press scale the first ones. REFUSED names file and line; IO */
-pal_err pal_script_load(pal_script *script, const char *name, double radius_m, double depth_m, pal_note *note);
+pal_err pal_script_load(pal_script *script, const char *name, double radius_m, double depth_m, pal_diagnostic *diag);
 /* offset and buttons at a time since the start; the last key's time is the period */
 void pal_script_at(const pal_script *script, double t_s, double offset_m[3], uint32_t *buttons);
 #endif

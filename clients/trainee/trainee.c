@@ -440,8 +440,8 @@ static void trainee_hello(pal_trainee *t, const pal_wire_hello *hello)
         double depth = t->options.depth_m;
         if (!(depth > 0))
             depth = fmin(0.01, 0.08 * fabs(pal_dot3(t->box_high, t->options.up) - pal_dot3(t->box_low, t->options.up)));
-        pal_note note;
-        if (pal_script_load(&t->script, t->options.script, radius, depth, &note)) return;
+        pal_diagnostic diag;
+        if (pal_script_load(&t->script, t->options.script, radius, depth, &diag)) return;
         t->script_made = true;
     }
     trainee_parts(t, hello->part, hello->n_part);
@@ -467,15 +467,15 @@ static void trainee_on_control(void *user, pal_link *link, const pal_control *c)
     }
 }
 
-static void trainee_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+static void trainee_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     (void)link;
     pal_trainee *t = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
-    snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, why);
+    snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, reason);
     if (state == PAL_LINK_ENDED) {
         t->ended = true;
-        trainee_fault(t, PAL_FAULT_CLOSED, "%d %.120s", code, why);
+        trainee_fault(t, PAL_FAULT_CLOSED, "%d %.120s", code, reason);
     }
 }
 
@@ -491,7 +491,7 @@ void pal_trainee_asset(pal_trainee *t, const pal_stored_asset *asset)
         trainee_part *part = &t->part[i];
         if (part->asset != asset) continue;
         if (asset->failed || asset->asset->order->n_vertex != part->n_vertex) {
-            trainee_fault(t, PAL_FAULT_ASSET, "%s: %s", asset->path, asset->failed ? asset->why : "vertex count");
+            trainee_fault(t, PAL_FAULT_ASSET, "%s: %s", asset->path, asset->failed ? asset->reason : "vertex count");
             continue;
         }
         if (part->adapts && pal_patch_table_base(&part->table, asset->asset))
@@ -546,7 +546,7 @@ static void trainee_tick(void *user)
 }
 
 pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_trainee_options *options,
-                         pal_note *note, pal_trainee **out)
+                         pal_diagnostic *diag, pal_trainee **out)
 {
     static const pal_link_events events = {trainee_on_state, trainee_on_control, trainee_on_message, trainee_on_fault};
     pal_trainee *t = calloc(1, sizeof *t);
@@ -559,9 +559,9 @@ pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_
     const double *up = options->up;
     const double other[3] = {fabs(up[0]) < 0.9, fabs(up[0]) >= 0.9, 0};
     pal_cross3(t->e2, up, other);
-    pal_err err = pal_unit3(t->e2, t->e2, 1e-9) ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_REFUSED, "up is zero");
+    pal_err err = pal_unit3(t->e2, t->e2, 1e-9) ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "up is zero");
     pal_cross3(t->e1, t->e2, up);
-    if (!err) err = pal_script_load(&t->script, options->script, 0.01, 0.01, note);
+    if (!err) err = pal_script_load(&t->script, options->script, 0.01, 0.01, diag);
     const pal_link_options link = {.url = options->url,
                                    .name = options->name,
                                    .role = options->orders ? PAL_WIRE_ROLE_INSTRUCTOR : PAL_WIRE_ROLE_TRAINEE,
@@ -570,7 +570,7 @@ pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_
                                    .read_bytes_s = options->read_bytes_s,
                                    .events = &events,
                                    .user = t};
-    if (!err) err = pal_link_open(loop, &link, note, &t->link);
+    if (!err) err = pal_link_open(loop, &link, diag, &t->link);
     if (!err) t->timer = pal_link_every(loop, (uint64_t)(1e6 / options->rate_hz), trainee_tick, t);
     if (!err && !t->timer) err = PAL_ERR_MEMORY;
     if (err) {

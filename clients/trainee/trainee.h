@@ -9,8 +9,8 @@
  * in the same cycle, before any other part's. What is of an older epoch is nobody's until the first frame of the newer
  * one has come. A wish broken is counted under its name. Measured: pose
  * to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
-#ifndef PAL_CLIENTS_TRAINEE_TRAINEE_H
-#define PAL_CLIENTS_TRAINEE_TRAINEE_H
+#ifndef PAL_TRAINEE_TRAINEE_H
+#define PAL_TRAINEE_TRAINEE_H
 #include "clients/link/asset_store.h"
 #include "clients/link/patch_table.h"
 #include "clients/trainee/orders.h"
@@ -83,7 +83,7 @@ typedef struct pal_trainee_result {
 
 /* borrows loop and store until destroy; REFUSED: URL or script */
 pal_err pal_trainee_open(pal_link_loop *loop, pal_asset_store *store, const pal_trainee_options *options,
-                         pal_note *note, pal_trainee **out);
+                         pal_diagnostic *diag, pal_trainee **out);
 void pal_trainee_destroy(pal_trainee *t); /* after the loop is destroyed; NULL is fine */
 /* an asset of the store became ready or failed */
 void pal_trainee_asset(pal_trainee *t, const pal_stored_asset *asset);

@@ -11,7 +11,7 @@ static const char *const until_name[PAL_UNTIL_COUNT] = {
 #undef X
 };
 
-pal_err pal_until_read(pal_until *until, const char *text, pal_note *note)
+pal_err pal_until_read(pal_until *until, const char *text, pal_diagnostic *diag)
 {
     *until = (pal_until){.any = false};
     for (const char *word = text; *word;) {
@@ -25,13 +25,13 @@ pal_err pal_until_read(pal_until *until, const char *text, pal_note *note)
             char known[200] = "";
             for (int i = 0; i < PAL_UNTIL_COUNT; i++)
                 snprintf(known + strlen(known), sizeof known - strlen(known), "%s%s", i ? ", " : "", until_name[i]);
-            return pal_note_set(note, PAL_ERR_REFUSED, "until: \"%.*s\" is none of %s with a number", length, word,
-                                known);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "until: \"%.*s\" is none of %s with a number", length,
+                                      word, known);
         }
         char *end;
         const double least = strtod(equals + 1, &end);
         if (end != word + length || end == equals + 1 || !(least > 0) || !isfinite(least))
-            return pal_note_set(note, PAL_ERR_REFUSED, "until: \"%.*s\" wants a number above 0", length, word);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "until: \"%.*s\" wants a number above 0", length, word);
         until->least[which] = least;
         until->any = true;
         word += length + (word[length] == ',');

@@ -1,7 +1,7 @@
 /* What a trainee has to have seen before it may end: "NAME=NUMBER,...", all of it reached. Tests wait for what they
  * need instead of for a time. SI units but for moved_mm. Thread: [load]. */
-#ifndef PAL_CLIENTS_TRAINEE_UNTIL_H
-#define PAL_CLIENTS_TRAINEE_UNTIL_H
+#ifndef PAL_TRAINEE_UNTIL_H
+#define PAL_TRAINEE_UNTIL_H
 #include "clients/trainee/trainee.h"
 
 /*     NAME      how much of it a client has seen */
@@ -34,7 +34,7 @@ typedef struct pal_until {
 } pal_until;
 
 /* REFUSED names the word */
-pal_err pal_until_read(pal_until *until, const char *text, pal_note *note);
+pal_err pal_until_read(pal_until *until, const char *text, pal_diagnostic *diag);
 /* false while something is not reached, and when nothing was asked for */
 bool pal_until_reached(const pal_until *until, const pal_trainee_result *r);
 #endif

@@ -59,7 +59,7 @@ void pal_arena_destroy(pal_arena *arena)
     free(arena);
 }
 
-void *pal_arena_take(pal_arena *arena, size_t n_byte)
+void *pal_arena_alloc(pal_arena *arena, size_t n_byte)
 {
     size_t size = (n_byte + 63) & ~(size_t)63;
     if (size < n_byte) return NULL;
@@ -82,7 +82,7 @@ void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte)
 {
     size_t total;
     if (__builtin_mul_overflow(n_item, n_byte, &total)) return NULL;
-    return pal_arena_take(arena, total);
+    return pal_arena_alloc(arena, total);
 }
 
 size_t pal_arena_used(const pal_arena *arena)
@@ -90,7 +90,7 @@ size_t pal_arena_used(const pal_arena *arena)
     return arena->handed_out;
 }
 
-void pal_arena_return(pal_arena *arena, size_t used)
+void pal_arena_rewind(pal_arena *arena, size_t used)
 {
     PAL_ASSERT(!arena->grows && used <= arena->handed_out);
     arena->newest->used = used;
@@ -99,5 +99,5 @@ void pal_arena_return(pal_arena *arena, size_t used)
 
 void pal_arena_reset(pal_arena *arena)
 {
-    pal_arena_return(arena, 0);
+    pal_arena_rewind(arena, 0);
 }

@@ -16,7 +16,7 @@ void pal_arena_destroy(pal_arena *arena); /* NULL is fine */
 
 /* n_byte zeroed bytes at a multiple of 64, valid until reset or destroy; NULL: full or out of memory. n_byte 0 gives a
  * valid pointer that must not be read. */
-void *pal_arena_take(pal_arena *arena, size_t n_byte);
+void *pal_arena_alloc(pal_arena *arena, size_t n_byte);
 /* zeroed array of n_item items of n_byte; NULL also when the product overflows */
 void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte);
 #define PAL_NEW(arena, type, n) ((type *)pal_arena_array((arena), (size_t)(n), sizeof(type)))
@@ -24,5 +24,5 @@ void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte);
 /* bytes handed out since the last reset, with padding; a fixed arena's mark and return for nested scratch */
 size_t pal_arena_used(const pal_arena *arena);
 void pal_arena_reset(pal_arena *arena);               /* fixed arenas only: empty again */
-void pal_arena_return(pal_arena *arena, size_t used); /* fixed arenas only: back to an earlier pal_arena_used */
+void pal_arena_rewind(pal_arena *arena, size_t used); /* fixed arenas only: back to an earlier pal_arena_used */
 #endif

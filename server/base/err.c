@@ -26,12 +26,12 @@ const char *pal_err_text(pal_err err)
     return (unsigned)err < PAL_ERR_COUNT ? texts[err] : "unknown error code";
 }
 
-pal_err pal_note_set(pal_note *note, pal_err err, const char *format, ...)
+pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)
 {
-    if (note) {
+    if (diag) {
         va_list args;
         va_start(args, format);
-        vsnprintf(note->text, sizeof note->text, format, args);
+        vsnprintf(diag->text, sizeof diag->text, format, args);
         va_end(args);
     }
     return err;

@@ -1,8 +1,8 @@
 /* The error table: one code per thing the caller may do about it.
  *
  * Every fallible function returns pal_err, 0 is success, and writes its results only on success. A function that has
- * more to say than its code takes a pal_note, which may be NULL: one sentence that names the file, entry and number.
- * Thread: any. */
+ * more to say than its code takes a pal_diagnostic, which may be NULL: one sentence that names the file, entry and
+ * number. Thread: any. */
 #ifndef PAL_BASE_ERR_H
 #define PAL_BASE_ERR_H
 #include <stddef.h>
@@ -32,13 +32,14 @@ const char *pal_err_name(pal_err err);
 const char *pal_err_text(pal_err err);
 
 /* one sentence for people, without a line end */
-typedef struct pal_note {
+typedef struct pal_diagnostic {
     char text[512];
-} pal_note;
+} pal_diagnostic;
 
-/* writes the sentence (cut at the buffer's end) unless note is NULL, and returns err: return pal_note_set(note,
+/* writes the sentence (cut at the buffer's end) unless note is NULL, and returns err: return pal_diagnostic_set(note,
  * PAL_ERR_REFUSED, ...) */
-pal_err pal_note_set(pal_note *note, pal_err err, const char *format, ...) __attribute__((format(printf, 3, 4)));
+pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 
 #define PAL_TRY(call)                                                                                                  \
     do {                                                                                                               \

@@ -46,7 +46,7 @@ static int count_cores(void)
         if (!small) break;
     }
     long n = sysconf(_SC_NPROCESSORS_ONLN);
-    return n < 1 ? 1 : n > PAL_TEAM_MOST ? PAL_TEAM_MOST : (int)n;
+    return n < 1 ? 1 : n > PAL_TEAM_MAX ? PAL_TEAM_MAX : (int)n;
 }
 
 static void work(pal_team *team, int number)
@@ -81,7 +81,7 @@ static void *live(void *self)
 pal_err pal_team_create(int n_worker, pal_team **out)
 {
     int size = n_worker > 0 ? n_worker : count_cores();
-    if (size > PAL_TEAM_MOST) size = PAL_TEAM_MOST;
+    if (size > PAL_TEAM_MAX) size = PAL_TEAM_MAX;
     pal_team *team = calloc(1, sizeof *team + sizeof team->worker[0] * (size_t)(size - 1));
     if (!team) return PAL_ERR_MEMORY;
     pthread_mutex_init(&team->lock, NULL);

@@ -5,12 +5,12 @@
 #define PAL_BASE_TEAM_H
 #include "server/base/err.h"
 
-enum { PAL_TEAM_MOST = 256 };
+enum { PAL_TEAM_MAX = 256 };
 
 typedef struct pal_team pal_team;
 
 /* n_worker <= 0: one per core that this process may use; 1: no thread is made and the caller works. At most
- * PAL_TEAM_MOST, and no more than the system gives: pal_team_size says how many. Between runs they sleep; they take no
+ * PAL_TEAM_MAX, and no more than the system gives: pal_team_size says how many. Between runs they sleep; they take no
  * signals. MEMORY: no memory, or no thread could be made. [load] */
 pal_err pal_team_create(int n_worker, pal_team **out);
 void pal_team_destroy(pal_team *team);   /* joins; NULL is fine */

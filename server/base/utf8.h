@@ -26,7 +26,7 @@ static inline int pal_utf8_next(const char *text, size_t n_byte, uint32_t *code)
 
 /* may this character stand in a name or title? Not control characters, line and paragraph separators, direction marks
  * and overrides, zero-width ones, the byte order mark */
-static inline bool pal_utf8_shown(uint32_t c)
+static inline bool pal_utf8_printable(uint32_t c)
 {
     return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||
              (c >= 0x2060 && c <= 0x206f) || c == 0xfeff);

@@ -22,7 +22,7 @@
 #include "server/figure/plot.h"
 #include "server/mesh/geometry/stomach.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 
 #include <math.h>
@@ -75,7 +75,7 @@ typedef struct palm_row {
 } palm_row;
 
 typedef struct live_row {
-    int n_all, n_node, n_spring, n_sub;
+    int n_finest, n_node, n_spring, n_sub;
     double p50_ms, p95_ms;
     int n_row;
     char row[ROWS][24];
@@ -107,15 +107,15 @@ static const char *shared_path(const char *file)
 }
 
 /* a surface from a file, or with path NULL the shape; pressed where it is farthest along the axis */
-static pal_err take(const char *name, const char *path, int axis, pressed *out, pal_note *note)
+static pal_err take(const char *name, const char *path, int axis, pressed *out, pal_diagnostic *diag)
 {
     const pal_surface_scene options = options_of(name);
     *out = (pressed){.name = name, .axis = axis, .source = "procedural"};
     if (path) {
         snprintf(out->source, sizeof out->source, "%s", strrchr(path, '/') + 1);
-        PAL_TRY(pal_scene_from_surface(path, &options, &out->loaded, NULL, note));
+        PAL_TRY(pal_scene_from_surface(path, &options, &out->loaded, NULL, diag));
     } else {
-        PAL_TRY(pal_scene_procedural(&options, &out->loaded, NULL, note));
+        PAL_TRY(pal_scene_procedural(&options, &out->loaded, NULL, diag));
     }
     const pal_surface *surface = &out->loaded->mesh[0].surface;
     int front = 0;
@@ -126,8 +126,8 @@ static pal_err take(const char *name, const char *path, int axis, pressed *out, 
 }
 
 /* a world of the body alone, as `kind` */
-static pal_err start(const pressed *p, int kind, int n_level, int most_node, double step_s, pal_world **out,
-                     pal_note *note)
+static pal_err start(const pressed *p, int kind, int n_level, int max_node, double step_s, pal_world **out,
+                     pal_diagnostic *diag)
 {
     pal_scene *scene = malloc(sizeof *scene);
     if (!scene) return PAL_ERR_MEMORY;
@@ -136,19 +136,19 @@ static pal_err start(const pressed *p, int kind, int n_level, int most_node, dou
     scene->n_tool = 0;
     scene->step_s = step_s;
     def->n_effect = 0;
-    pal_item *model = &def->model;
-    pal_item_init(model, "model", "adaptive_springs");
-    pal_err err = pal_item_put_number(model, "levels", n_level, note);
-    if (!err) err = pal_item_put_text(model, "frame", "world", note);
-    if (!err && p->mass_kg > 0) err = pal_item_put_number(model, "mass_kg", p->mass_kg, note);
-    if (!err && kind == REFINED) err = pal_item_put_number(model, "start_level", n_level - 1, note);
-    if (!err && kind != ADAPTIVE) err = pal_item_put_bool(model, "refine", false, note);
-    if (!err && most_node > 0) {
-        pal_item *refine = &def->effect[def->n_effect++];
-        pal_item_init(refine, "effects[0]", "refine");
-        err = pal_item_put_number(refine, "most_node", most_node, note);
+    pal_config_entry *model = &def->model;
+    pal_entry_init(model, "model", "adaptive_springs");
+    pal_err err = pal_entry_put_number(model, "levels", n_level, diag);
+    if (!err) err = pal_entry_put_text(model, "frame", "world", diag);
+    if (!err && p->mass_kg > 0) err = pal_entry_put_number(model, "mass_kg", p->mass_kg, diag);
+    if (!err && kind == REFINED) err = pal_entry_put_number(model, "start_level", n_level - 1, diag);
+    if (!err && kind != ADAPTIVE) err = pal_entry_put_bool(model, "refine", false, diag);
+    if (!err && max_node > 0) {
+        pal_config_entry *refine = &def->effect[def->n_effect++];
+        pal_entry_init(refine, "effects[0]", "refine");
+        err = pal_entry_put_number(refine, "most_node", max_node, diag);
     }
-    if (!err) err = pal_world_create(scene, note, out);
+    if (!err) err = pal_world_create(scene, diag, out);
     free(scene);
     return err;
 }
@@ -165,7 +165,7 @@ static void load(pal_world *world, const pressed *p, double share)
             int i = pal_body_point(body, k);
             double r = pal_dist3(body->x_rest + 3 * i, p->at) / p->radius_m;
             double weight = (1 - r * r) * (1 - r * r) * body->mass_kg[i];
-            if (body->held[i] || r >= 1) continue;
+            if (body->fixed[i] || r >= 1) continue;
             f[p->axis] = turn ? -share * p->force_N * weight / sum : 0;
             if (turn)
                 (void)pal_world_load(world, 0, i, f);
@@ -177,7 +177,7 @@ static void load(pal_world *world, const pressed *p, double share)
 static double moved(const pal_body *body, const pressed *p)
 {
     int best = 0;
-    for (int i = 1; i < body->shell->levels.n_vertex[0]; i++)
+    for (int i = 1; i < body->adaptive->levels.n_vertex[0]; i++)
         if (pal_dist3(body->x_rest + 3 * i, p->at) < pal_dist3(body->x_rest + 3 * best, p->at)) best = i;
     return pal_dist3(body->x + 3 * best, body->x_rest + 3 * best);
 }
@@ -200,15 +200,15 @@ static double go(pal_world *world, const pressed *p, double share, int n_step, d
         int *node = told->n_node[kind], *spring = told->n_spring[kind];
         node[0] = body->n_active < node[0] || !node[0] ? body->n_active : node[0];
         node[1] = body->n_active > node[1] ? body->n_active : node[1];
-        spring[0] = body->shell->n_spring < spring[0] || !spring[0] ? body->shell->n_spring : spring[0];
-        spring[1] = body->shell->n_spring > spring[1] ? body->shell->n_spring : spring[1];
+        spring[0] = body->adaptive->n_spring < spring[0] || !spring[0] ? body->adaptive->n_spring : spring[0];
+        spring[1] = body->adaptive->n_spring > spring[1] ? body->adaptive->n_spring : spring[1];
     }
     return 1e-9 * (double)spent;
 }
 
 /* ---- (a) ---- */
 
-static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_row *out, pal_note *note)
+static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_row *out, pal_diagnostic *diag)
 {
     pal_world *world[KINDS] = {NULL};
     double run_s[KINDS][ROUNDS], ratio[ROUNDS];
@@ -216,7 +216,7 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
     *out = (table_row){.name = p->name};
     memcpy(out->source, p->source, sizeof out->source);
     memcpy(out->paper_s, paper_s, sizeof out->paper_s);
-    for (int kind = 0; kind < KINDS && !err; kind++) err = start(p, kind, 2, 0, frame_s, &world[kind], note);
+    for (int kind = 0; kind < KINDS && !err; kind++) err = start(p, kind, 2, 0, frame_s, &world[kind], diag);
     for (int round = 0; round < ROUNDS && !err; round++) {
         for (int kind = 0; kind < KINDS && !err; kind++) {
             pal_world_reset(world[kind]);
@@ -227,7 +227,7 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
             double after = go(world[kind], p, 0, (int)lround(free_s / frame_s), frame_s, out, kind);
             run_s[kind][round] = looking + pressing + after;
             if (looking < 0 || pressing < 0 || after < 0)
-                err = pal_note_set(note, PAL_ERR_FROZEN, "%s: it diverged", p->name);
+                err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "%s: it diverged", p->name);
         }
         ratio[round] = err ? 0 : run_s[ADAPTIVE][round] / run_s[REFINED][round];
     }
@@ -250,13 +250,13 @@ static const double settle_s = 0.4, palm_s = 0.1, ball_m = 0.1;
 enum { PALM_LEVELS = 4 };
 
 /* the sphere split some times, as the coarsest level of a body that has finer ones still */
-static pal_err make_ball(int n_split, double radius_m, double force_N, pressed *out, pal_note *note)
+static pal_err make_ball(int n_split, double radius_m, double force_N, pressed *out, pal_diagnostic *diag)
 {
     pal_levels levels = {0};
     const pal_levels_options options = {.n_level = n_split + 1};
-    PAL_TRY(take("sphere", NULL, 2, out, note));
+    PAL_TRY(take("sphere", NULL, 2, out, diag));
     pal_surface *surface = &out->loaded->mesh[0].surface;
-    pal_err err = pal_levels_make(surface, &options, &levels, note);
+    pal_err err = pal_levels_make(surface, &options, &levels, diag);
     if (!err) {
         pal_surface_free(surface);
         err = pal_levels_surface(&levels, n_split, surface);
@@ -272,13 +272,13 @@ static pal_err make_ball(int n_split, double radius_m, double force_N, pressed *
     return PAL_ERR_OK;
 }
 
-static pal_err run_palm(const pressed *p, palm_row *out, pal_note *note)
+static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
 {
     pal_world *world[2] = {NULL};
     double run_s[2][PALM_ROUNDS], ratio[PALM_ROUNDS];
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < 2 && !err; k++)
-        err = start(p, k ? ADAPTIVE : REFINED, PALM_LEVELS, 0, frame_s, &world[k], note);
+        err = start(p, k ? ADAPTIVE : REFINED, PALM_LEVELS, 0, frame_s, &world[k], diag);
     /* only what adapts has to come to its state */
     if (!err && go(world[1], p, 1, (int)lround(settle_s / frame_s), frame_s, NULL, 0) < 0) err = PAL_ERR_FROZEN;
     for (int round = 0; round < PALM_ROUNDS && !err; round++) {
@@ -288,11 +288,11 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_note *note)
         }
         ratio[round] = run_s[1][round] / run_s[0][round];
     }
-    if (err == PAL_ERR_FROZEN) pal_note_set(note, err, "four levels: it diverged");
+    if (err == PAL_ERR_FROZEN) pal_diagnostic_set(diag, err, "four levels: it diverged");
     for (int k = 0; k < 2; k++) {
         if (!err) {
-            const pal_shell *shell = pal_world_body(world[k], 0)->shell;
-            out->n_node[k] = shell->n_node, out->n_spring[k] = shell->n_spring;
+            const pal_adaptive_surface *adaptive = pal_world_body(world[k], 0)->adaptive;
+            out->n_node[k] = adaptive->n_node, out->n_spring[k] = adaptive->n_spring;
             out->second_s[k] = pal_median(run_s[k], PALM_ROUNDS);
         }
         pal_world_destroy(world[k]);
@@ -309,10 +309,10 @@ enum { BALL_LEVELS = 4, LIVE_STEPS = 301 };
 /* milliseconds of the rows that took the most, under their names */
 static void tell_rows(pal_world *world, double *ms, int n_step, live_row *out)
 {
-    out->n_row = pal_world_rows(world) < ROWS ? pal_world_rows(world) : ROWS;
+    out->n_row = pal_world_component_count(world) < ROWS ? pal_world_component_count(world) : ROWS;
     for (int r = 0; r < out->n_row; r++) {
-        pal_row_info info;
-        pal_world_row(world, r, &info);
+        pal_component_info info;
+        pal_world_component_info(world, r, &info);
         snprintf(out->row[r], sizeof out->row[r], "%s", info.name);
         out->row_ms[r] = pal_median(ms + (size_t)r * LIVE_STEPS, n_step);
     }
@@ -327,36 +327,36 @@ static double timed_step(pal_world *world)
 }
 
 /* a leaf that splits alone and can be joined again; -1: none */
-static int32_t find_leaf(pal_shell *shell, pal_body *body)
+static int32_t find_leaf(pal_adaptive_surface *adaptive, pal_body *body)
 {
-    for (int k = 0; k < shell->n_leaf; k++) {
-        int32_t face = shell->leaf[k];
-        if (shell->levels.face_level[face] + 1 >= shell->levels.n_level) continue;
-        int n = pal_shell_split(shell, body, face, 0);
-        bool back = n > 0 && pal_shell_join(shell, body, face);
-        pal_shell_update(shell, body);
+    for (int k = 0; k < adaptive->n_leaf; k++) {
+        int32_t face = adaptive->leaf[k];
+        if (adaptive->levels.face_level[face] + 1 >= adaptive->levels.n_level) continue;
+        int n = pal_adaptive_split(adaptive, body, face, 0);
+        bool back = n > 0 && pal_adaptive_join(adaptive, body, face);
+        pal_adaptive_update(adaptive, body);
         if (n == 1 && back) return face;
     }
     return -1;
 }
 
 /* splits and joins one face again and again, with a step after each and steps without any between */
-static pal_err run_switches(pal_world *world, live_row *out, pal_note *note)
+static pal_err run_switches(pal_world *world, live_row *out, pal_diagnostic *diag)
 {
     pal_body *body = pal_world_body(world, 0);
-    pal_shell *shell = body->shell;
+    pal_adaptive_surface *adaptive = body->adaptive;
     double us[2][SWITCHES], more[SWITCHES];
-    int32_t face = find_leaf(shell, body);
-    if (face < 0) return pal_note_set(note, PAL_ERR_INTERNAL, "no face can be split alone");
+    int32_t face = find_leaf(adaptive, body);
+    if (face < 0) return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "no face can be split alone");
     for (int turn = 0; turn < SWITCHES; turn++) {
         double with = 0, without = 0;
         for (int join = 0; join < 2; join++) {
             uint64_t began = pal_clock_thread_ns();
             if (join)
-                pal_shell_join(shell, body, face);
+                pal_adaptive_join(adaptive, body, face);
             else
-                pal_shell_split(shell, body, face, 0);
-            pal_shell_update(shell, body);
+                pal_adaptive_split(adaptive, body, face, 0);
+            pal_adaptive_update(adaptive, body);
             us[join][turn] = 1e-3 * (double)(pal_clock_thread_ns() - began);
             with += timed_step(world), without += timed_step(world);
         }
@@ -367,30 +367,30 @@ static pal_err run_switches(pal_world *world, live_row *out, pal_note *note)
     return PAL_ERR_OK;
 }
 
-static pal_err run_live(const pressed *p, live_row *out, pal_note *note)
+static pal_err run_live(const pressed *p, live_row *out, pal_diagnostic *diag)
 {
     static double step_ms[LIVE_STEPS], row_ms[ROWS][LIVE_STEPS];
     pal_world *world = NULL;
-    PAL_TRY(start(p, ADAPTIVE, BALL_LEVELS, MOST_NODE, live_s, &world, note));
+    PAL_TRY(start(p, ADAPTIVE, BALL_LEVELS, MOST_NODE, live_s, &world, diag));
     const pal_body *body = pal_world_body(world, 0);
     pal_err err = PAL_ERR_OK;
-    if (go(world, p, 1, 700, live_s, NULL, 0) < 0) err = pal_note_set(note, PAL_ERR_FROZEN, "ball: it diverged");
+    if (go(world, p, 1, 700, live_s, NULL, 0) < 0) err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "ball: it diverged");
     for (int step = 0; step < LIVE_STEPS && !err; step++) {
         step_ms[step] = timed_step(world);
-        for (int r = 0; r < pal_world_rows(world) && r < ROWS; r++) {
-            pal_row_info info;
-            pal_world_row(world, r, &info);
+        for (int r = 0; r < pal_world_component_count(world) && r < ROWS; r++) {
+            pal_component_info info;
+            pal_world_component_info(world, r, &info);
             row_ms[r][step] = 1e-6 * (double)info.spent_ns;
         }
     }
     if (!err) {
-        *out = (live_row){.n_all = body->n_node,
+        *out = (live_row){.n_finest = body->n_node,
                           .n_node = body->n_active,
-                          .n_spring = body->shell->n_spring,
+                          .n_spring = body->adaptive->n_spring,
                           .n_sub = pal_world_substeps(world)};
         out->p50_ms = pal_median(step_ms, LIVE_STEPS), out->p95_ms = step_ms[LIVE_STEPS * 95 / 100];
         tell_rows(world, row_ms[0], LIVE_STEPS, out);
-        err = run_switches(world, out, note);
+        err = run_switches(world, out, diag);
     }
     pal_world_destroy(world);
     return err;
@@ -428,7 +428,7 @@ static void print_table(const results *r)
     const live_row *l = &r->live;
     printf("\nfinest level of %d nodes, %d active (%d springs), steps of 1 ms in %d sub-steps: %.3f ms, 95 %% below "
            "%.3f (less than 1 is asked for)\n",
-           l->n_all, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
+           l->n_finest, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
     for (int k = 0; k < l->n_row; k++) printf("  %-16s %.4f ms\n", l->row[k], l->row_ms[k]);
     printf("there, one switch of a face: split %.1f us, joined %.1f us, and %.1f us in the step after it\n",
            l->split_us, l->join_us, l->after_us);
@@ -456,7 +456,7 @@ static void print_json(const results *r)
            p->n_node[1], p->n_spring[0], p->n_spring[1], p->second_s[0], p->second_s[1], p->ratio);
     printf("\"live\":{\"finest_nodes\":%d,\"nodes\":%d,\"springs\":%d,\"substeps\":%d,\"step_ms\":1,\"p50_ms\":%.4f,"
            "\"p95_ms\":%.4f,\"rows_ms\":{",
-           l->n_all, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
+           l->n_finest, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
     for (int k = 0; k < l->n_row; k++) printf("%s\"%s\":%.5f", k ? "," : "", l->row[k], l->row_ms[k]);
     printf("}},\"switch\":{\"split_us\":%.2f,\"join_us\":%.2f,\"after_us\":%.2f}}\n", l->split_us, l->join_us,
            l->after_us);
@@ -473,7 +473,7 @@ static void fill(pressed *body, double force_N)
 }
 
 /* the sphere is pressed at its equator, which has no pole of many faces */
-static pal_err run_tables(results *out, pal_note *note)
+static pal_err run_tables(results *out, pal_diagnostic *diag)
 {
     static const double paper_s[2][KINDS] = {{2.334, 10.078, 3.136}, {3.328, 14.422, 6.906}};
     static const char *const name[2] = {"sphere", "stomach"}, *const file[2] = {"sphere_114.obj", "stomach_188.obj"};
@@ -484,16 +484,16 @@ static pal_err run_tables(results *out, pal_note *note)
         const char *path = k & 1 ? shared_path(file[k / 2]) : NULL;
         if (k & 1 && !path) continue;
         pressed body;
-        err = take(name[k / 2], path, axis[k / 2], &body, note);
+        err = take(name[k / 2], path, axis[k / 2], &body, diag);
         if (!err) fill(&body, force_N[k / 2]);
-        if (!err) err = run_table(&body, paper_s[k / 2], &out->table[out->n_table++], note);
+        if (!err) err = run_table(&body, paper_s[k / 2], &out->table[out->n_table++], diag);
         pal_scene_free(body.loaded);
     }
     return err;
 }
 
 /* the way of the pressed vertex over time, of what was made here */
-static pal_err draw_ways(const results *r, const char *path, pal_note *note)
+static pal_err draw_ways(const results *r, const char *path, pal_diagnostic *diag)
 {
     static const char *const name[2][KINDS] = {{"sphere, coarse", "sphere, refined", "sphere, adaptive"},
                                                {"stomach, coarse", "stomach, refined", "stomach, adaptive"}};
@@ -513,23 +513,23 @@ static pal_err draw_ways(const results *r, const char *path, pal_note *note)
         }
         body++;
     }
-    return pal_plot_write(&plot, path, note);
+    return pal_plot_write(&plot, path, diag);
 }
 
 int bench_adaptive(bool json, const char *picture)
 {
     static results r;
     pressed ball[2] = {{.name = NULL}};
-    pal_note note = {""};
-    pal_err err = run_tables(&r, &note);
-    if (!err && picture) err = draw_ways(&r, picture, &note);
-    if (!err) err = make_ball(1, 0.035, 0.12, &ball[0], &note);
-    if (!err) err = run_palm(&ball[0], &r.palm, &note);
-    if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], &note);
-    if (!err) err = run_live(&ball[1], &r.live, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = run_tables(&r, &diag);
+    if (!err && picture) err = draw_ways(&r, picture, &diag);
+    if (!err) err = make_ball(1, 0.035, 0.12, &ball[0], &diag);
+    if (!err) err = run_palm(&ball[0], &r.palm, &diag);
+    if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], &diag);
+    if (!err) err = run_live(&ball[1], &r.live, &diag);
     for (int k = 0; k < 2; k++) pal_scene_free(ball[k].loaded);
     if (err) {
-        fprintf(stderr, "palpate bench: adaptive: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate bench: adaptive: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;
     }
     if (json)

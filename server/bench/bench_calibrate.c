@@ -56,7 +56,7 @@ static double mean_of(const pal_calibrate_set *set, const pal_calibration_value 
 
 /* enough_percent: where annealing may end */
 static pal_err search(const job *j, const pal_calibrate_set *set, const pal_calibration *c, double enough_percent,
-                      result *out, pal_note *note)
+                      result *out, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     pal_calibration_info info;
@@ -68,15 +68,15 @@ static pal_err search(const job *j, const pal_calibrate_set *set, const pal_cali
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
     pal_err err = theta ? pal_calibration_seat_create(c, &seat) : PAL_ERR_MEMORY;
     if (!err) pal_calibration_by_hand(c, theta);
-    if (!err) err = pal_calibration_evaluate(c, seat, theta, ALL, &v, NULL, note);
+    if (!err) err = pal_calibration_evaluate(c, seat, theta, ALL, &v, NULL, diag);
     out->hand_percent = mean_of(set, &v, true);
     while (!err && out->n_repeat < REPEATS) {
         memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
-        const pal_fit_options o = {.most_evaluation = j->annealing ? MOST_EVALUATION : 0,
+        const pal_fit_options o = {.max_evaluation = j->annealing ? MOST_EVALUATION : 0,
                                    .enough_percent = j->annealing ? enough_percent : 0,
                                    .seed = 1,
                                    .n_worker = 1};
-        err = j->annealing ? pal_fit_anneal(c, &o, theta, &r, note) : pal_fit_adjoint(c, &o, theta, &r, note);
+        err = j->annealing ? pal_fit_anneal(c, &o, theta, &r, diag) : pal_fit_adjoint(c, &o, theta, &r, diag);
         seconds[out->n_repeat++] = r.seconds;
         if (r.seconds > short_s) break;
     }
@@ -93,7 +93,7 @@ static pal_err search(const job *j, const pal_calibrate_set *set, const pal_cali
     return err;
 }
 
-static pal_err run_job(const job *j, const char *folder, double enough_percent, result *out, pal_note *note)
+static pal_err run_job(const job *j, const char *folder, double enough_percent, result *out, pal_diagnostic *diag)
 {
     char path[1200];
     pal_calibrate_options o;
@@ -106,9 +106,9 @@ static pal_err run_job(const job *j, const char *folder, double enough_percent, 
     pal_calibrate_default(&o);
     o.voxel.resolution = j->resolution;
     memcpy(o.grid, j->grid, sizeof o.grid);
-    pal_err err = pal_calibrate_cases_read(&wish, set, note);
-    if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, &c, note);
-    if (!err) err = search(j, set, c, enough_percent, out, note);
+    pal_err err = pal_calibrate_cases_read(&wish, set, diag);
+    if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, &c, diag);
+    if (!err) err = search(j, set, c, enough_percent, out, diag);
     pal_calibration_destroy(c);
     pal_calibrate_cases_free(set);
     free(set);
@@ -184,12 +184,12 @@ static void print_json(const result *r)
 int bench_calibrate(const char *folder_or_null, bool json)
 {
     result r[N_JOB];
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     for (int k = 0; k < N_JOB; k++) {
         double enough = k > 0 ? near_enough * r[k - 1].percent : 0;
-        pal_err err = run_job(&jobs[k], folder_or_null ? folder_or_null : "deploy/problems", enough, &r[k], &note);
+        pal_err err = run_job(&jobs[k], folder_or_null ? folder_or_null : "deploy/problems", enough, &r[k], &diag);
         if (!err) continue;
-        fprintf(stderr, "palpate bench: calibrate: %s%s\n", note.text[0] ? note.text : pal_err_text(err),
+        fprintf(stderr, "palpate bench: calibrate: %s%s\n", diag.text[0] ? diag.text : pal_err_text(err),
                 err == PAL_ERR_IO && !folder_or_null ? " (palpate bench calibrate FOLDER says where the problems are)"
                                                      : "");
         return err == PAL_ERR_MEMORY ? 3 : 1;

@@ -30,7 +30,7 @@ typedef struct subject {
 } subject;
 
 typedef struct row {
-    pal_priced_setting foreseen;
+    pal_measured_configuration foreseen;
     int n_node, n_substep;
     double was_ms, ms; /* of the settings before and after, of a step of the scene */
     double own_m;      /* what the new setting's estimate says */
@@ -55,7 +55,8 @@ static pal_err put_load(pal_world *world, const pal_scene *scene)
 {
     pal_body *body = pal_world_body(world, 0);
     const double aside[3] = {scene->up[1], scene->up[2], scene->up[0]};
-    double sum_kg = 0, total = pull * scene->body[0].material.young_Pa * body->size_m * body->size_m, f[3];
+    double sum_kg = 0, total = pull * scene->body[0].material.young_Pa * body->length_scale_m * body->length_scale_m,
+           f[3];
     for (int i = 0; i < body->n_node; i++) sum_kg += body->node_mass_kg[i];
     for (int i = 0; i < body->n_node; i++) {
         pal_scale3(f, total * body->node_mass_kg[i] / sum_kg, aside);
@@ -87,16 +88,16 @@ static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, i
 
 /* cost: of steps so far */
 static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_estimate_cost *cost, int n_cost,
-                        pal_estimate *out, pal_note *note)
+                        pal_estimate *out, pal_diagnostic *diag)
 {
     pal_estimate_work *work = NULL;
-    PAL_TRY(pal_estimate_work_open(scene, 0, NULL, note, &work));
+    PAL_TRY(pal_estimate_work_open(scene, 0, NULL, diag, &work));
     pal_estimate_state *state = pal_estimate_work_state(work);
     bool good = pal_estimate_copy(state, world, 0);
     for (int i = 0; i < n_cost && i < PAL_ESTIMATE_STEPS; i++) state->cost[state->n_cost++] = cost[i];
     good = good && pal_estimate_work_run(work, out);
     pal_estimate_work_close(work);
-    return good ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_NUMERIC, "nothing is known of the state");
+    return good ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "nothing is known of the state");
 }
 
 static double median_ms(const pal_estimate_cost *cost, int n)
@@ -122,24 +123,24 @@ static pal_err in_turn(pal_world *was, double was_s, pal_world *now, double now_
     return err;
 }
 
-static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, pal_note *note)
+static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, pal_diagnostic *diag)
 {
     pal_switch *change = NULL;
     pal_world *next = NULL;
     pal_estimate own = {.error_m = NAN};
-    if (pal_setting_nodes(scene, 0, &r->foreseen.setting) > MOST_NODE)
-        return pal_note_set(note, PAL_ERR_BUDGET, "more than %d nodes", MOST_NODE);
+    if (pal_configuration_estimate_nodes(scene, 0, &r->foreseen.setting) > MOST_NODE)
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MOST_NODE);
     pal_err err = swing(world, scene);
-    if (!err) err = pal_switch_prepare(scene, NULL, 0, &r->foreseen.setting, note, &change);
-    if (!err) err = pal_world_create(pal_switch_scene(change), note, &next);
+    if (!err) err = pal_switch_prepare(scene, NULL, 0, &r->foreseen.setting, diag, &change);
+    if (!err) err = pal_world_create(pal_switch_scene(change), diag, &next);
     if (!err) {
         pal_switch_carry(change, next, world);
         err = put_load(next, pal_switch_scene(change));
     }
     if (!err) {
-        r->n_node = pal_world_look(next, 0)->n_node;
+        r->n_node = pal_world_view_body(next, 0)->n_node;
         const pal_scene *to = pal_switch_scene(change);
-        err = estimate(to, next, NULL, 0, &own, note);
+        err = estimate(to, next, NULL, 0, &own, diag);
         r->own_m = own.error_m;
         if (!err) err = in_turn(world, scene->step_s, next, to->step_s, r);
     }
@@ -148,28 +149,28 @@ static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, p
     return err;
 }
 
-static pal_err measure(const subject *s, result *out, pal_note *note)
+static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = NULL;
     pal_world *world = NULL;
     pal_estimate_cost cost[MOST];
     int n = 0;
-    PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, note));
+    PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, diag));
     if (s->two) put_other(&loaded->scene);
     const pal_scene *scene = &loaded->scene;
-    pal_err err = pal_world_create(scene, note, &world);
+    pal_err err = pal_world_create(scene, diag, &world);
     if (!err) err = swing(world, scene);
     for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, cost, &n);
     if (!err) err = swing(world, scene);
-    if (!err) err = estimate(scene, world, cost, n, &out->estimate, note);
+    if (!err) err = estimate(scene, world, cost, n, &out->estimate, diag);
     if (!err) {
-        out->n_node = pal_world_look(world, 0)->n_node, out->n_substep = pal_world_substeps(world);
+        out->n_node = pal_world_view_body(world, 0)->n_node, out->n_substep = pal_world_substeps(world);
         out->n_row = out->estimate.n_neighbour;
         for (int k = 0; k < out->n_row; k++) {
             row *r = &out->row[k];
             r->foreseen = out->estimate.neighbour[k];
-            pal_note why = {""};
-            r->err = try_neighbour(scene, world, r, &why);
+            pal_diagnostic reason = {""};
+            r->err = try_neighbour(scene, world, r, &reason);
         }
     }
     pal_world_destroy(world);
@@ -184,7 +185,7 @@ static double cost_off(const result *c, const row *r)
 
 static const char *knob(const row *r, char text[64])
 {
-    const pal_setting *s = &r->foreseen.setting;
+    const pal_configuration *s = &r->foreseen.setting;
     char tolerance[24] = "";
     if (s->tolerance > 0) snprintf(tolerance, sizeof tolerance, ", tolerance %.0e", s->tolerance);
     snprintf(text, 64, "%d voxels, %.3g ms%s", s->size, 1e3 * s->step_s, tolerance);
@@ -225,7 +226,7 @@ static void print_table(const subject *s, const result *c)
     char text[64];
     printf("%s: %d nodes, %.3f ms", s->name, c->n_node, c->estimate.ms);
     if (isfinite(c->estimate.error_m)) printf(", error %.3g mm", 1e3 * c->estimate.error_m);
-    if (c->estimate.note[0]) printf(" (%s)", c->estimate.note);
+    if (c->estimate.diag[0]) printf(" (%s)", c->estimate.diag);
     printf("\n");
     for (int k = 0; k < c->n_row; k++) {
         const row *r = &c->row[k];
@@ -259,9 +260,9 @@ int bench_estimate(bool json)
     int n = 0, within = 0;
     if (json) printf("{\"bench\":\"estimate\",\"cases\":[");
     for (int k = 0; k < N_CASE; k++) {
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         result *c = calloc(1, sizeof *c);
-        pal_err err = c ? measure(&subjects[k], c, &note) : PAL_ERR_MEMORY;
+        pal_err err = c ? measure(&subjects[k], c, &diag) : PAL_ERR_MEMORY;
         for (int i = 0; !err && i < c->n_row; i++) {
             if (c->row[i].err) continue;
             n++, within += is_good(cost_off(c, &c->row[i]));
@@ -272,7 +273,7 @@ int bench_estimate(bool json)
         free(c);
         if (!err) continue;
         fprintf(stderr, "palpate bench: estimate: %s: %s\n", subjects[k].name,
-                note.text[0] ? note.text : pal_err_text(err));
+                diag.text[0] ? diag.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;
     }
     if (json)

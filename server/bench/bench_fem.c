@@ -21,32 +21,32 @@ enum { N_STEP = 240 };
 typedef struct job {
     const char *name, *element, *law;
     int n[3];
-    double h_m, poisson, step_s, force_N, limit_ms;
+    double edge_m, poisson, step_s, force_N, limit_ms;
     bool warp;
 } job;
 
 typedef struct result {
     int n_node, n_element;
-    double p50_ms, p95_ms, force_ms, mean_cg, most_cg, tip_m;
+    double p50_ms, p95_ms, force_ms, mean_cg, max_cg, tip_m;
 } result;
 
-static pal_err make_box(const int n[3], double h_m, pal_prepared *out, pal_note *note)
+static pal_err make_box(const int n[3], double edge_m, pal_prepared *out, pal_diagnostic *diag)
 {
     size_t n_voxel = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .h_m = h_m, .n_inside = (int64_t)n_voxel};
+    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .edge_m = edge_m, .n_inside = (int64_t)n_voxel};
     memset(out, 0, sizeof *out);
     voxels.kind = malloc(n_voxel);
     if (!voxels.kind) return PAL_ERR_MEMORY;
     memset(voxels.kind, 2, n_voxel);
     pal_err err = pal_voxels_split(&voxels, &out->tets);
-    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, note);
+    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, diag);
     pal_voxels_free(&voxels);
     return err;
 }
 
 /* the scene of one body clamped at its lowest face along `axis`, without output and tools */
 static pal_err make_scene(const job *j, const pal_prepared *mesh, int axis, const char *solver, pal_scene *scene,
-                          pal_note *note)
+                          pal_diagnostic *diag)
 {
     pal_scene_default(scene);
     scene->n_body = 1;
@@ -57,14 +57,14 @@ static pal_err make_scene(const job *j, const pal_prepared *mesh, int axis, cons
     body->output.name[0] = 0;
     body->n_effect = 0;
     body->n_support = 1;
-    body->support[0] = (pal_support){.lowest = false};
+    body->support[0] = (pal_support_def){.lowest = false};
     for (int c = 0; c < 3; c++) body->support[0].low_m[c] = -1, body->support[0].high_m[c] = 1;
     body->support[0].high_m[axis] = 1e-6;
-    pal_item_init(&body->model, "model", "fem");
-    PAL_TRY(pal_item_put_text(&body->model, "element", j->element, note));
-    PAL_TRY(pal_item_put_text(&body->model, "law", j->law, note));
-    pal_item_init(&body->solver, "solver", solver);
-    if (!strcmp(solver, "implicit_euler")) PAL_TRY(pal_item_put_bool(&body->solver, "warp", j->warp, note));
+    pal_entry_init(&body->model, "model", "fem");
+    PAL_TRY(pal_entry_put_text(&body->model, "element", j->element, diag));
+    PAL_TRY(pal_entry_put_text(&body->model, "law", j->law, diag));
+    pal_entry_init(&body->solver, "solver", solver);
+    if (!strcmp(solver, "implicit_euler")) PAL_TRY(pal_entry_put_bool(&body->solver, "warp", j->warp, diag));
     return PAL_ERR_OK;
 }
 
@@ -101,23 +101,23 @@ static pal_err load_face(pal_world *world, int axis, double low, double high, co
 static double row_ms(const pal_world *world, const char *stage)
 {
     double ms = 0;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         if (!strcmp(info.stage, stage)) ms += 1e-6 * (double)info.spent_ns;
     }
     return ms;
 }
 
-static pal_err run_live(const job *j, result *out, pal_note *note)
+static pal_err run_live(const job *j, result *out, pal_diagnostic *diag)
 {
     static double ms[N_STEP], force[N_STEP];
     pal_prepared mesh = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? make_box(j->n, j->h_m, &mesh, note) : PAL_ERR_MEMORY;
-    if (!err) err = make_scene(j, &mesh, 0, "implicit_euler", scene, note);
-    if (!err) err = pal_world_create(scene, note, &world);
+    pal_err err = scene ? make_box(j->n, j->edge_m, &mesh, diag) : PAL_ERR_MEMORY;
+    if (!err) err = make_scene(j, &mesh, 0, "implicit_euler", scene, diag);
+    if (!err) err = pal_world_create(scene, diag, &world);
     *out = (result){0};
     int half = (int)lround(0.5 / j->step_s);
     for (int i = -half; i < N_STEP && !err; i++) {
@@ -131,7 +131,7 @@ static pal_err run_live(const job *j, result *out, pal_note *note)
         pal_world_solve_report(world, 0, &report);
         ms[i] = 1e3 * (pal_clock_s() - began), force[i] = row_ms(world, "force");
         out->mean_cg += (double)report.n_cg / N_STEP;
-        out->most_cg = fmax(out->most_cg, report.n_cg);
+        out->max_cg = fmax(out->max_cg, report.n_cg);
         const pal_body *body = pal_world_body(world, 0);
         for (int k = 0; k < body->n_node; k++)
             out->tip_m = fmax(out->tip_m, fabs(body->x[3 * k + 2] - body->x_rest[3 * k + 2]));
@@ -155,15 +155,19 @@ typedef struct static_result {
 } static_result;
 
 /* the reference cube: 0.1 m, nu 0.499, soft over stiff, a patch of its top pushed down and sideways */
-static pal_err run_static(int n, static_result *out, pal_note *note)
+static pal_err run_static(int n, static_result *out, pal_diagnostic *diag)
 {
-    const job j = {
-        .element = "hex8_bbar", .law = "linear", .n = {n, n, n}, .h_m = 0.1 / n, .poisson = 0.499, .step_s = 1.0 / 60};
+    const job j = {.element = "hex8_bbar",
+                   .law = "linear",
+                   .n = {n, n, n},
+                   .edge_m = 0.1 / n,
+                   .poisson = 0.499,
+                   .step_s = 1.0 / 60};
     pal_prepared mesh = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? make_box(j.n, j.h_m, &mesh, note) : PAL_ERR_MEMORY;
-    if (!err) err = make_scene(&j, &mesh, 2, "static_newton", scene, note);
+    pal_err err = scene ? make_box(j.n, j.edge_m, &mesh, diag) : PAL_ERR_MEMORY;
+    if (!err) err = make_scene(&j, &mesh, 2, "static_newton", scene, diag);
     if (!err) {
         pal_region *soft = &scene->body[0].region[scene->body[0].n_region++];
         *soft = (pal_region){.kind = PAL_REGION_BOX, .young_Pa = 5e4, .poisson = NAN, .density_kg_m3 = NAN};
@@ -172,7 +176,7 @@ static pal_err run_static(int n, static_result *out, pal_note *note)
         soft->low_m[2] = 0.05;
     }
     double began = pal_clock_s();
-    if (!err) err = pal_world_create(scene, note, &world);
+    if (!err) err = pal_world_create(scene, diag, &world);
     out->create_ms = 1e3 * (pal_clock_s() - began);
     const double force[3] = {5, 0, -12.5};
     if (!err) err = load_face(world, 2, 0.025, 0.075, force);
@@ -214,7 +218,7 @@ static void print_table(const result *r, const static_result *s)
             printf("%7.1f ", j->limit_ms);
         else
             printf("%7s ", "");
-        printf("%10.3f %8.1f %8.0f %6.3f\n", r[k].force_ms, r[k].mean_cg, r[k].most_cg, r[k].tip_m);
+        printf("%10.3f %8.1f %8.0f %6.3f\n", r[k].force_ms, r[k].mean_cg, r[k].max_cg, r[k].tip_m);
     }
     printf("static cube, nu 0.499, %d nodes: made in %.0f ms, solved in %.0f ms (%.0f of it factors), %d Newton "
            "iterations, residual %.1e, limit 1500 ms\n",
@@ -230,7 +234,7 @@ static void print_json(const result *r, const static_result *s)
                "\"warp\":%s,\"p50_ms\":%.4f,\"p95_ms\":%.4f,\"force_ms\":%.4f,\"cg_mean\":%.2f,\"cg_most\":%.0f,"
                "\"tip_m\":%.4f}",
                k ? "," : "", j->name, j->element, j->law, r[k].n_node, r[k].n_element, j->step_s,
-               j->warp ? "true" : "false", r[k].p50_ms, r[k].p95_ms, r[k].force_ms, r[k].mean_cg, r[k].most_cg,
+               j->warp ? "true" : "false", r[k].p50_ms, r[k].p95_ms, r[k].force_ms, r[k].mean_cg, r[k].max_cg,
                r[k].tip_m);
     }
     printf("],\"static\":{\"nodes\":%d,\"make_ms\":%.2f,\"solve_ms\":%.2f,\"factor_ms\":%.2f,\"newton\":%d,"
@@ -243,12 +247,12 @@ int bench_fem(bool json)
 {
     result r[N_JOB];
     static_result s = {0};
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < N_JOB && !err; k++) err = run_live(&jobs[k], &r[k], &note);
-    if (!err) err = run_static(16, &s, &note);
+    for (int k = 0; k < N_JOB && !err; k++) err = run_live(&jobs[k], &r[k], &diag);
+    if (!err) err = run_static(16, &s, &diag);
     if (err) {
-        fprintf(stderr, "palpate bench: fem: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate bench: fem: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;
     }
     if (json)

@@ -31,19 +31,19 @@ typedef struct guards {
 
 /* what scenes of the four models are made of */
 typedef struct bodies {
-    pal_prepared voxels, shell, boundary;
+    pal_prepared voxels, adaptive, boundary;
     pal_cells cells;
 } bodies;
 
-static pal_err make_bodies(bodies *b, pal_note *note)
+static pal_err make_bodies(bodies *b, pal_diagnostic *diag)
 {
     pal_surface organ = {0}, faces = {0};
     pal_voxel_options options = {.resolution = 18, .border = true, .fill = true};
     pal_prepare_report report;
     pal_err err = pal_organ_make(2000, &organ);
-    if (!err) err = pal_prepared_make(&organ, &options, &b->voxels, &report, note);
-    if (!err) err = pal_prepared_surface(&organ, &b->shell);
-    if (!err) err = pal_cell_model_make(pal_cell_model_find("chair"), &b->cells, note);
+    if (!err) err = pal_prepared_make(&organ, &options, &b->voxels, &report, diag);
+    if (!err) err = pal_prepared_surface(&organ, &b->adaptive);
+    if (!err) err = pal_cell_model_make(pal_cell_model_find("chair"), &b->cells, diag);
     if (!err) err = pal_cells_boundary(&b->cells, &faces, NULL, NULL);
     if (!err) err = pal_prepared_surface(&faces, &b->boundary);
     pal_surface_free(&organ);
@@ -54,7 +54,7 @@ static pal_err make_bodies(bodies *b, pal_note *note)
 static void free_bodies(bodies *b)
 {
     pal_prepared_free(&b->voxels);
-    pal_prepared_free(&b->shell);
+    pal_prepared_free(&b->adaptive);
     pal_prepared_free(&b->boundary);
     pal_cells_free(&b->cells);
 }
@@ -63,7 +63,7 @@ static const char *const model_name[N_CASE] = {"tet_springs", "fem", "adaptive_s
 /* pairs of worlds: where guards are dear beside a short step there have to be many */
 static const int n_round[N_CASE] = {10, 40, 40, 4};
 
-static pal_err dress(pal_scene *scene, const bodies *b, int which, bool guard, pal_note *note)
+static pal_err dress(pal_scene *scene, const bodies *b, int which, bool guard, pal_diagnostic *diag)
 {
     pal_scene_default(scene);
     scene->n_body = 1;
@@ -71,26 +71,26 @@ static pal_err dress(pal_scene *scene, const bodies *b, int which, bool guard, p
     if (which == 3)
         pal_body_default_cells(def, "body", &b->boundary, &b->cells);
     else
-        pal_body_default(def, "body", which == 2 ? &b->shell : &b->voxels);
-    pal_item_init(&def->model, "model", model_name[which]);
+        pal_body_default(def, "body", which == 2 ? &b->adaptive : &b->voxels);
+    pal_entry_init(&def->model, "model", model_name[which]);
     def->support[0].fraction = 0.15;
     /* little: under all of its own weight this one topples over its foot, and is rescued in every step */
     scene->gravity_m_s2 = 0.5;
     if (which == 1) {
-        pal_item_init(&def->solver, "solver", "implicit_euler");
-        if (pal_item_put_bool(&def->solver, "watch", guard, note)) return PAL_ERR_REFUSED;
+        pal_entry_init(&def->solver, "solver", "implicit_euler");
+        if (pal_entry_put_bool(&def->solver, "watch", guard, diag)) return PAL_ERR_REFUSED;
     }
     def->n_effect = 0;
-    pal_item_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
-    if (guard) pal_item_init(&def->effect[def->n_effect++], "effects[1]", "finite_guard");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
+    if (guard) pal_entry_init(&def->effect[def->n_effect++], "effects[1]", "finite_guard");
     return PAL_ERR_OK;
 }
 
 static double row_ms(const pal_world *world, const char *name)
 {
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         if (!strcmp(info.name, name)) return 1e-6 * (double)info.spent_ns;
     }
     return 0;
@@ -141,15 +141,15 @@ static void take_least(double *least, double ms, bool first)
 }
 
 /* both worlds made, stepped in turn and gone; what is no sum of times goes to out from the guarded one */
-static pal_err one_round(const bodies *b, int which, int round, times *t, guards *out, pal_note *note)
+static pal_err one_round(const bodies *b, int which, int round, times *t, guards *out, pal_diagnostic *diag)
 {
     static pal_scene scene[2];
     pal_world *world[2] = {NULL, NULL};
     pal_err err = PAL_ERR_OK;
     for (int turn = 0; turn < 2 && !err; turn++) {
         int g = (round + turn) & 1;
-        err = dress(&scene[g], b, which, g == 1, note);
-        if (!err) err = pal_world_create(&scene[g], note, &world[g]);
+        err = dress(&scene[g], b, which, g == 1, diag);
+        if (!err) err = pal_world_create(&scene[g], diag, &world[g]);
     }
     for (int k = -N_WARM; k < N_STEP && !err; k++) {
         for (int turn = 0; turn < 2 && !err; turn++) {
@@ -165,7 +165,7 @@ static pal_err one_round(const bodies *b, int which, int round, times *t, guards
     if (!err) {
         out->n_point = pal_world_body(world[1], 0)->n_active;
         out->n_sub = pal_world_substeps(world[1]);
-        out->n_rescue += pal_rescues_sum(&pal_world_body(world[1], 0)->rescue);
+        out->n_rescue += pal_safeguards_sum(&pal_world_body(world[1], 0)->safeguards);
         out->looks_ms = looks_ms(world[1]);
         out->watches = pal_world_body(world[1], 0)->implicit;
     }
@@ -173,12 +173,12 @@ static pal_err one_round(const bodies *b, int which, int round, times *t, guards
     return err;
 }
 
-static pal_err measure(const bodies *b, int which, guards *out, pal_note *note)
+static pal_err measure(const bodies *b, int which, guards *out, pal_diagnostic *diag)
 {
     static times t;
     pal_err err = PAL_ERR_OK;
     *out = (guards){.model = model_name[which]};
-    for (int round = 0; round < n_round[which] && !err; round++) err = one_round(b, which, round, &t, out, note);
+    for (int round = 0; round < n_round[which] && !err; round++) err = one_round(b, which, round, &t, out, diag);
     for (int k = 0; k < N_STEP; k++) {
         out->with_ms += t.ms[1][k] / N_STEP;
         out->without_ms += t.ms[0][k] / N_STEP;
@@ -252,12 +252,12 @@ int bench_guards(bool json)
 {
     bodies b = {0};
     guards r[N_CASE] = {0};
-    pal_note note = {""};
-    pal_err err = make_bodies(&b, &note);
-    for (int k = 0; k < N_CASE && !err; k++) err = measure(&b, k, &r[k], &note);
+    pal_diagnostic diag = {""};
+    pal_err err = make_bodies(&b, &diag);
+    for (int k = 0; k < N_CASE && !err; k++) err = measure(&b, k, &r[k], &diag);
     free_bodies(&b);
     if (err) {
-        fprintf(stderr, "palpate bench: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate bench: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
         return 3;
     }
     if (json)

@@ -81,13 +81,13 @@ int bench_latency(bool json)
     bell b = {.lock = PTHREAD_MUTEX_INITIALIZER, .rung = PTHREAD_COND_INITIALIZER};
     pal_loaded_scene *loaded = NULL;
     pal_session *session = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_session_options options = {.lease_s = 5, .wake = ring, .user = &b};
-    pal_err err = pal_scene_procedural(&plain, &loaded, NULL, &note);
-    if (!err) err = pal_session_open(&loaded->scene, &options, &note, &session);
+    pal_err err = pal_scene_procedural(&plain, &loaded, NULL, &diag);
+    if (!err) err = pal_session_open(&loaded->scene, &options, &diag, &session);
     if (err) {
         pal_scene_free(loaded);
-        return pal_report_refusal(&common, err, &note);
+        return pal_report_refusal(&common, err, &diag);
     }
     double step_ms = 1e3 * loaded->scene.step_s;
     for (int k = -WARM; k < POSES; k++) {

@@ -83,7 +83,7 @@ static void forget_peak(void)
     fclose(file);
 }
 
-static pal_err run_case(const pal_surface *surface, int resolution, result *out, pal_note *note)
+static pal_err run_case(const pal_surface *surface, int resolution, result *out, pal_diagnostic *diag)
 {
     double fill[N_RUN], split[N_RUN], total[N_RUN];
     pal_voxel_options options = {.resolution = resolution, .border = true};
@@ -94,12 +94,12 @@ static pal_err run_case(const pal_surface *surface, int resolution, result *out,
         pal_voxel_report report;
         pal_tets tets;
         double began = pal_clock_s();
-        PAL_TRY(pal_voxels_fill(surface, &options, &voxels, &report, note));
+        PAL_TRY(pal_voxels_fill(surface, &options, &voxels, &report, diag));
         double filled = pal_clock_s();
         pal_err err = pal_voxels_split(&voxels, &tets);
         double ended = pal_clock_s();
         pal_voxels_free(&voxels);
-        if (err) return pal_note_set(note, err, "cannot split at resolution %d", resolution);
+        if (err) return pal_diagnostic_set(diag, err, "cannot split at resolution %d", resolution);
         fill[k] = 1e3 * (filled - began), split[k] = 1e3 * (ended - filled), total[k] = 1e3 * (ended - began);
         if (k == 0) out->peak_bytes = memory_of("VmHWM") - resident;
         out->n_tet = tets.n_tet;
@@ -139,20 +139,20 @@ static void print_json(const pal_surface *surface, double read_ms, const result 
 int bench_mesh(const char *ply_path_or_null, bool json)
 {
     pal_surface surface = {0};
-    pal_note note = {.text = "out of memory"};
+    pal_diagnostic diag = {.text = "out of memory"};
     result r[N_CASE];
     double read_ms = -1, began = pal_clock_s();
     pal_err err;
     if (ply_path_or_null) {
         pal_mesh_file_options options = {.weld = 0};
-        err = pal_mesh_file_read(ply_path_or_null, &options, &surface, NULL, NULL, NULL, &note);
+        err = pal_mesh_file_read(ply_path_or_null, &options, &surface, NULL, NULL, NULL, &diag);
         read_ms = 1e3 * (pal_clock_s() - began);
     } else {
         err = make_body(&surface);
     }
-    for (int k = 0; !err && k < N_CASE; k++) err = run_case(&surface, CASE[k].resolution, &r[k], &note);
+    for (int k = 0; !err && k < N_CASE; k++) err = run_case(&surface, CASE[k].resolution, &r[k], &diag);
     if (err)
-        fprintf(stderr, "bench mesh: %s\n", note.text);
+        fprintf(stderr, "bench mesh: %s\n", diag.text);
     else if (json)
         print_json(&surface, read_ms, r);
     else

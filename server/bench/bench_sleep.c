@@ -37,24 +37,24 @@ static pal_err timed(pal_world *world, double step_s, bool awake, double *median
     return PAL_ERR_OK;
 }
 
-static pal_err measure_world(const pal_scene *scene, result *out, pal_note *note)
+static pal_err measure_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
 {
     pal_world *world;
-    PAL_TRY(pal_world_create(scene, note, &world));
+    PAL_TRY(pal_world_create(scene, diag, &world));
     const pal_body *body = pal_world_body(world, 0);
     pal_err err = PAL_ERR_OK;
     out->n_node = body->n_node;
     int n = 0;
     for (; n < MOST_STEP && !body->asleep && !err; n++) err = pal_world_step(world, scene->step_s);
     out->asleep_s = n * scene->step_s;
-    if (body->frozen) err = pal_note_set(note, PAL_ERR_NUMERIC, "%s stopped: %s", out->name, body->why);
+    if (body->frozen) err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s stopped: %s", out->name, body->reason);
     if (!err && !body->asleep)
-        err = pal_note_set(note, PAL_ERR_NUMERIC, "%s does not come to rest in %g s", out->name, out->asleep_s);
+        err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s does not come to rest in %g s", out->name, out->asleep_s);
     pal_pose pose = {.quat = {1, 0, 0, 0}};
-    for (int c = 0; c < 3; c++) pose.position_m[c] = 1.5 * body->size_m * scene->up[c];
+    for (int c = 0; c < 3; c++) pose.position_m[c] = 1.5 * body->length_scale_m * scene->up[c];
     if (!err) err = pal_world_pose(world, 0, &pose);
     if (!err) err = timed(world, scene->step_s, false, &out->asleep_ms);
-    if (!err && !body->asleep) err = pal_note_set(note, PAL_ERR_INTERNAL, "%s woke by itself", out->name);
+    if (!err && !body->asleep) err = pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "%s woke by itself", out->name);
     if (!err) err = timed(world, scene->step_s, true, &out->awake_ms);
     if (!err) err = pal_world_pose(world, 0, NULL);
     if (!err) pal_world_watch(world, false);
@@ -63,34 +63,34 @@ static pal_err measure_world(const pal_scene *scene, result *out, pal_note *note
     return err;
 }
 
-static pal_err measure_organ(const pal_surface_scene *options, result *out, pal_note *note)
+static pal_err measure_organ(const pal_surface_scene *options, result *out, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = NULL;
-    PAL_TRY(pal_scene_procedural(options, &loaded, NULL, note));
-    pal_err err = measure_world(&loaded->scene, out, note);
+    PAL_TRY(pal_scene_procedural(options, &loaded, NULL, diag));
+    pal_err err = measure_world(&loaded->scene, out, diag);
     pal_scene_free(loaded);
     return err;
 }
 
-static pal_err measure_solid(const pal_cell_model *model, result *out, pal_note *note)
+static pal_err measure_solid(const pal_cell_model *model, result *out, pal_diagnostic *diag)
 {
     pal_cells cells = {0};
     pal_prepared mesh = {0};
     pal_surface surface = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     if (!scene) return PAL_ERR_MEMORY;
-    pal_err err = pal_cell_model_make(model, &cells, note);
+    pal_err err = pal_cell_model_make(model, &cells, diag);
     if (!err) err = pal_cells_boundary(&cells, &surface, NULL, NULL);
     if (!err) err = pal_prepared_surface(&surface, &mesh);
     pal_surface_free(&surface);
     if (!err) {
         pal_scene_default(scene);
         pal_body_default_cells(&scene->body[0], model->name, &mesh, &cells);
-        pal_item_init(&scene->body[0].effect[scene->body[0].n_effect++], "effects[4]", "sleep");
+        pal_entry_init(&scene->body[0].effect[scene->body[0].n_effect++], "effects[4]", "sleep");
         scene->n_body = 1;
         pal_tools_default(scene, 1);
-        err = pal_item_put_number(&scene->body[0].model, "levels", model->n_level, note);
-        if (!err) err = measure_world(scene, out, note);
+        err = pal_entry_put_number(&scene->body[0].model, "levels", model->n_level, diag);
+        if (!err) err = measure_world(scene, out, diag);
     }
     pal_prepared_free(&mesh);
     pal_cells_free(&cells);
@@ -123,15 +123,15 @@ int bench_sleep(bool json)
 {
     result r[CASES] = {{.name = "tet_springs"}, {.name = "fem"}, {.name = "adaptive_springs"}};
     const pal_surface_scene springs = {.label = -1}, fem = {.label = -1, .fem = true},
-                            shell = {.label = -1, .adaptive = true, .shape = "stomach"};
-    pal_note note = {""};
-    pal_err err = measure_organ(&springs, &r[0], &note);
-    if (!err) err = measure_organ(&fem, &r[1], &note);
-    if (!err) err = measure_organ(&shell, &r[2], &note);
+                            adaptive = {.label = -1, .adaptive = true, .shape = "stomach"};
+    pal_diagnostic diag = {""};
+    pal_err err = measure_organ(&springs, &r[0], &diag);
+    if (!err) err = measure_organ(&fem, &r[1], &diag);
+    if (!err) err = measure_organ(&adaptive, &r[2], &diag);
     r[3].name = "subdivision_fem";
-    if (!err) err = measure_solid(pal_cell_model_find("block3"), &r[3], &note);
+    if (!err) err = measure_solid(pal_cell_model_find("block3"), &r[3], &diag);
     if (err) {
-        fprintf(stderr, "palpate bench: sleep: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate bench: sleep: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;
     }
     print(r, json);

@@ -12,7 +12,7 @@
 #include "server/base/clock.h"
 #include "server/cli/median.h"
 #include "server/mesh/cells/cell_models.h"
-#include "server/sim/subdivision/solid.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
 
 #include <math.h>
@@ -38,7 +38,7 @@ typedef struct result {
     double percent[PAL_CELL_KINDS];
     double paper_ms;                  /* 0: not in the table */
     double step_ms[OPERATORS], ratio; /* ratio: of the default operator; 0 without the paper's */
-    double mean_cg, most_cg;          /* of the default preconditioner, a factor of M~ */
+    double mean_cg, max_cg;           /* of the default preconditioner, a factor of M~ */
     double diagonal_cg;               /* with the paper's */
     int n_sub;                        /* sub-steps of central_cg a frame, at most */
     double explicit_ms, implicit_ms;  /* of a frame; median */
@@ -53,13 +53,13 @@ typedef struct body {
     pal_world *world;
 } body;
 
-static pal_err take(const pal_cell_model *model, body *b, pal_note *note)
+static pal_err take(const pal_cell_model *model, body *b, pal_diagnostic *diag)
 {
     pal_surface surface = {0};
     memset(b, 0, sizeof *b);
     b->scene = calloc(1, sizeof *b->scene);
     if (!b->scene) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_cell_model_make(model, &b->cells, note));
+    PAL_TRY(pal_cell_model_make(model, &b->cells, diag));
     pal_err err = pal_cells_boundary(&b->cells, &surface, NULL, NULL);
     if (!err) err = pal_prepared_surface(&surface, &b->mesh);
     pal_surface_free(&surface);
@@ -76,23 +76,23 @@ static void leave(body *b)
 
 /* a world of the solid under gravity, the lowest part held */
 static pal_err start(const pal_cell_model *model, const char *operator, const char * solver, const char *preconditioner,
-                     body *b, pal_note *note)
+                     body *b, pal_diagnostic *diag)
 {
     pal_world_destroy(b->world);
     b->world = NULL;
     pal_scene_default(b->scene);
     b->scene->n_body = 1;
     b->scene->step_s = frame_s;
-    b->scene->most_substep = 1000000;
+    b->scene->max_substep = 1000000;
     pal_body_def *def = &b->scene->body[0];
     pal_body_default_cells(def, "solid", &b->mesh, &b->cells);
     def->n_effect = 1;
-    pal_item_init(&def->effect[0], "effects[0]", "gravity");
-    PAL_TRY(pal_item_put_number(&def->model, "levels", model->n_level, note));
-    PAL_TRY(pal_item_put_text(&def->model, "operator", operator, note));
-    pal_item_init(&def->solver, "solver", solver);
-    if (preconditioner) PAL_TRY(pal_item_put_text(&def->solver, "preconditioner", preconditioner, note));
-    return pal_world_create(b->scene, note, &b->world);
+    pal_entry_init(&def->effect[0], "effects[0]", "gravity");
+    PAL_TRY(pal_entry_put_number(&def->model, "levels", model->n_level, diag));
+    PAL_TRY(pal_entry_put_text(&def->model, "operator", operator, diag));
+    pal_entry_init(&def->solver, "solver", solver);
+    if (preconditioner) PAL_TRY(pal_entry_put_text(&def->solver, "preconditioner", preconditioner, diag));
+    return pal_world_create(b->scene, diag, &b->world);
 }
 
 static int iterations(const body *b)
@@ -103,30 +103,30 @@ static int iterations(const body *b)
 }
 
 /* n explicit steps of one sub-step each, after as many as it takes to begin; ms of each, iterations */
-static pal_err run_steps(body *b, int n, double *ms, double *mean_cg, double *most_cg, pal_note *note)
+static pal_err run_steps(body *b, int n, double *ms, double *mean_cg, double *max_cg, pal_diagnostic *diag)
 {
     double sum = 0, most = 0;
     for (int i = -n / 10; i < n; i++) {
         /* drag and motion change the limit by little */
         uint64_t began = pal_clock_thread_ns();
         if (pal_world_step(b->world, 0.9 * pal_world_limit_s(b->world)))
-            return pal_note_set(note, PAL_ERR_FROZEN, "an explicit step failed");
+            return pal_diagnostic_set(diag, PAL_ERR_FROZEN, "an explicit step failed");
         if (i < 0) continue;
         ms[i] = 1e-6 * (double)(pal_clock_thread_ns() - began) / pal_world_substeps(b->world);
         sum += iterations(b), most = fmax(most, iterations(b));
     }
     if (mean_cg) *mean_cg = sum / n;
-    if (most_cg) *most_cg = most;
+    if (max_cg) *max_cg = most;
     return PAL_ERR_OK;
 }
 
 /* frames; ms of each */
-static pal_err run_frames(body *b, int n, double *ms, int *n_sub, double *mean_cg, pal_note *note)
+static pal_err run_frames(body *b, int n, double *ms, int *n_sub, double *mean_cg, pal_diagnostic *diag)
 {
     double sum = 0;
     for (int i = -2; i < n; i++) {
         uint64_t began = pal_clock_thread_ns();
-        if (pal_world_step(b->world, frame_s)) return pal_note_set(note, PAL_ERR_FROZEN, "a frame failed");
+        if (pal_world_step(b->world, frame_s)) return pal_diagnostic_set(diag, PAL_ERR_FROZEN, "a frame failed");
         if (i < 0) continue;
         ms[i] = 1e-6 * (double)(pal_clock_thread_ns() - began);
         sum += iterations(b);
@@ -148,27 +148,27 @@ static void describe(const pal_cell_model *model, const body *b, result *out)
         if (!strcmp(paper[k].name, model->name)) out->paper_ms = paper[k].ms;
 }
 
-static pal_err measure(const pal_cell_model *model, result *out, pal_note *note)
+static pal_err measure(const pal_cell_model *model, result *out, pal_diagnostic *diag)
 {
     static double ms[N_STEP];
     body b;
     *out = (result){0};
-    pal_err err = take(model, &b, note);
+    pal_err err = take(model, &b, diag);
     for (int op = 0; op < OPERATORS && !err; op++) {
-        err = start(model, operator_name[op], "central_cg", NULL, &b, note);
+        err = start(model, operator_name[op], "central_cg", NULL, &b, diag);
         if (!err && op == 0) describe(model, &b, out);
-        if (!err) err = run_steps(&b, N_STEP, ms, op ? NULL : &out->mean_cg, op ? NULL : &out->most_cg, note);
+        if (!err) err = run_steps(&b, N_STEP, ms, op ? NULL : &out->mean_cg, op ? NULL : &out->max_cg, diag);
         if (!err) out->step_ms[op] = pal_median(ms, N_STEP);
     }
-    if (!err) err = start(model, operator_name[0], "central_cg", "diagonal", &b, note);
-    if (!err) err = run_steps(&b, N_STEP / 8, ms, &out->diagonal_cg, NULL, note);
-    if (!err) err = start(model, operator_name[0], "central_cg", NULL, &b, note);
-    if (!err) err = run_frames(&b, N_FRAME / 4, ms, &out->n_sub, NULL, note);
+    if (!err) err = start(model, operator_name[0], "central_cg", "diagonal", &b, diag);
+    if (!err) err = run_steps(&b, N_STEP / 8, ms, &out->diagonal_cg, NULL, diag);
+    if (!err) err = start(model, operator_name[0], "central_cg", NULL, &b, diag);
+    if (!err) err = run_frames(&b, N_FRAME / 4, ms, &out->n_sub, NULL, diag);
     if (!err) out->explicit_ms = pal_median(ms, N_FRAME / 4);
     uint64_t began = pal_clock_thread_ns();
-    if (!err) err = start(model, operator_name[0], "implicit_euler", NULL, &b, note);
+    if (!err) err = start(model, operator_name[0], "implicit_euler", NULL, &b, diag);
     out->make_ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
-    if (!err) err = run_frames(&b, N_FRAME, ms, NULL, &out->implicit_cg, note);
+    if (!err) err = run_frames(&b, N_FRAME, ms, NULL, &out->implicit_cg, diag);
     if (!err) out->implicit_ms = pal_median(ms, N_FRAME);
     if (!err && out->paper_ms > 0) out->ratio = out->paper_ms / out->step_ms[0];
     leave(&b);
@@ -199,7 +199,7 @@ static void print_table(const result *r)
         print_paper(r[k].paper_ms);
         printf("%8.3f %9.3f ", r[k].step_ms[0], r[k].step_ms[1]);
         print_paper(r[k].ratio);
-        printf("%7.2f %5.0f %9.1f %17d %9.2f %8.2f %12.3f %7.1f %5.1f %8.0f\n", r[k].mean_cg, r[k].most_cg,
+        printf("%7.2f %5.0f %9.1f %17d %9.2f %8.2f %12.3f %7.1f %5.1f %8.0f\n", r[k].mean_cg, r[k].max_cg,
                r[k].diagonal_cg, r[k].n_sub, r[k].explicit_ms, 1e3 * frame_s / r[k].explicit_ms, r[k].implicit_ms,
                1e3 * frame_s / r[k].implicit_ms, r[k].implicit_cg, r[k].make_ms);
     }
@@ -220,7 +220,7 @@ static void print_json(const result *r)
                "\"implicit_cg\":%.2f,\"implicit_make_ms\":%.1f}",
                k ? "," : "", m->name, m->n_level, r[k].n_cell, r[k].n_point, r[k].n_element, m->n_element,
                r[k].percent[0], r[k].percent[1], r[k].percent[2], r[k].paper_ms, r[k].step_ms[0], r[k].step_ms[1],
-               r[k].ratio, r[k].mean_cg, r[k].most_cg, r[k].diagonal_cg, r[k].n_sub, r[k].explicit_ms, r[k].implicit_ms,
+               r[k].ratio, r[k].mean_cg, r[k].max_cg, r[k].diagonal_cg, r[k].n_sub, r[k].explicit_ms, r[k].implicit_ms,
                r[k].implicit_cg, r[k].make_ms);
     }
     printf("]}\n");
@@ -229,11 +229,11 @@ static void print_json(const result *r)
 int bench_solids(bool json)
 {
     result r[PAL_CELL_MODELS];
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) err = measure(&pal_cell_model_list[k], &r[k], &note);
+    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) err = measure(&pal_cell_model_list[k], &r[k], &diag);
     if (err) {
-        fprintf(stderr, "palpate bench: solids: %s\n", note.text[0] ? note.text : pal_err_text(err));
+        fprintf(stderr, "palpate bench: solids: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
         return err == PAL_ERR_MEMORY ? 3 : 1;
     }
     if (json)

@@ -71,7 +71,7 @@ static double measure_fma(void)
 static pal_err make_box(const int n[3], pal_prepared *out)
 {
     size_t n_voxel = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .h_m = 0.006, .n_inside = (int64_t)n_voxel};
+    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .edge_m = 0.006, .n_inside = (int64_t)n_voxel};
     memset(out, 0, sizeof *out);
     voxels.kind = malloc(n_voxel);
     if (!voxels.kind) return PAL_ERR_MEMORY;
@@ -82,7 +82,7 @@ static pal_err make_box(const int n[3], pal_prepared *out)
 }
 
 /* an organ shown with 50,000 triangles, at the resolution whose mesh comes nearest to 13,000 tetrahedra */
-static pal_err make_organ(pal_prepared *out, pal_note *note)
+static pal_err make_organ(pal_prepared *out, pal_diagnostic *diag)
 {
     pal_surface surface = {0};
     PAL_TRY(pal_organ_make(50000, &surface));
@@ -93,7 +93,7 @@ static pal_err make_organ(pal_prepared *out, pal_note *note)
         pal_voxel_options options = {.resolution = resolution, .border = true};
         pal_voxels voxels;
         pal_voxel_report report;
-        err = pal_voxels_fill(&surface, &options, &voxels, &report, note);
+        err = pal_voxels_fill(&surface, &options, &voxels, &report, diag);
         if (err) break;
         double apart = fabs(5.0 * (double)(voxels.n_inside + voxels.n_border) - 13000);
         if (apart < nearest) nearest = apart, best = resolution;
@@ -101,7 +101,7 @@ static pal_err make_organ(pal_prepared *out, pal_note *note)
     }
     pal_voxel_options options = {.resolution = best, .border = true};
     pal_prepare_report report;
-    if (!err) err = pal_prepared_make(&surface, &options, out, &report, note);
+    if (!err) err = pal_prepared_make(&surface, &options, out, &report, diag);
     pal_surface_free(&surface);
     return err;
 }
@@ -124,9 +124,9 @@ static void sum_rows(const pal_world *world, result *r, double *skin_ns)
 {
     static const char *const springs[3] = {"edge_distance", "face_area", "tet_volume"};
     *skin_ns = r->step_ms = r->solve_ms = 0;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         double ms = 1e-6 * (double)info.spent_ns / r->n_sub;
         if (!strcmp(info.stage, "output")) *skin_ns = (double)info.spent_ns;
         if (!strcmp(info.stage, "solve")) r->solve_ms = ms;
@@ -136,11 +136,11 @@ static void sum_rows(const pal_world *world, result *r, double *skin_ns)
     }
 }
 
-static pal_err run_world(const pal_scene *scene, result *out, pal_note *note)
+static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
 {
     double step[N_STEP], row[3][N_STEP], solve[N_STEP], skin[N_STEP];
     pal_world *world;
-    PAL_TRY(pal_world_create(scene, note, &world));
+    PAL_TRY(pal_world_create(scene, diag, &world));
     pal_err err = PAL_ERR_OK;
     for (int i = -2; i < N_STEP && !err; i++) {
         pal_world_wake(world);
@@ -152,14 +152,14 @@ static pal_err run_world(const pal_scene *scene, result *out, pal_note *note)
         for (int k = 0; k < 3; k++) row[k][i] = out->row_ms[k];
     }
     pal_world_destroy(world);
-    if (err) return pal_note_set(note, err, "the step failed: %s", pal_err_text(err));
+    if (err) return pal_diagnostic_set(diag, err, "the step failed: %s", pal_err_text(err));
     out->step_ms = pal_median(step, N_STEP), out->solve_ms = pal_median(solve, N_STEP);
     out->skin_ms = 1e-6 * pal_median(skin, N_STEP);
     for (int k = 0; k < 3; k++) out->row_ms[k] = pal_median(row[k], N_STEP);
     return PAL_ERR_OK;
 }
 
-static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, result *out, pal_note *note)
+static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, result *out, pal_diagnostic *diag)
 {
     *out = (result){.n_tet = mesh->tets.n_tet, .n_node = mesh->tets.n_node, .limit_ms = limit_ms};
     snprintf(out->name, sizeof out->name, "%s", name);
@@ -174,7 +174,7 @@ static pal_err run_case(const char *name, const pal_prepared *mesh, double limit
         scene->body[0].output.name[0] = 0;
     scene->body[0].n_effect = 1;
     pal_err err = count_work(&mesh->tets, out);
-    if (!err) err = run_world(scene, out, note);
+    if (!err) err = run_world(scene, out, diag);
     free(scene);
     return err;
 }
@@ -217,14 +217,14 @@ int bench_springs(bool json)
     static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k"};
     static const double limit_ms[N_CASE] = {0.25, 3, 0.25};
     result r[N_CASE];
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     for (int k = 0; k < N_CASE; k++) {
         pal_prepared mesh = {0};
-        pal_err err = k < 2 ? make_box(box[k], &mesh) : make_organ(&mesh, &note);
-        if (!err) err = run_case(name[k], &mesh, limit_ms[k], &r[k], &note);
+        pal_err err = k < 2 ? make_box(box[k], &mesh) : make_organ(&mesh, &diag);
+        if (!err) err = run_case(name[k], &mesh, limit_ms[k], &r[k], &diag);
         pal_prepared_free(&mesh);
         if (err) {
-            fprintf(stderr, "palpate bench: springs: %s\n", note.text[0] ? note.text : pal_err_text(err));
+            fprintf(stderr, "palpate bench: springs: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
             return err == PAL_ERR_MEMORY ? 3 : 1;
         }
     }

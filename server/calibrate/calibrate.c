@@ -16,7 +16,7 @@ typedef struct job {
     pal_calibration *c;
     const pal_surface *surface;
     pal_locate *locate;
-    pal_note *note;
+    pal_diagnostic *diag;
 } job;
 
 void pal_calibrate_default(pal_calibrate_options *options)
@@ -27,7 +27,7 @@ void pal_calibrate_default(pal_calibrate_options *options)
 
 static pal_err no_memory(const job *j, const char *what)
 {
-    return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for %s", what);
+    return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for %s", what);
 }
 
 /* ---- the body ---- */
@@ -78,16 +78,16 @@ static pal_err make_world(const job *j)
     memcpy(body->support, c->support, sizeof c->support);
     /* constants of 1 J: only the weights of the rows are taken */
     static const char *const key[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
-    pal_item_init(&body->model, "model", "tet_springs");
-    pal_err err = pal_item_put_text(&body->model, "weights", c->options.equal ? "equal" : "volume", j->note);
+    pal_entry_init(&body->model, "model", "tet_springs");
+    pal_err err = pal_entry_put_text(&body->model, "weights", c->options.equal ? "equal" : "volume", j->diag);
     for (int k = 0; k < PAL_SPRING_KINDS && !err; k++)
-        err =
-            pal_item_put_number(&body->model, key[k], k == PAL_SPRING_AREA && c->options.without_area ? 0 : 1, j->note);
+        err = pal_entry_put_number(&body->model, key[k], k == PAL_SPRING_AREA && c->options.without_area ? 0 : 1,
+                                   j->diag);
     scene->step_s = 1e-4; /* never taken; springs of 1 J have a limit of their own */
-    scene->most_substep = 2000;
-    if (!err) err = pal_world_create(scene, j->note, &c->world);
+    scene->max_substep = 2000;
+    if (!err) err = pal_world_create(scene, j->diag, &c->world);
     free(scene);
-    return err ? err : pal_lattice_take(c->world, 0, &c->lattice, j->note);
+    return err ? err : pal_lattice_take(c->world, 0, &c->lattice, j->diag);
 }
 
 /* held nodes on one line let the body turn about it: neither truth nor springs have a rest then */
@@ -97,7 +97,7 @@ static pal_err check_hold(const job *j)
     double first[3] = {0}, along[3] = {0}, d[3], out[3], longest = 0, widest = 0;
     int n_held = 0;
     for (int i = 0; i < l->n_node; i++) {
-        if (!l->held[i]) continue;
+        if (!l->fixed[i]) continue;
         if (n_held++ == 0) pal_copy3(first, l->x_rest + 3 * i);
         pal_sub3(d, l->x_rest + 3 * i, first);
         if (pal_norm3(d) <= longest) continue;
@@ -105,24 +105,26 @@ static pal_err check_hold(const job *j)
         pal_copy3(along, d);
     }
     for (int i = 0; i < l->n_node && longest > 0; i++) {
-        if (!l->held[i]) continue;
+        if (!l->fixed[i]) continue;
         pal_sub3(d, l->x_rest + 3 * i, first);
         pal_cross3(out, along, d);
         widest = fmax(widest, pal_norm3(out) / longest);
     }
-    if (widest > 1e-6 * l->h_m) return PAL_ERR_OK;
-    return pal_note_set(j->note, PAL_ERR_REFUSED,
-                        "supports: held nodes: %d, all on one line, so the body turns and comes to no rest", n_held);
+    if (widest > 1e-6 * l->edge_m) return PAL_ERR_OK;
+    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                              "supports: held nodes: %d, all on one line, so the body turns and comes to no rest",
+                              n_held);
 }
 
 static pal_err make_body(const job *j)
 {
     pal_calibration *c = j->c;
     if (c->problem->n_support == 0)
-        return pal_note_set(j->note, PAL_ERR_REFUSED,
-                            "supports: none, so nothing holds the body against its loads and it comes to no rest");
-    PAL_TRY(pal_case_voxels(c->problem, j->surface, &c->options.voxel, &c->mesh, j->note));
-    PAL_TRY(pal_case_supports(c->problem, &c->mesh.tets, c->support, j->note));
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
+            "supports: none, so nothing holds the body against its loads and it comes to no rest");
+    PAL_TRY(pal_case_voxels(c->problem, j->surface, &c->options.voxel, &c->mesh, j->diag));
+    PAL_TRY(pal_case_supports(c->problem, &c->mesh.tets, c->support, j->diag));
     take_material(c);
     PAL_TRY(make_world(j));
     return check_hold(j);
@@ -131,13 +133,13 @@ static pal_err make_body(const job *j)
 /* ---- loads ---- */
 
 /* sums of |f| over all nodes and over held ones */
-static void sum_up(const pal_calibration *c, const double *f, double *all, double *held)
+static void sum_up(const pal_calibration *c, const double *f, double *all, double *fixed)
 {
-    *all = *held = 0;
+    *all = *fixed = 0;
     for (int i = 0; i < c->lattice.n_node; i++) {
         double size = pal_norm3(f + 3 * i);
         *all += size;
-        if (c->lattice.held[i]) *held += size;
+        if (c->lattice.fixed[i]) *fixed += size;
     }
 }
 
@@ -156,29 +158,29 @@ static pal_err make_loads(const job *j, int index)
     }
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < load_case->n_load && !err; k++) {
-        double all, held;
+        double all, fixed;
         memset(one, 0, n * sizeof *one);
-        err = pal_case_force(c->problem, load_case, k, body, j->locate, &c->mesh.surface, one, NULL, j->note);
+        err = pal_case_force(c->problem, load_case, k, body, j->locate, &c->mesh.surface, one, NULL, j->diag);
         if (err) break;
-        sum_up(c, one, &all, &held);
+        sum_up(c, one, &all, &fixed);
         sum += all;
-        if (load_case->load[k].kind != PAL_LOAD_GRAVITY && held > 0.5 * all)
-            err = pal_note_set(j->note, PAL_ERR_REFUSED,
-                               "load_cases[%d].loads[%d]: %.0f %% of it stands on nodes that a support holds",
-                               (int)(load_case - c->problem->load_case), k, 100 * held / all);
+        if (load_case->load[k].kind != PAL_LOAD_GRAVITY && fixed > 0.5 * all)
+            err = pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                                     "load_cases[%d].loads[%d]: %.0f %% of it stands on nodes that a support holds",
+                                     (int)(load_case - c->problem->load_case), k, 100 * fixed / all);
         for (size_t i = 0; i < n; i++) fit->force_N[i] += one[i];
     }
     free(one);
     if (err) return err;
-    double left, held;
-    sum_up(c, fit->force_N, &left, &held);
+    double left, fixed;
+    sum_up(c, fit->force_N, &left, &fixed);
     if (!(sum > 0))
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
-                            load_case->id);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
+                                  load_case->id);
     if (left <= 1e-9 * sum)
-        return pal_note_set(j->note, PAL_ERR_REFUSED,
-                            "load case \"%s\": its loads cancel each other at every node, so there is nothing to fit",
-                            load_case->id);
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
+            "load case \"%s\": its loads cancel each other at every node, so there is nothing to fit", load_case->id);
     return PAL_ERR_OK;
 }
 
@@ -198,7 +200,7 @@ static pal_err truth_by_elements(const job *j, int index)
                            .law = fit->linear ? "linear" : "neo_hookean",
                            .resolution = c->options.voxel.resolution,
                            .fill = c->options.voxel.fill,
-                           .least_fill = c->options.voxel.least_fill,
+                           .min_fill = c->options.voxel.min_fill,
                            .align = c->options.voxel.align,
                            .split = c->options.split,
                            .young_Pa = NAN,
@@ -207,9 +209,9 @@ static pal_err truth_by_elements(const job *j, int index)
                            .user = c->options.user};
     pal_solution *solution = NULL;
     pal_solve_result result;
-    pal_note why = {""};
-    pal_err err = pal_solve(c->problem, c->cases[index].load_case, j->surface, &o, &solution, &result, &why);
-    if (err) return pal_note_set(j->note, err, "truth of \"%s\": %s", c->cases[index].load_case->id, why.text);
+    pal_diagnostic reason = {""};
+    pal_err err = pal_solve(c->problem, c->cases[index].load_case, j->surface, &o, &solution, &result, &reason);
+    if (err) return pal_diagnostic_set(j->diag, err, "truth of \"%s\": %s", c->cases[index].load_case->id, reason.text);
     c->clamped |= result.clamped;
     fit->n_point = t->n_node;
     fit->u = malloc(3 * sizeof(double) * (size_t)t->n_node);
@@ -254,12 +256,12 @@ static pal_err make_truth(const job *j, int index)
     const pal_calibrate_case *k = &c->cases[index];
     fit->linear = k->linear;
     if (!say(c, "truth", (double)index / c->n_case))
-        return pal_note_set(j->note, PAL_ERR_STATE, "stopped before the truth of \"%s\"", k->load_case->id);
+        return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped before the truth of \"%s\"", k->load_case->id);
     PAL_TRY(k->samples ? truth_by_samples(j, index) : truth_by_elements(j, index));
-    for (int i = 0; i < fit->n_point; i++) fit->most_m = fmax(fit->most_m, pal_norm3(fit->u + 3 * i));
-    if (fit->most_m > 0) return PAL_ERR_OK;
-    return pal_note_set(j->note, PAL_ERR_REFUSED, "load case \"%s\": its truth (%s) moves nothing", k->load_case->id,
-                        k->truth_name ? k->truth_name : "finite elements");
+    for (int i = 0; i < fit->n_point; i++) fit->max_m = fmax(fit->max_m, pal_norm3(fit->u + 3 * i));
+    if (fit->max_m > 0) return PAL_ERR_OK;
+    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "load case \"%s\": its truth (%s) moves nothing",
+                              k->load_case->id, k->truth_name ? k->truth_name : "finite elements");
 }
 
 /* ---- parameters ---- */
@@ -298,7 +300,8 @@ static pal_err make_grid(const job *j)
     if (n[0] <= 0) return PAL_ERR_OK;
     for (int a = 0; a < 3; a++) {
         if (n[a] < 1 || n[a] > 1024)
-            return pal_note_set(j->note, PAL_ERR_REFUSED, "grid: %d nodes along axis %d, wanted 1 to 1024", n[a], a);
+            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "grid: %d nodes along axis %d, wanted 1 to 1024", n[a],
+                                      a);
         c->grid.n[a] = n[a];
         c->grid.low[a] = DBL_MAX;
         c->grid.high[a] = -DBL_MAX;
@@ -308,10 +311,10 @@ static pal_err make_grid(const job *j)
         }
     }
     if ((int64_t)n[0] * n[1] * n[2] * PAL_SPRING_KINDS > PAL_CALIBRATE_PARAMETERS)
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "grid: %d x %d x %d nodes are more than %d parameters", n[0],
-                            n[1], n[2], PAL_CALIBRATE_PARAMETERS);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "grid: %d x %d x %d nodes are more than %d parameters",
+                                  n[0], n[1], n[2], PAL_CALIBRATE_PARAMETERS);
     c->has_grid = true;
-    if (pal_weights_make(&c->grid, t->x, t->n_node, &c->weights)) return no_memory(j, "the grid's weights");
+    if (pal_grid_weights_make(&c->grid, t->x, t->n_node, &c->weights)) return no_memory(j, "the grid's weights");
     c->n_used = c->weights.n_used;
     return make_edges(j);
 }
@@ -328,7 +331,7 @@ static pal_err make_parameters(const job *j)
 {
     static const double hand[PAL_SPRING_KINDS] = {0.2, 0.4, 1};
     pal_calibration *c = j->c;
-    double factor[PAL_SPRING_KINDS], scale = c->mean_young_Pa * pow(c->lattice.h_m, 3), range = c->options.decades;
+    double factor[PAL_SPRING_KINDS], scale = c->mean_young_Pa * pow(c->lattice.edge_m, 3), range = c->options.decades;
     pal_spring_factors(c->mean_poisson, c->options.without_area, factor);
     for (int k = 0; k < PAL_SPRING_KINDS; k++)
         if (c->lattice.kind[k].n_item > 0) c->kind[c->n_kind++] = k;
@@ -367,7 +370,7 @@ static pal_err make_starts(const job *j)
     }
     if (pal_calibration_seat_create(c, &seat)) return no_memory(j, "the start");
     pal_err err = pal_calibration_evaluate(c, seat, c->theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY, &value,
-                                           NULL, j->note);
+                                           NULL, j->diag);
     for (int i = 0; i < c->n_case && !err; i++)
         if (seat->rests[i]) memcpy(c->fit[i].x_start, seat->x[i], n * sizeof(double));
     pal_calibration_seat_destroy(seat);
@@ -390,19 +393,22 @@ static pal_err make(const job *j)
 }
 
 pal_err pal_calibration_create(const pal_problem *problem, const pal_surface *surface, const pal_calibrate_case *cases,
-                               int n_case, const pal_calibrate_options *options, pal_calibration **out, pal_note *note)
+                               int n_case, const pal_calibrate_options *options, pal_calibration **out,
+                               pal_diagnostic *diag)
 {
-    pal_note own = {""};
-    job j = {.surface = surface, .note = note ? note : &own};
+    pal_diagnostic own = {""};
+    job j = {.surface = surface, .diag = diag ? diag : &own};
     int n_fit = 0;
     for (int i = 0; i < n_case; i++) n_fit += cases[i].fit;
     if (n_case > PAL_CALIBRATE_CASES)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%d load cases: at most %d are taken", n_case, PAL_CALIBRATE_CASES);
-    if (n_fit == 0) return pal_note_set(note, PAL_ERR_REFUSED, "no load case to fit");
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d load cases: at most %d are taken", n_case,
+                                  PAL_CALIBRATE_CASES);
+    if (n_fit == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "no load case to fit");
     for (int i = 0; i < n_case; i++)
         if (cases[i].load_case->n_load == 0)
-            return pal_note_set(note, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
-                                cases[i].load_case->id);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "load case \"%s\": has no load, so there is nothing to fit",
+                                      cases[i].load_case->id);
     pal_calibration *c = j.c = calloc(1, sizeof *c);
     if (!c) return no_memory(&j, "a calibration");
     *c = (pal_calibration){.options = *options, .problem = problem, .cases = cases, .n_case = n_case, .n_fit = n_fit};
@@ -433,7 +439,7 @@ void pal_calibration_destroy(pal_calibration *c)
     }
     free(c->theta);
     free(c->edge);
-    pal_weights_free(&c->weights);
+    pal_grid_weights_free(&c->weights);
     pal_lattice_free(&c->lattice);
     pal_world_destroy(c->world);
     pal_prepared_free(&c->mesh);
@@ -448,7 +454,7 @@ void pal_calibration_info_of(const pal_calibration *c, pal_calibration_info *out
                                   .n_node = c->lattice.n_node,
                                   .n_free = c->lattice.n_free,
                                   .n_tet = c->mesh.tets.n_tet,
-                                  .h_m = c->lattice.h_m,
+                                  .edge_m = c->lattice.edge_m,
                                   .mean_young_Pa = c->mean_young_Pa,
                                   .truth_s = c->truth_s,
                                   .prepare_s = c->prepare_s,
@@ -464,7 +470,7 @@ void pal_calibration_info_of(const pal_calibration *c, pal_calibration_info *out
         out->n_spring += c->lattice.kind[c->kind[k]].n_item;
     }
     for (int i = 0; i < c->n_case; i++) {
-        out->most_m[i] = c->fit[i].most_m;
+        out->max_m[i] = c->fit[i].max_m;
         out->n_point[i] = c->fit[i].n_point;
     }
 }
@@ -479,7 +485,7 @@ const double *pal_calibration_forces(const pal_calibration *c, int index)
     return c->fit[index].force_N;
 }
 
-const pal_support *pal_calibration_supports(const pal_calibration *c, int *n)
+const pal_support_def *pal_calibration_supports(const pal_calibration *c, int *n)
 {
     *n = c->problem->n_support;
     return c->support;

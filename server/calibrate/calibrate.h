@@ -10,8 +10,8 @@
  * A calibration is made once (voxels, springs, truths) and then read only; every thread evaluates on a seat of its
  * own. What an evaluation gives depends on theta alone, never on the seat's past, unless it is asked to go on from its
  * last answer. Heap. */
-#ifndef PAL_LAB_CALIBRATE_H
-#define PAL_LAB_CALIBRATE_H
+#ifndef PAL_CALIBRATE_CALIBRATE_H
+#define PAL_CALIBRATE_CALIBRATE_H
 #include "server/calibrate/equilibrium.h"
 #include "server/num/trilinear.h"
 #include "server/solve/load_case.h"
@@ -48,7 +48,8 @@ typedef struct pal_calibration pal_calibration;
  * that stands on held nodes, a truth that moves nothing, a grid with more parameters than PAL_CALIBRATE_PARAMETERS;
  * NUMERIC: finite elements find no truth; STATE: progress said stop; MEMORY. Borrows problem, cases and surface */
 pal_err pal_calibration_create(const pal_problem *problem, const pal_surface *surface, const pal_calibrate_case *cases,
-                               int n_case, const pal_calibrate_options *options, pal_calibration **out, pal_note *note);
+                               int n_case, const pal_calibrate_options *options, pal_calibration **out,
+                               pal_diagnostic *diag);
 void pal_calibration_destroy(pal_calibration *calibration); /* NULL is fine */
 
 /* what was made */
@@ -56,16 +57,16 @@ typedef struct pal_calibration_info {
     int n_parameter, n_kind, n_used; /* parameters = n_kind * n_used, kind by kind                             */
     int kind[PAL_SPRING_KINDS];      /* pal_spring_kind of each                                                */
     int n_node, n_free, n_spring, n_tet;
-    double h_m, mean_young_Pa;          /* start: volume's mean of ln E                                            */
-    double most_m[PAL_CALIBRATE_CASES]; /* largest displacement of each truth                                    */
+    double edge_m, mean_young_Pa;      /* start: volume's mean of ln E                                            */
+    double max_m[PAL_CALIBRATE_CASES]; /* largest displacement of each truth                                    */
     int n_point[PAL_CALIBRATE_CASES];
     double truth_s, prepare_s;
-    bool clamped;               /* a Poisson ratio above 0.4999 was taken as 0.4999                        */
-    const pal_prepared *mesh;   /* voxels as tetrahedra, with the surface's skin; the calibration's own    */
-    const pal_grid *grid;       /* body frame; NULL: homogeneous                                           */
-    const pal_weights *weights; /* grid -> nodes; NULL: homogeneous                                        */
-    const double *start;        /* theta of the default constants, from E and nu [n_parameter]             */
-    const double *low, *high;   /* bounds                                        [n_parameter]             */
+    bool clamped;                    /* a Poisson ratio above 0.4999 was taken as 0.4999                        */
+    const pal_prepared *mesh;        /* voxels as tetrahedra, with the surface's skin; the calibration's own    */
+    const pal_grid *grid;            /* body frame; NULL: homogeneous                                           */
+    const pal_grid_weights *weights; /* grid -> nodes; NULL: homogeneous                                        */
+    const double *start;             /* theta of the default constants, from E and nu [n_parameter]             */
+    const double *low, *high;        /* bounds                                        [n_parameter]             */
 } pal_calibration_info;
 void pal_calibration_info_of(const pal_calibration *calibration, pal_calibration_info *out);
 /* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B 3.4; the factors
@@ -96,7 +97,7 @@ typedef enum pal_calibration_ask {
 /* E and, unless slope is NULL, d objective / d theta [n_parameter] (0 where there is no value). No rest is no error: it
  * is DBL_MAX, never averaged. MEMORY; NUMERIC: theta is not finite */
 pal_err pal_calibration_evaluate(const pal_calibration *calibration, pal_calibration_seat *seat, const double *theta,
-                                 unsigned ask, pal_calibration_value *out, double *slope, pal_note *note);
+                                 unsigned ask, pal_calibration_value *out, double *slope, pal_diagnostic *diag);
 /* displacement [n_node][3] of a case at the seat's last rest; false: it has none */
 bool pal_calibration_moved(const pal_calibration *calibration, const pal_calibration_seat *seat, int index, double *u);
 /* the truth at the mesh's nodes [n_node][3]; false: it is given at other points */
@@ -104,7 +105,7 @@ bool pal_calibration_truth(const pal_calibration *calibration, int index, double
 /* nodal forces of a case, N [n_node][3], borrowed */
 const double *pal_calibration_forces(const pal_calibration *calibration, int index);
 /* the problem's supports in the body frame, borrowed; *n of them */
-const pal_support *pal_calibration_supports(const pal_calibration *calibration, int *n);
+const pal_support_def *pal_calibration_supports(const pal_calibration *calibration, int *n);
 
 /* ---- methods: calibrate_adjoint.c, calibrate_anneal.c ---- */
 
@@ -118,11 +119,11 @@ typedef struct pal_fit_step {
 } pal_fit_step;
 
 typedef struct pal_fit_options {
-    double budget_s;         /* 0: none; ends within an evaluation of it (annealing: within a batch)      */
-    int64_t most_evaluation; /* 0: adjoint 1000, annealing 4000                                          */
-    uint64_t seed;           /* annealing                                                                */
-    int n_worker;            /* annealing: threads; 0: one per core                                      */
-    double enough_percent;   /* ends when E is at most this; 0: goes on                                  */
+    double budget_s;        /* 0: none; ends within an evaluation of it (annealing: within a batch)      */
+    int64_t max_evaluation; /* 0: adjoint 1000, annealing 4000                                          */
+    uint64_t seed;          /* annealing                                                                */
+    int n_worker;           /* annealing: threads; 0: one per core                                      */
+    double enough_percent;  /* ends when E is at most this; 0: goes on                                  */
     /* annealing: evaluates points elsewhere in place of this process' own team (MPI ranks); NULL: own team */
     pal_err (*evaluate)(void *user, const double *theta, int n, double *error_percent);
     int n_batch; /* points that evaluate takes at once                                       */
@@ -143,7 +144,7 @@ typedef struct pal_fit_result {
 /* theta [n_parameter]: in: where to begin (annealing: one of its samples), out: the best, never worse than the start.
  * NUMERIC: neither the start nor any sample comes to rest; MEMORY */
 pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
-                        pal_fit_result *out, pal_note *note);
+                        pal_fit_result *out, pal_diagnostic *diag);
 pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
-                       pal_fit_result *out, pal_note *note);
+                       pal_fit_result *out, pal_diagnostic *diag);
 #endif

@@ -27,13 +27,13 @@ typedef struct fit {
     int64_t most;
     const char *ended; /* NULL: goes on */
     pal_err err;
-    pal_note *note;
+    pal_diagnostic *diag;
     nlopt_opt opt;
 } fit;
 
-static void stop(fit *f, const char *why)
+static void stop(fit *f, const char *reason)
 {
-    if (!f->ended) f->ended = why;
+    if (!f->ended) f->ended = reason;
     if (f->opt) nlopt_force_stop(f->opt);
 }
 
@@ -58,7 +58,7 @@ static double evaluate(fit *f, const double *theta, double *slope)
     size_t n = sizeof(double) * (size_t)f->c->n_parameter;
     pal_calibration_value v;
     pal_err err = pal_calibration_evaluate(f->c, f->seat, theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_CONTINUE, &v,
-                                           slope, f->note);
+                                           slope, f->diag);
     f->out->n_evaluation++;
     if (err == PAL_ERR_MEMORY) {
         f->err = err;
@@ -127,8 +127,8 @@ static pal_err run(fit *f, double *theta)
     f->out->start_percent = f->best_percent;
     if (f->err) return f->err;
     if (!(start < DBL_MAX))
-        return pal_note_set(f->note, PAL_ERR_NUMERIC,
-                            "the start has no stable rest under its loads, so there is no gradient to follow");
+        return pal_diagnostic_set(f->diag, PAL_ERR_NUMERIC,
+                                  "the start has no stable rest under its loads, so there is no gradient to follow");
     memcpy(f->good, theta, n);
     f->good_objective = start;
     /* a search may end early behind a wall: begun again at the best it forgets its curvatures */
@@ -149,15 +149,15 @@ static pal_err close_up(fit *f, const double *start, double *theta)
     const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
     pal_fit_result *out = f->out;
     if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
-    PAL_TRY(pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note));
+    PAL_TRY(pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->diag));
     if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
     /* none, or another, worse one: the rest is only reached from its neighbours, a live body may not find it either */
     memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
-    return pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->note);
+    return pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->diag);
 }
 
 pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
-                        pal_fit_result *out, pal_note *note)
+                        pal_fit_result *out, pal_diagnostic *diag)
 {
     const pal_calibration *c = calibration;
     size_t n = (size_t)c->n_parameter;
@@ -168,13 +168,13 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
              .begin_s = pal_clock_s(),
              .best_objective = DBL_MAX,
              .best_percent = DBL_MAX,
-             .most = options->most_evaluation > 0 ? options->most_evaluation : MOST_EVALUATION,
-             .note = note};
+             .most = options->max_evaluation > 0 ? options->max_evaluation : MOST_EVALUATION,
+             .diag = diag};
     f.best = calloc(4 * n, sizeof(double));
     pal_err err = f.best ? pal_calibration_seat_create(c, &f.seat) : PAL_ERR_MEMORY;
     if (err) {
         free(f.best);
-        return pal_note_set(note, err, "no memory to calibrate %d constants", c->n_parameter);
+        return pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
     }
     f.good = f.best + n, f.slope = f.good + n;
     double *start = f.slope + n;

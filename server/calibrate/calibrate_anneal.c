@@ -142,34 +142,34 @@ static bool tell(void *user, const pal_anneal_step *at)
 }
 
 /* *theta: in: the start, out: the best */
-static pal_err walk(fit *f, double *theta, pal_note *note)
+static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
 {
     const pal_calibration *c = f->c;
     pal_anneal_options a;
     pal_anneal_result r;
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_anneal_default(&a);
     a.n_parameter = c->n_parameter;
     a.low = f->low, a.high = f->high, a.first = f->first;
     a.seed = f->o->seed;
     a.n_batch = f->n_batch;
-    a.most_evaluation = f->most;
-    a.coldest = COLDEST;
+    a.max_evaluation = f->most;
+    a.min_temperature_ratio = COLDEST;
     a.stall = MOST_STALL;
     a.evaluate = evaluate;
     a.step = tell;
     a.user = f;
     make_box(f, theta);
-    pal_err err = pal_anneal(&a, f->shown, &r, &why);
+    pal_err err = pal_anneal(&a, f->shown, &r, &reason);
     if (r.best < DBL_MAX) to_theta(f, f->shown, theta);
     f->out->n_evaluation = r.n_evaluation;
     f->out->n_rejected = r.n_failed;
     f->out->n_spent = r.n_spent;
     f->out->ended = f->ended ? f->ended : "stalled";
     if (err == PAL_ERR_NUMERIC && r.best == DBL_MAX)
-        return pal_note_set(note, err, "none of %lld sets of constants comes to a stable rest under the loads",
-                            (long long)r.n_evaluation);
-    return err ? pal_note_set(note, err, "%s", why.text[0] ? why.text : pal_err_text(err)) : err;
+        return pal_diagnostic_set(diag, err, "none of %lld sets of constants comes to a stable rest under the loads",
+                                  (long long)r.n_evaluation);
+    return err ? pal_diagnostic_set(diag, err, "%s", reason.text[0] ? reason.text : pal_err_text(err)) : err;
 }
 
 /* team and seats; with points evaluated elsewhere one seat, for the best */
@@ -177,7 +177,7 @@ static pal_err make(fit *f)
 {
     size_t n = (size_t)f->c->n_parameter;
     f->n_seat = 1;
-    f->n_batch = f->o->n_batch < 1 ? 1 : f->o->n_batch > PAL_ANNEAL_MOST_BATCH ? PAL_ANNEAL_MOST_BATCH : f->o->n_batch;
+    f->n_batch = f->o->n_batch < 1 ? 1 : f->o->n_batch > PAL_ANNEAL_MAX_BATCH ? PAL_ANNEAL_MAX_BATCH : f->o->n_batch;
     if (!f->o->evaluate) {
         PAL_TRY(pal_team_create(f->o->n_worker, &f->team));
         f->n_seat = f->n_batch = pal_team_size(f->team);
@@ -203,7 +203,7 @@ static void clean_up(fit *f)
 }
 
 pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
-                       pal_fit_result *out, pal_note *note)
+                       pal_fit_result *out, pal_diagnostic *diag)
 {
     const pal_calibration *c = calibration;
     const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
@@ -212,14 +212,14 @@ pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options
              .o = options,
              .out = out,
              .begin_s = pal_clock_s(),
-             .most = options->most_evaluation > 0 ? options->most_evaluation : MOST_EVALUATION};
+             .most = options->max_evaluation > 0 ? options->max_evaluation : MOST_EVALUATION};
     for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
     pal_err err = make(&f);
     if (err)
-        pal_note_set(note, err, "no memory to calibrate %d constants", c->n_parameter);
+        pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
     else
-        err = walk(&f, theta, note);
-    if (!err) err = pal_calibration_evaluate(c, f.seat[0], theta, all, &out->value, NULL, note);
+        err = walk(&f, theta, diag);
+    if (!err) err = pal_calibration_evaluate(c, f.seat[0], theta, all, &out->value, NULL, diag);
     out->seconds = pal_clock_s() - f.begin_s;
     clean_up(&f);
     return err;

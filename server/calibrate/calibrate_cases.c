@@ -21,7 +21,7 @@ typedef struct job {
     pal_calibrate_set *set;
     const pal_problem_reference *reference[PAL_CALIBRATE_CASES]; /* of each case; NULL: none   */
     bool named[PAL_CALIBRATE_CASES];                             /* it was named itself        */
-    pal_note *note;
+    pal_diagnostic *diag;
 } job;
 
 static bool is(const char *word, const char *what)
@@ -37,8 +37,9 @@ static pal_err no_case(const job *j, const char *flag, const char *id)
     for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
         n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
                               k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: %s: there is no load case or reference \"%.40s\"; known are %s",
-                        p->path, flag, id, list);
+    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                              "%s: %s: there is no load case or reference \"%.40s\"; known are %s", p->path, flag, id,
+                              list);
 }
 
 /* ---- which cases ---- */
@@ -50,18 +51,19 @@ static pal_err add_case(job *j, const char *id, bool fit)
     const char *flag = fit ? "--case" : "--verify";
     for (int k = 0; k < s->n; k++)
         if (!strcmp(s->id[k], id))
-            return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: \"%s\" %s", flag, id,
-                                fit == s->list[k].fit ? "stands there twice"
-                                                      : "is fitted, so it can not verify what the fit did not see");
+            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: \"%s\" %s", flag, id,
+                                      fit == s->list[k].fit
+                                          ? "stands there twice"
+                                          : "is fitted, so it can not verify what the fit did not see");
     if (s->n == PAL_CALIBRATE_CASES)
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: \"%.40s\" is one too many, at most %d cases are taken", flag,
-                            id, PAL_CALIBRATE_CASES);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is one too many, at most %d cases are taken",
+                                  flag, id, PAL_CALIBRATE_CASES);
     const pal_problem_reference *named = pal_problem_reference_find(p, id);
     const pal_problem_case *load_case = pal_problem_case_find(p, named ? named->load_case : id);
     if (!load_case || strlen(id) >= PAL_NAME) return no_case(j, flag, id);
     if (named && j->wish->kinematics && named->finite != is(j->wish->kinematics, "finite"))
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag, id,
-                            named->finite ? "finite" : "linear", j->wish->kinematics);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag,
+                                  id, named->finite ? "finite" : "linear", j->wish->kinematics);
     snprintf(s->id[s->n], PAL_NAME, "%s", id);
     j->reference[s->n] = named;
     j->named[s->n] = named != NULL;
@@ -108,9 +110,9 @@ static pal_err settle_material(job *j)
     for (int k = 1; k < s->n; k++) {
         material_of(j, k, &other_young, &other_poisson);
         if (same(other_young, young) && same(other_poisson, poisson)) continue;
-        return pal_note_set(j->note, PAL_ERR_REFUSED,
-                            "%s: \"%s\" is of E %g, nu %g and \"%s\" of E %g, nu %g: one body has one material",
-                            s->problem->path, s->id[0], young, poisson, s->id[k], other_young, other_poisson);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                                  "%s: \"%s\" is of E %g, nu %g and \"%s\" of E %g, nu %g: one body has one material",
+                                  s->problem->path, s->id[0], young, poisson, s->id[k], other_young, other_poisson);
     }
     s->problem->material[0].young_Pa = young;
     s->problem->material[0].poisson = poisson;
@@ -145,9 +147,9 @@ static pal_err choose_reference(job *j, int index)
     }
     const pal_problem_reference *r = j->reference[index];
     if (!r)
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: --truth: no reference answers load case \"%s\"%s%s", p->path,
-                            s->id[index], j->wish->kinematics ? " with kinematics " : "",
-                            j->wish->kinematics ? j->wish->kinematics : "");
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: --truth: no reference answers load case \"%s\"%s%s",
+                                  p->path, s->id[index], j->wish->kinematics ? " with kinematics " : "",
+                                  j->wish->kinematics ? j->wish->kinematics : "");
     c->linear = !r->finite;
     return PAL_ERR_OK;
 }
@@ -155,7 +157,7 @@ static pal_err choose_reference(job *j, int index)
 static pal_err read_truth(job *j, int index, const char *path, const char *name)
 {
     pal_calibrate_set *s = j->set;
-    PAL_TRY(pal_samples_read(path, &s->samples[index], j->note));
+    PAL_TRY(pal_samples_read(path, &s->samples[index], j->diag));
     s->list[index].samples = &s->samples[index];
     snprintf(s->truth_name[index], PAL_NAME, "%s", name);
     s->list[index].truth_name = s->truth_name[index];
@@ -170,8 +172,8 @@ static pal_err choose_truths(job *j)
     int n_fit = 0;
     for (int k = 0; k < s->n; k++) n_fit += s->list[k].fit;
     if (file && n_fit != 1)
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "--truth: %.200s is one file, --case names %d cases", truth,
-                            n_fit);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "--truth: %.200s is one file, --case names %d cases", truth,
+                                  n_fit);
     for (int k = 0; k < s->n; k++) {
         PAL_TRY(choose_reference(j, k));
         const char *slash = file ? strrchr(truth, '/') : NULL;
@@ -199,8 +201,8 @@ static pal_err check_box(const job *j, int index)
         for (int c = 0; c < 3; c++) out = fmax(out, fmax(low[c] - x[c], x[c] - high[c]));
         if (out <= slack) continue;
         const double *at = samples->x + 3 * i;
-        return pal_note_set(
-            j->note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
             "truth \"%s\": point %d (%g, %g, %g) m is %.3g m outside of the body: is it of another one?",
             s->truth_name[index], i + 1, at[0], at[1], at[2], out);
     }
@@ -208,12 +210,12 @@ static pal_err check_box(const job *j, int index)
 }
 
 pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
-                                       pal_note *note)
+                                       pal_diagnostic *diag)
 {
     pal_voxel_wish wish = *voxel;
     for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
         pal_prepared mesh = {0};
-        pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, note);
+        pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, diag);
         if (err && (err != PAL_ERR_REFUSED || wish.resolution + 2 >= FINEST)) return err;
         int n_node = err ? 0 : mesh.tets.n_node; /* refused: thinner than such voxels */
         pal_prepared_free(&mesh);
@@ -223,7 +225,7 @@ pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_v
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared *mesh, pal_note *note)
+pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared *mesh, pal_diagnostic *diag)
 {
     pal_locate *locate = NULL;
     pal_err err = PAL_ERR_OK;
@@ -233,18 +235,19 @@ pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared
         double most = 0, out, local[4], x[3];
         if (!s->list[k].samples) continue;
         if (!locate && pal_locate_create(&mesh->tets, NULL, &locate))
-            return pal_note_set(note, PAL_ERR_MEMORY, "no memory for points in the mesh");
+            return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for points in the mesh");
         for (int i = 0; i < samples->n; i++) {
             pal_sub3(x, samples->x + 3 * i, mesh->tets.origin_m);
             pal_locate_point(locate, x, local, &out);
-            n_far += out > mesh->tets.h_m;
+            n_far += out > mesh->tets.edge_m;
             most = fmax(most, out);
         }
         if (n_far > 0.01 * samples->n)
-            err = pal_note_set(note, PAL_ERR_REFUSED,
-                               "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
-                               "%.3g m): is it of another one?",
-                               s->truth_name[k], n_far, samples->n, most);
+            err =
+                pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                   "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
+                                   "%.3g m): is it of another one?",
+                                   s->truth_name[k], n_far, samples->n, most);
     }
     pal_locate_destroy(locate);
     return err;
@@ -256,18 +259,18 @@ static pal_err check_supports(const job *j)
     for (int k = 0; k < p->n_support; k++) {
         const double *move = p->support[k].move_m;
         if (p->support[k].moved && (move[0] != 0 || move[1] != 0 || move[2] != 0))
-            return pal_note_set(j->note, PAL_ERR_REFUSED,
-                                "%s: supports[%d]: moves, springs are calibrated on supports that hold still", p->path,
-                                k);
+            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                                      "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
+                                      p->path, k);
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_note *note)
+pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_diagnostic *diag)
 {
     *out = (pal_calibrate_set){0};
-    job j = {.wish = wish, .set = out, .note = note};
-    PAL_TRY(pal_problem_read(wish->problem, &out->problem, note));
+    job j = {.wish = wish, .set = out, .diag = diag};
+    PAL_TRY(pal_problem_read(wish->problem, &out->problem, diag));
     PAL_TRY(check_supports(&j));
     PAL_TRY(add_list(&j, wish->fit, true));
     PAL_TRY(add_list(&j, wish->verify, false));
@@ -275,7 +278,7 @@ pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_s
     PAL_TRY(choose_truths(&j));
     pal_mesh_file_options file = {.unit_m = out->problem->unit_m, .weld = PAL_MESH_WELD};
     pal_surface_report report = {0};
-    PAL_TRY(pal_mesh_file_read(out->problem->surface, &file, &out->surface, &report, NULL, NULL, note));
+    PAL_TRY(pal_mesh_file_read(out->problem->surface, &file, &out->surface, &report, NULL, NULL, diag));
     for (int k = 0; k < out->n; k++)
         if (out->list[k].samples) PAL_TRY(check_box(&j, k));
     return PAL_ERR_OK;

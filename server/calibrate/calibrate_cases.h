@@ -1,7 +1,7 @@
 /* What is calibrated: a problem, its load cases or references by name, and where the truth of each comes from.
  * Thread: [load]. */
-#ifndef PAL_COMMANDS_CALIBRATE_CASES_H
-#define PAL_COMMANDS_CALIBRATE_CASES_H
+#ifndef PAL_CALIBRATE_CALIBRATE_CASES_H
+#define PAL_CALIBRATE_CALIBRATE_CASES_H
 #include "server/calibrate/calibrate.h"
 
 typedef struct pal_calibrate_wish {
@@ -28,13 +28,13 @@ typedef struct pal_calibrate_set {
 /* reads all files. REFUSED names the entry: an unknown name, one twice, a reference of other kinematics than asked for,
  * references of different materials, no reference that answers, supports that move, points that lie outside the body;
  * IO, MEMORY. *out is to be freed in any case */
-pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_note *note);
+pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_diagnostic *diag);
 /* the least even number of voxels on the longest axis whose lattice has more than 700 nodes, as the paper's bodies
  * have; at most 64. Errors are those of pal_case_voxels */
 pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
-                                       pal_note *note);
+                                       pal_diagnostic *diag);
 /* are the points of the truths in or near these voxels? REFUSED names the case: more than 1 % of them are farther than
  * a voxel from any (those of a body that does not fit its voxels stay within half of one) */
-pal_err pal_calibrate_cases_check(const pal_calibrate_set *set, const pal_prepared *mesh, pal_note *note);
+pal_err pal_calibrate_cases_check(const pal_calibrate_set *set, const pal_prepared *mesh, pal_diagnostic *diag);
 void pal_calibrate_cases_free(pal_calibrate_set *set); /* a zeroed struct is fine */
 #endif

@@ -6,7 +6,7 @@
 #include "server/figure/body_picture.h"
 #include "server/figure/plot.h"
 #include "server/mesh/files/vtk_file.h"
-#include "server/mesh/geometry/near.h"
+#include "server/mesh/geometry/kd_tree.h"
 
 #include <float.h>
 #include <math.h>
@@ -34,12 +34,12 @@ static int thin_out(const pal_calibrate_run *run, double *x, double *error, doub
     return n;
 }
 
-pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_note *note)
+pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {
     char title[TITLE], label[80] = "evaluations";
     double *x = malloc(3 * ((size_t)MOST_DRAWN + 1) * sizeof *x), *error = x + MOST_DRAWN + 1,
            *best = error + MOST_DRAWN + 1;
-    if (!x) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    if (!x) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
     int n = thin_out(run, x, error, best);
     const char *name = run->set.problem->name;
     int room = TITLE_SHOWN;
@@ -60,7 +60,7 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
                      .curve = {{.name = "every evaluation", .n = n, .x = x, .y = error, .bare = true, .thin = true},
                                {.name = "best so far", .n = n, .x = x, .y = best, .bare = true},
                                {.name = "set by hand", .n = 2, .x = edge, .y = level, .bare = true, .dashed = true}}};
-    pal_err err = pal_plot_write(&plot, path, note);
+    pal_err err = pal_plot_write(&plot, path, diag);
     free(x);
     return err;
 }
@@ -69,27 +69,28 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
 
 /* the truth at the nodes [n_node][3]; of samples the mean of the four nearest, by inverse squared distance: good
  * enough to be looked at */
-static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u, pal_note *note)
+static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u, pal_diagnostic *diag)
 {
     const pal_samples *s = &run->set.samples[index];
     const pal_tets *t = &run->info.mesh->tets;
-    pal_near *tree;
+    pal_kd_tree *tree;
     if (pal_calibration_truth(run->calibration, index, u)) return PAL_ERR_OK;
-    if (pal_near_create(s->x, s->n, &tree)) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a picture");
+    if (pal_kd_tree_create(s->x, s->n, &tree))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a picture");
     for (int i = 0; i < t->n_node; i++) {
         int32_t near[4];
         double x[3], distance2[4], sum = 0;
         pal_add3(x, t->x + 3 * i, t->origin_m);
-        int n = pal_near_find(tree, x, 4, near, distance2);
+        int n = pal_kd_tree_nearest(tree, x, 4, near, distance2);
         for (int c = 0; c < 3; c++) u[3 * i + c] = 0;
         for (int k = 0; k < n; k++) {
-            double w = 1 / (distance2[k] + 1e-12 * t->h_m * t->h_m);
+            double w = 1 / (distance2[k] + 1e-12 * t->edge_m * t->edge_m);
             pal_axpy3(u + 3 * i, w, s->u + 3 * near[k]);
             sum += w;
         }
         pal_scale3(u + 3 * i, 1 / sum, u + 3 * i);
     }
-    pal_near_destroy(tree);
+    pal_kd_tree_destroy(tree);
     return PAL_ERR_OK;
 }
 
@@ -120,22 +121,22 @@ typedef struct drawing {
     double *memory, *node_u[N_SHAPE], *node_x, *value;
     shape shape[N_SHAPE];
     double *k_d, *young;
-    uint8_t *held;
+    uint8_t *fixed;
     double *load_at, *load_N;
     int n_load;
     void *frames;
     float *shown;
 } drawing;
 
-static pal_err take_memory(drawing *d, pal_note *note)
+static pal_err take_memory(drawing *d, pal_diagnostic *diag)
 {
     size_t n = (size_t)d->n_node, m = (size_t)d->n_vertex;
     double *at = d->memory = calloc(3 * n * (N_SHAPE + 1) + n + 4 * m * N_SHAPE + 2 * m + 6 * n, sizeof *at);
-    d->held = calloc(m, 1);
+    d->fixed = calloc(m, 1);
     d->frames = calloc(1, pal_skin_frames_bytes(&d->mesh->skin) + 64);
     d->shown = malloc(3 * m * sizeof *d->shown);
-    if (!at || !d->held || !d->frames || !d->shown)
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a picture");
+    if (!at || !d->fixed || !d->frames || !d->shown)
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a picture");
     for (int k = 0; k < N_SHAPE; k++, at += 3 * n) d->node_u[k] = at;
     d->node_x = at, at += 3 * n;
     d->value = at, at += n;
@@ -156,8 +157,8 @@ static void skin_value(const drawing *d, const double *value, double *out)
     const pal_skin *s = &d->mesh->skin;
     for (int v = 0; v < d->n_vertex; v++) {
         out[v] = 0;
-        for (int k = 0; k < PAL_SKIN_NEAR; k++) {
-            int at = PAL_SKIN_NEAR * v + k;
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
+            int at = PAL_SKIN_NEIGHBOURS * v + k;
             out[v] += (double)s->coef[4 * at + 3] * value[s->frame[s->near[at]]];
         }
     }
@@ -189,7 +190,7 @@ static void take_vertices(drawing *d)
     const pal_problem *p = d->run->set.problem;
     const pal_tets *t = &d->mesh->tets;
     int n_support;
-    const pal_support *support = pal_calibration_supports(d->run->calibration, &n_support);
+    const pal_support_def *support = pal_calibration_supports(d->run->calibration, &n_support);
     for (int v = 0; v < d->n_vertex; v++) {
         const double *at = d->mesh->surface.x + 3 * v;
         double x[3];
@@ -201,7 +202,7 @@ static void take_vertices(drawing *d)
         for (int k = 0; k < n_support; k++) {
             bool in = true;
             for (int c = 0; c < 3; c++) in = in && at[c] >= support[k].low_m[c] && at[c] <= support[k].high_m[c];
-            d->held[v] |= in;
+            d->fixed[v] |= in;
         }
     }
     if (!d->run->info.grid) return;
@@ -243,7 +244,7 @@ static int add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
                                    .n_tri = s->n_tri,
                                    .x = d->shape[k].x,
                                    .tri = s->tri,
-                                   .held = d->held};
+                                   .fixed = d->fixed};
         if (k == REST) {
             to[k].n_load = d->n_load, to[k].load_at = d->load_at, to[k].load_N = d->load_N;
             continue;
@@ -270,7 +271,7 @@ static int add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
                                    .n_tri = s->n_tri,
                                    .x = d->shape[REST].x,
                                    .tri = s->tri,
-                                   .held = d->held,
+                                   .fixed = d->fixed,
                                    .value = k ? d->young : d->k_d,
                                    .value_title = k ? "E" : "k_d of edges",
                                    .unit = k ? "Pa" : "J",
@@ -279,13 +280,13 @@ static int add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
     return 2;
 }
 
-static pal_err draw(drawing *d, const char *path, pal_note *note)
+static pal_err draw(drawing *d, const char *path, pal_diagnostic *diag)
 {
     const pal_calibrate_run *run = d->run;
     char title[N_SHAPE + 2][TITLE];
     pal_body_picture picture[N_SHAPE + 2];
-    PAL_TRY(take_memory(d, note));
-    PAL_TRY(truth_at_nodes(run, d->index, d->node_u[TRUTH], note));
+    PAL_TRY(take_memory(d, diag));
+    PAL_TRY(truth_at_nodes(run, d->index, d->node_u[TRUTH], diag));
     springs_at_nodes(run, run->info.start, d->index, d->node_u[START]);
     springs_at_nodes(run, run->theta, d->index, d->node_u[FOUND]);
     for (int k = 0; k < N_SHAPE; k++) skin_shape(d, k);
@@ -293,17 +294,17 @@ static pal_err draw(drawing *d, const char *path, pal_note *note)
     take_vertices(d);
     int n = add_shapes(d, picture, title);
     if (run->info.grid) n += add_maps(d, picture + n, title + n);
-    return pal_body_picture_write(picture, n, path, note);
+    return pal_body_picture_write(picture, n, path, diag);
 }
 
-pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_note *note)
+pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {
     drawing d = {
         .run = run, .mesh = run->info.mesh, .n_vertex = run->info.mesh->skin.n_vertex, .n_node = run->info.n_node};
     while (!run->set.list[d.index].fit) d.index++;
-    pal_err err = draw(&d, path, note);
+    pal_err err = draw(&d, path, diag);
     free(d.memory);
-    free(d.held);
+    free(d.fixed);
     free(d.frames);
     free(d.shown);
     return err;
@@ -311,7 +312,7 @@ pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, 
 
 /* ---- vtk ---- */
 
-pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_note *note)
+pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {
     enum { MOST = PAL_SPRING_KINDS + 2 * PAL_CALIBRATE_CASES };
     pal_vtk_field field[MOST];
@@ -320,7 +321,7 @@ pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, 
     size_t n = (size_t)t->n_node;
     int n_field = 0;
     double *memory = calloc(n * (PAL_SPRING_KINDS + 6 * (size_t)run->set.n), sizeof *memory), *at = memory;
-    if (!memory) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    if (!memory) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
     for (int k = 0; k < run->info.n_kind; k++, at += n) {
         snprintf(name[n_field], sizeof name[0], "%s", pal_calibrate_key(run, k, false));
         pal_calibration_constants(run->calibration, run->theta, k, at);
@@ -329,7 +330,7 @@ pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, 
     }
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < run->set.n && !err; k++) {
-        err = truth_at_nodes(run, k, at, note);
+        err = truth_at_nodes(run, k, at, diag);
         snprintf(name[n_field], sizeof name[0], "truth_%s_m", run->set.id[k]);
         field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 3, .value = at};
         n_field++, at += 3 * n;
@@ -347,7 +348,7 @@ pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, 
                                .node = t->tet,
                                .n_point = n_field,
                                .point = field};
-    if (!err) err = pal_mesh_write_vtk(path, &grid, note);
+    if (!err) err = pal_mesh_write_vtk(path, &grid, diag);
     free(memory);
     return err;
 }

@@ -89,9 +89,9 @@ int64_t pal_journal_count(const pal_journal *j)
 
 /* ---- the file ---- */
 
-static pal_err no_io(const pal_journal *j, const char *what, pal_note *note)
+static pal_err no_io(const pal_journal *j, const char *what, pal_diagnostic *diag)
 {
-    return pal_note_set(note, PAL_ERR_IO, "%s: %s: %s", j->path, what, strerror(errno));
+    return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s: %s", j->path, what, strerror(errno));
 }
 
 /* sixteen digits and the character after them */
@@ -149,15 +149,15 @@ static bool read_head(pal_journal *j)
 }
 
 /* a file whose last line has its end, for appending */
-static pal_err cut(pal_journal *j, long whole, pal_note *note)
+static pal_err cut(pal_journal *j, long whole, pal_diagnostic *diag)
 {
-    if (fseek(j->file, 0, SEEK_SET) || ftruncate(fileno(j->file), whole)) return no_io(j, "cannot be cut", note);
-    if (fseek(j->file, 0, SEEK_END)) return no_io(j, "cannot be written", note);
-    if (whole == 0 && (fputs(head, j->file) == EOF || fflush(j->file))) return no_io(j, "cannot be written", note);
+    if (fseek(j->file, 0, SEEK_SET) || ftruncate(fileno(j->file), whole)) return no_io(j, "cannot be cut", diag);
+    if (fseek(j->file, 0, SEEK_END)) return no_io(j, "cannot be written", diag);
+    if (whole == 0 && (fputs(head, j->file) == EOF || fflush(j->file))) return no_io(j, "cannot be written", diag);
     return PAL_ERR_OK;
 }
 
-static pal_err read_lines(pal_journal *j, pal_note *note)
+static pal_err read_lines(pal_journal *j, pal_diagnostic *diag)
 {
     char *line = NULL;
     size_t room = 0;
@@ -165,25 +165,25 @@ static pal_err read_lines(pal_journal *j, pal_note *note)
     long whole = 0;
     pal_err err = PAL_ERR_OK;
     double *theta = malloc(j->n_parameter * sizeof *theta);
-    if (!theta) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", j->path);
+    if (!theta) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", j->path);
     rewind(j->file);
     for (int64_t number = 1; !err && (n = getline(&line, &room, j->file)) > 0; number++) {
         if (line[n - 1] != '\n') break; /* torn */
         line[n - 1] = 0;
         const char *wrong = number > 1 ? take_line(j, line, (size_t)n - 1, theta, &err) : NULL;
         if (wrong)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "%s: line %" PRId64 " %s", j->path, number, wrong);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: line %" PRId64 " %s", j->path, number, wrong);
         else if (err)
-            pal_note_set(note, err, "%s: no memory for line %" PRId64, j->path, number);
+            pal_diagnostic_set(diag, err, "%s: no memory for line %" PRId64, j->path, number);
         whole += (long)n;
     }
-    if (!err && ferror(j->file)) err = no_io(j, "cannot be read", note);
+    if (!err && ferror(j->file)) err = no_io(j, "cannot be read", diag);
     free(line);
     free(theta);
-    return err ? err : cut(j, whole, note);
+    return err ? err : cut(j, whole, diag);
 }
 
-pal_err pal_journal_begin(pal_journal *j, uint64_t problem, int n_parameter, pal_note *note)
+pal_err pal_journal_begin(pal_journal *j, uint64_t problem, int n_parameter, pal_diagnostic *diag)
 {
     free(j->theta);
     free(j->cost);
@@ -193,7 +193,7 @@ pal_err pal_journal_begin(pal_journal *j, uint64_t problem, int n_parameter, pal
     j->n = j->most = j->n_slot = 0;
     j->problem = problem;
     j->n_parameter = (size_t)n_parameter;
-    return read_lines(j, note);
+    return read_lines(j, diag);
 }
 
 /* text of a line into a buffer of its own; NULL: no memory */
@@ -214,7 +214,7 @@ static char *write_line(const pal_journal *j, const double *theta, double cost, 
     return NULL;
 }
 
-pal_err pal_journal_put(pal_journal *j, const double *theta, double cost, pal_note *note)
+pal_err pal_journal_put(pal_journal *j, const double *theta, double cost, pal_diagnostic *diag)
 {
     double known;
     size_t n_byte;
@@ -223,29 +223,29 @@ pal_err pal_journal_put(pal_journal *j, const double *theta, double cost, pal_no
     char *text = write_line(j, theta, cost, &n_byte);
     if (!text || remember(j, theta, cost)) {
         free(text);
-        return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a line", j->path);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a line", j->path);
     }
     bool written = fwrite(text, 1, n_byte, j->file) == n_byte && fflush(j->file) == 0;
     free(text);
-    return written ? PAL_ERR_OK : no_io(j, "cannot be written", note);
+    return written ? PAL_ERR_OK : no_io(j, "cannot be written", diag);
 }
 
-pal_err pal_journal_open(const char *path, pal_journal **out, pal_note *note)
+pal_err pal_journal_open(const char *path, pal_journal **out, pal_diagnostic *diag)
 {
     pal_journal *j = calloc(1, sizeof *j);
-    if (!j) return pal_note_set(note, PAL_ERR_MEMORY, "%.200s: no memory", path);
+    if (!j) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%.200s: no memory", path);
     snprintf(j->path, sizeof j->path, "%.400s", path);
     pal_err err = PAL_ERR_OK;
     j->file = fopen(path, "a+e");
     if (!j->file)
-        err = no_io(j, "cannot be opened", note);
+        err = no_io(j, "cannot be opened", diag);
     else if (flock(fileno(j->file), LOCK_EX | LOCK_NB))
         err = errno == EWOULDBLOCK
-                  ? pal_note_set(note, PAL_ERR_STATE, "%s: another calibration is writing there", j->path)
-                  : no_io(j, "cannot be kept from others", note);
+                  ? pal_diagnostic_set(diag, PAL_ERR_STATE, "%s: another calibration is writing there", j->path)
+                  : no_io(j, "cannot be kept from others", diag);
     else if (!read_head(j))
-        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: is not a journal: it does not begin with \"palpate journal 1\"",
-                           j->path);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                 "%s: is not a journal: it does not begin with \"palpate journal 1\"", j->path);
     if (err)
         pal_journal_close(j);
     else

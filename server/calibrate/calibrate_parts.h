@@ -1,6 +1,6 @@
 /* A calibration's insides (private to calibrate*.c). */
-#ifndef PAL_LAB_CALIBRATE_PARTS_H
-#define PAL_LAB_CALIBRATE_PARTS_H
+#ifndef PAL_CALIBRATE_CALIBRATE_PARTS_H
+#define PAL_CALIBRATE_CALIBRATE_PARTS_H
 #include "server/calibrate/calibrate.h"
 
 /* one load with its truth */
@@ -11,7 +11,7 @@ typedef struct pal_fit_case {
     int32_t *start, *node;
     double *weight;
     double *u; /* truth [n_point][3], m                                                              */
-    double most_m;
+    double max_m;
     bool linear;
     double *x_start; /* rest at the start's constants; at rest where there is none [n_node][3]      */
 } pal_fit_case;
@@ -24,9 +24,9 @@ struct pal_calibration {
     pal_prepared mesh;
     pal_world *world;
     pal_lattice lattice;
-    pal_support support[PAL_PROBLEM_REGIONS];
+    pal_support_def support[PAL_PROBLEM_REGIONS];
     pal_grid grid;
-    pal_weights weights;
+    pal_grid_weights weights;
     bool has_grid;
     int32_t *edge; /* used nodes that are neighbours on the grid [n_edge][2] */
     int n_edge;

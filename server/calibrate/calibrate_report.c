@@ -138,7 +138,7 @@ void pal_calibrate_print(const pal_calibrate_run *run)
     const pal_calibration_info *i = &run->info;
     const pal_fit_result *r = &run->result;
     printf("%s: %d nodes (%d free), %d tetrahedra, voxels of %.4g m, %d springs\n", run->set.problem->name, i->n_node,
-           i->n_free, i->n_tet, i->h_m, i->n_spring);
+           i->n_free, i->n_tet, i->edge_m, i->n_spring);
     if (i->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
     if (i->grid)
         printf("grid %d x %d x %d, %d of its nodes touch the body: %d constants\n", i->grid->n[0], i->grid->n[1],
@@ -178,7 +178,7 @@ static void add_cases(const pal_calibrate_run *run, cJSON *o)
         add_number(c, "start_percent", run->start.case_percent[k]);
         add_number(c, "hand_percent", run->hand.case_percent[k]);
         add_number(c, "percent", run->last.case_percent[k]);
-        add_number(c, "most_m", run->info.most_m[k]);
+        add_number(c, "most_m", run->info.max_m[k]);
         add_number(c, "points", run->info.n_point[k]);
         add_number(c, "live_s", run->settled && run->live.load[k].steady ? run->live.load[k].seconds : NAN);
         add_number(c, "live_difference_percent", run->settled ? run->live.load[k].difference_percent : NAN);
@@ -264,7 +264,7 @@ cJSON *pal_calibrate_json(const pal_calibrate_run *run)
     add_number(o, "free_nodes", i->n_free);
     add_number(o, "tets", i->n_tet);
     add_number(o, "springs", i->n_spring);
-    add_number(o, "voxel_m", i->h_m);
+    add_number(o, "voxel_m", i->edge_m);
     cJSON_AddStringToObject(o, "weights", run->options.equal ? "equal" : "volume");
     cJSON_AddBoolToObject(o, "area_springs", !run->options.without_area);
     cJSON_AddBoolToObject(o, "poisson_clamped", i->clamped);

@@ -1,7 +1,7 @@
 /* One run of `palpate calibrate`: what was asked, what was found, and the parts of the command that say it, draw it and
  * write it (command_calibrate.c and calibrate_*.c). Thread: [load]. */
-#ifndef PAL_COMMANDS_CALIBRATE_RUN_H
-#define PAL_COMMANDS_CALIBRATE_RUN_H
+#ifndef PAL_CALIBRATE_CALIBRATE_RUN_H
+#define PAL_CALIBRATE_CALIBRATE_RUN_H
 #include "server/calibrate/calibrate_cases.h"
 #include "server/calibrate/settle.h"
 #include "server/cli/report.h"
@@ -46,19 +46,19 @@ double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_va
 
 /* the scene that serve runs, with everything but damping and accuracy as they will be; borrows mesh and supports of the
  * calibration; pal_scene_free; sets n_substep. MEMORY, REFUSED */
-pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note);
+pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_diagnostic *diag);
 /* "0.5 % RMS of finite elements (twist), 3.5 % (push, not fitted)" */
 void pal_calibrate_accuracy(const pal_calibrate_run *run, char *out, size_t n_byte);
 
 /* ---- calibrate_draw.c ---- */
 
 /* error of every evaluation and the best so far (paper B Fig 8) */
-pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_note *note);
+pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag);
 /* the first fitted case at rest, as the truth, at the start and as it was fitted, coloured by the distance to the truth
  * (Fig 7, 10); with a grid its constants beside the material (Fig 13, 14) */
-pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_note *note);
+pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag);
 /* tetrahedra with constants at nodes, and of every case the truth's and the springs' displacements */
-pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_note *note);
+pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag);
 
 /* ---- calibrate_report.c ---- */
 

@@ -53,22 +53,22 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
 }
 
 /* constants as keys of the model */
-static pal_err put_constants(const pal_calibrate_run *run, pal_item *model, pal_note *note)
+static pal_err put_constants(const pal_calibrate_run *run, pal_config_entry *model, pal_diagnostic *diag)
 {
     for (int k = 0; k < run->info.n_kind; k++)
-        PAL_TRY(pal_item_put_number(model, pal_calibrate_key(run, k, false), exp(run->theta[k]), note));
+        PAL_TRY(pal_entry_put_number(model, pal_calibrate_key(run, k, false), exp(run->theta[k]), diag));
     return PAL_ERR_OK;
 }
 
 /* constants at all nodes of the grid; those that touch nothing of the body take the mean of the others */
-static pal_err put_grid(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+static pal_err put_grid(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     const pal_grid *from = run->info.grid;
-    const pal_weights *w = run->info.weights;
+    const pal_grid_weights *w = run->info.weights;
     pal_spring_grid *to = &scene->scene.body[0].spring_grid;
     size_t n = (size_t)from->n[0] * (size_t)from->n[1] * (size_t)from->n[2];
     double *value = malloc(n * (size_t)run->info.n_kind * sizeof *value);
-    if (!value) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the grid");
+    if (!value) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the grid");
     scene->spring_grid[0] = value;
     for (int c = 0; c < 3; c++) to->n[c] = from->n[c], to->low_m[c] = from->low[c], to->high_m[c] = from->high[c];
     for (int k = 0; k < run->info.n_kind; k++, value += n) {
@@ -82,13 +82,13 @@ static pal_err put_grid(const pal_calibrate_run *run, pal_loaded_scene *scene, p
     return PAL_ERR_OK;
 }
 
-static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
-    pal_item *model = &scene->scene.body[0].model;
-    pal_item_init(model, "bodies[0].model", "tet_springs");
-    PAL_TRY(pal_item_put_text(model, "weights", run->options.equal ? "equal" : "volume", note));
-    PAL_TRY(run->info.grid ? put_grid(run, scene, note) : put_constants(run, model, note));
-    return run->options.without_area ? pal_item_put_number(model, "k_area_J", 0, note) : PAL_ERR_OK;
+    pal_config_entry *model = &scene->scene.body[0].model;
+    pal_entry_init(model, "bodies[0].model", "tet_springs");
+    PAL_TRY(pal_entry_put_text(model, "weights", run->options.equal ? "equal" : "volume", diag));
+    PAL_TRY(run->info.grid ? put_grid(run, scene, diag) : put_constants(run, model, diag));
+    return run->options.without_area ? pal_entry_put_number(model, "k_area_J", 0, diag) : PAL_ERR_OK;
 }
 
 /* tools as strong as the loads that were fitted, so that a hand can do to the body what they did */
@@ -107,22 +107,22 @@ static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
 }
 
 /* stiff constants may want more sub-steps than a scene usually has */
-static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_note *note)
+static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_diagnostic *diag)
 {
     pal_world *world = NULL;
-    pal_err err = pal_world_create(scene, note, &world);
-    while (err == PAL_ERR_BUDGET && scene->most_substep < MOST_SUBSTEP) {
-        scene->most_substep = 2 * scene->most_substep < MOST_SUBSTEP ? 2 * scene->most_substep : MOST_SUBSTEP;
-        err = pal_world_create(scene, note, &world);
+    pal_err err = pal_world_create(scene, diag, &world);
+    while (err == PAL_ERR_BUDGET && scene->max_substep < MOST_SUBSTEP) {
+        scene->max_substep = 2 * scene->max_substep < MOST_SUBSTEP ? 2 * scene->max_substep : MOST_SUBSTEP;
+        err = pal_world_create(scene, diag, &world);
     }
     if (!err) *n_substep = pal_world_substeps(world);
     pal_world_destroy(world);
     return err;
 }
 
-static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_note *note)
+static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagnostic *diag)
 {
-    static const char *const effects[] = {"tool_push", "tool_grab", "finite_guard"};
+    static const char *const effects[] = {"tool_push", "tool_grasp", "finite_guard"};
     pal_scene *scene = &loaded->scene;
     pal_body_def *body = &scene->body[0];
     char name[PAL_NAME], source[sizeof scene->source], list[160] = "";
@@ -133,34 +133,34 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_note *
     scene->n_body = 1;
     pal_body_default(body, name, run->info.mesh);
     take_material(run, &body->material);
-    const pal_support *support = pal_calibration_supports(run->calibration, &n_support);
+    const pal_support_def *support = pal_calibration_supports(run->calibration, &n_support);
     body->n_support = n_support;
     memcpy(body->support, support, (size_t)n_support * sizeof *support);
     body->n_effect = (int)(sizeof effects / sizeof effects[0]);
     for (int k = 0; k < body->n_effect; k++) {
-        char path[PAL_ITEM_TEXT];
+        char path[PAL_ENTRY_TEXT];
         snprintf(path, sizeof path, "effects[%d]", k);
-        pal_item_init(&body->effect[k], path, effects[k]);
+        pal_entry_init(&body->effect[k], path, effects[k]);
     }
     for (int k = 0; k < run->set.n; k++)
         if (run->set.list[k].fit && n < sizeof list)
             n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", n ? ", " : "", run->set.id[k]);
     snprintf(source, sizeof source, "springs calibrated on %s (%s)", list, pal_calibrate_method(run));
     put_tools(run, scene);
-    PAL_TRY(pal_scene_rename(loaded, name, run->set.problem->name, source, note));
-    PAL_TRY(put_model(run, loaded, note));
-    return allow_substeps(scene, &run->n_substep, note);
+    PAL_TRY(pal_scene_rename(loaded, name, run->set.problem->name, source, diag));
+    PAL_TRY(put_model(run, loaded, diag));
+    return allow_substeps(scene, &run->n_substep, diag);
 }
 
-pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_note *note)
+pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
-    pal_note why = {""};
-    if (!loaded) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
-    pal_err err = fill(run, loaded, &why);
+    pal_diagnostic reason = {""};
+    if (!loaded) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
+    pal_err err = fill(run, loaded, &reason);
     if (err) {
         pal_scene_free(loaded);
-        return pal_note_set(note, err, "%s: %s", run->scene, why.text);
+        return pal_diagnostic_set(diag, err, "%s: %s", run->scene, reason.text);
     }
     *out = loaded;
     return PAL_ERR_OK;

@@ -106,7 +106,7 @@ static void gather_slopes(pal_calibration_seat *s, const double *theta)
         for (int i = 0; i < row->n_item; i++)
             for (int p = 0; p < row->n_corner; p++)
                 s->node[row->item[row->n_corner * i + p]] += slope[i] / row->n_corner;
-        if (c->has_grid) pal_weights_transpose(&c->weights, s->node, used);
+        if (c->has_grid) pal_grid_weights_apply_transpose(&c->weights, s->node, used);
         for (int i = 0; i < c->lattice.n_node && !c->has_grid; i++) used[0] += s->node[i];
         for (int i = 0; i < c->n_used; i++) to[i] += exp(t[i]) * used[i];
     }
@@ -118,7 +118,7 @@ static void gather_slopes(pal_calibration_seat *s, const double *theta)
 static double compare(const pal_calibration *c, const pal_fit_case *fit, const double *x, double *dJ_du)
 {
     const double *rest = c->lattice.x_rest;
-    double sum = 0, scale = 100 * 100 / (fit->most_m * fit->most_m * fit->n_point);
+    double sum = 0, scale = 100 * 100 / (fit->max_m * fit->max_m * fit->n_point);
     if (dJ_du) memset(dJ_du, 0, 3 * sizeof(double) * (size_t)c->lattice.n_node);
     for (int i = 0; i < fit->n_point; i++) {
         double d[3];
@@ -223,7 +223,7 @@ static bool add_up(const pal_calibration *c, pal_calibration_value *out, double 
 }
 
 pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat *seat, const double *theta,
-                                 unsigned ask, pal_calibration_value *out, double *slope, pal_note *note)
+                                 unsigned ask, pal_calibration_value *out, double *slope, pal_diagnostic *diag)
 {
     *out = (pal_calibration_value){.error_percent = DBL_MAX, .objective = DBL_MAX};
     for (int i = 0; i < c->n_case; i++) out->case_percent[i] = NAN;
@@ -231,8 +231,8 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
     if (slope) memset(slope, 0, n);
     for (int i = 0; i < c->n_parameter; i++)
         if (!isfinite(theta[i]) || fabs(theta[i]) > 600)
-            return pal_note_set(note, PAL_ERR_NUMERIC, "parameter %d is %g, not the logarithm of a constant", i,
-                                theta[i]);
+            return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "parameter %d is %g, not the logarithm of a constant", i,
+                                      theta[i]);
     memset(seat->gradient, 0, n);
     spread_constants(seat, theta);
     bool lost = false;
@@ -244,7 +244,7 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
             continue;
         }
         pal_err err = evaluate_case(seat, theta, i, ask, out, slope && !lost);
-        if (err == PAL_ERR_MEMORY) return pal_note_set(note, err, "no memory to evaluate load case %d", i);
+        if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(diag, err, "no memory to evaluate load case %d", i);
         lost |= fit && err;
     }
     double scale = 1;

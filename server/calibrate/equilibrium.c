@@ -8,8 +8,8 @@
 #include "server/calibrate/equilibrium.h"
 
 #include "server/num/cholesky.h"
-#include "server/sim/springs/spring_row.h"
-#include "server/sim/springs/spring_shape.h"
+#include "server/sim/springs/spring_constraint.h"
+#include "server/sim/springs/spring_set.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,7 +20,7 @@ static const double MOST_LINEAR = 1e-6; /* residual of a linear solve, relative 
 
 struct pal_seat {
     const pal_lattice *lattice;
-    pal_blocks matrix; /* pattern borrowed, values our own */
+    pal_block_matrix matrix; /* pattern borrowed, values our own */
     pal_cholesky *factor;
     double *f, *p, *r, *trial; /* [n_node][3] */
 };
@@ -32,7 +32,7 @@ static int pair_count(int n_corner)
     return n_corner * (n_corner + 1) / 2;
 }
 
-static pal_err take_row(const pal_spring_row *row, pal_lattice *to)
+static pal_err take_row(const pal_spring_set *row, pal_lattice *to)
 {
     pal_springs *s = &to->kind[row->spring.kind];
     s->n_corner = row->n_corner;
@@ -44,8 +44,8 @@ static pal_err take_row(const pal_spring_row *row, pal_lattice *to)
     s->n_item = row->n_item;
     memcpy(s->item, row->item, sizeof *s->item * (size_t)row->n_item * (size_t)row->n_corner);
     for (int i = 0; i < row->n_item; i++) {
-        s->w[i] = row->w[row->strips.place[i]];
-        s->q[i] = row->q[row->strips.place[i]];
+        s->w[i] = row->w[row->simd_blocks.place[i]];
+        s->q[i] = row->q[row->simd_blocks.place[i]];
     }
     return PAL_ERR_OK;
 }
@@ -57,7 +57,7 @@ static pal_err make_pattern(pal_lattice *l)
     for (int k = 0; k < PAL_SPRING_KINDS; k++)
         if (l->kind[k].n_item > 0)
             list[n_list++] = (pal_cliques){l->kind[k].n_item, l->kind[k].n_corner, l->kind[k].item};
-    PAL_TRY(pal_blocks_make(l->n_node, list, n_list, l->arena, &l->pattern));
+    PAL_TRY(pal_block_matrix_make(l->n_node, list, n_list, l->arena, &l->pattern));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         pal_springs *s = &l->kind[k];
         int32_t *place = s->place;
@@ -66,7 +66,7 @@ static pal_err make_pattern(pal_lattice *l)
             for (int a = 0; a < s->n_corner; a++)
                 for (int b = 0; b <= a; b++) {
                     bool low = node[a] >= node[b];
-                    int at = pal_blocks_find(&l->pattern, low ? node[a] : node[b], low ? node[b] : node[a]);
+                    int at = pal_block_matrix_find(&l->pattern, low ? node[a] : node[b], low ? node[b] : node[a]);
                     *place++ = low ? at : ~at;
                 }
         }
@@ -79,39 +79,40 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
     static const char *const name[PAL_SPRING_KINDS] = {"edge_distance", "face_area", "tet_volume"};
     size_t n = (size_t)body->n_node;
     out->n_node = body->n_node;
-    out->h_m = body->h_m;
+    out->edge_m = body->edge_m;
     out->x_rest = PAL_NEW(out->arena, double, 3 * n);
-    out->held = PAL_NEW(out->arena, uint8_t, n);
-    if (!out->x_rest || !out->held) return PAL_ERR_MEMORY;
+    out->fixed = PAL_NEW(out->arena, uint8_t, n);
+    if (!out->x_rest || !out->fixed) return PAL_ERR_MEMORY;
     memcpy(out->x_rest, body->x_rest, 3 * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
-        out->held[i] = body->held[i] != 0;
-        out->n_free += !out->held[i];
+        out->fixed[i] = body->fixed[i] != 0;
+        out->n_free += !out->fixed[i];
     }
-    for (int r = 0; r < pal_world_rows(world); r++) {
-        pal_row_info info;
-        pal_world_row(world, r, &info);
+    for (int r = 0; r < pal_world_component_count(world); r++) {
+        pal_component_info info;
+        pal_world_component_info(world, r, &info);
         for (int k = 0; k < PAL_SPRING_KINDS; k++)
             if (!strcmp(info.name, name[k]) && !strcmp(info.body, body->name))
-                PAL_TRY(take_row(pal_world_effect(world, r)->self, out));
+                PAL_TRY(take_row(pal_world_component(world, r)->self, out));
     }
     return out->kind[PAL_SPRING_DISTANCE].n_item > 0 ? make_pattern(out) : PAL_ERR_OK;
 }
 
-pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_note *note)
+pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag)
 {
     /* a body is only read here */
     const pal_body *b = pal_world_body((pal_world *)(uintptr_t)world, body);
     *out = (pal_lattice){.arena = pal_arena_create(1 << 20, true)};
     pal_err err = out->arena ? take(world, b, out) : PAL_ERR_MEMORY;
     if (err)
-        pal_note_set(note, err, "body \"%s\": no memory for %d nodes", b->name, b->n_node);
+        pal_diagnostic_set(diag, err, "body \"%s\": no memory for %d nodes", b->name, b->n_node);
     else if (out->kind[PAL_SPRING_DISTANCE].n_item == 0)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": has no edge springs", b->name);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": has no edge springs", b->name);
     else if (out->n_free == out->n_node)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": nothing holds it against its loads", b->name);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it against its loads", b->name);
     else if (out->n_free == 0)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": all of its %d nodes are held", b->name, b->n_node);
+        err =
+            pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": all of its %d nodes are held", b->name, b->n_node);
     if (err) pal_lattice_free(out);
     return err;
 }
@@ -134,7 +135,7 @@ pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out)
     s->matrix.value = calloc(9 * n_block, sizeof(double));
     s->f = calloc(4 * n, sizeof(double));
     pal_err err =
-        s->matrix.value && s->f ? pal_cholesky_create(&lattice->pattern, lattice->held, &s->factor) : PAL_ERR_MEMORY;
+        s->matrix.value && s->f ? pal_cholesky_create(&lattice->pattern, lattice->fixed, &s->factor) : PAL_ERR_MEMORY;
     if (err) {
         pal_seat_destroy(s);
         return err;
@@ -171,9 +172,9 @@ PAL_INLINE double force_of(const pal_springs *s, pal_spring_kind kind, const dou
     const int n_corner = pal_spring_corner_count(kind);
     for (int i = 0; i < s->n_item; i++) {
         const double *at[PAL_CORNERS];
-        pal_shape shape;
+        pal_constraint shape;
         corners_of(s, x, i, at);
-        pal_spring_shape(kind, at, s->w[i], &shape);
+        pal_spring_constraint(kind, at, s->w[i], &shape);
         double k = s->q[i] * k_J[i];
         sum += 0.5 * k * shape.c * shape.c;
         for (int c = 0; c < n_corner && f; c++) pal_axpy3(f + 3 * s->item[n_corner * i + c], -k * shape.c, shape.g[c]);
@@ -192,7 +193,7 @@ double pal_lattice_force(const pal_lattice *l, const double *const k_J[PAL_SPRIN
 
 typedef enum hessian { TRUE_HESSIAN, SAFE_HESSIAN, REST_STIFFNESS } hessian;
 
-PAL_INLINE void add_block(pal_blocks *a, int32_t place, const double m[9])
+PAL_INLINE void add_block(pal_block_matrix *a, int32_t place, const double m[9])
 {
     double *to = a->value + 9 * (size_t)(place < 0 ? ~place : place);
     if (place >= 0)
@@ -202,19 +203,19 @@ PAL_INLINE void add_block(pal_blocks *a, int32_t place, const double m[9])
 }
 
 PAL_INLINE void stiffness_of(const pal_springs *s, pal_spring_kind kind, const double *k_J, const double *x,
-                             hessian which, pal_blocks *a)
+                             hessian which, pal_block_matrix *a)
 {
     const int n_corner = pal_spring_corner_count(kind);
     const int32_t *place = s->place;
     for (int i = 0; i < s->n_item; i++) {
         const double *at[PAL_CORNERS];
-        pal_shape shape;
+        pal_constraint shape;
         double h[4][4][9], m[9];
         corners_of(s, x, i, at);
-        pal_spring_shape(kind, at, s->w[i], &shape);
+        pal_spring_constraint(kind, at, s->w[i], &shape);
         double k = s->q[i] * k_J[i], bend = k * shape.c;
         bool bends = which == TRUE_HESSIAN || (which == SAFE_HESSIAN && kind == PAL_SPRING_DISTANCE && shape.c > 0);
-        if (bends) pal_spring_bend(kind, at, s->w[i], h);
+        if (bends) pal_spring_constraint_hessian(kind, at, s->w[i], h);
         for (int p = 0; p < n_corner; p++)
             for (int q = 0; q <= p; q++) {
                 for (int r = 0; r < 9; r++)
@@ -227,14 +228,14 @@ PAL_INLINE void stiffness_of(const pal_springs *s, pal_spring_kind kind, const d
 static void assemble(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x, hessian which)
 {
     const pal_lattice *l = seat->lattice;
-    pal_blocks_zero(&seat->matrix);
+    pal_block_matrix_zero(&seat->matrix);
     stiffness_of(&l->kind[PAL_SPRING_DISTANCE], PAL_SPRING_DISTANCE, k_J[PAL_SPRING_DISTANCE], x, which, &seat->matrix);
     stiffness_of(&l->kind[PAL_SPRING_AREA], PAL_SPRING_AREA, k_J[PAL_SPRING_AREA], x, which, &seat->matrix);
     stiffness_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, which, &seat->matrix);
 }
 
 /* diagonal += share of itself */
-static void shift(pal_blocks *a, double share)
+static void shift(pal_block_matrix *a, double share)
 {
     for (int j = 0; j < a->n; j++)
         for (int c = 0; c < 3; c++) a->value[9 * (size_t)a->start[j] + 4 * (size_t)c] *= 1 + share;
@@ -249,14 +250,14 @@ typedef struct search {
     const double *force_N;
     const pal_equilibrium_options *o;
     pal_equilibrium_report *report;
-    pal_note *note;
+    pal_diagnostic *diag;
 } search;
 
 static double norm(const pal_lattice *l, const double *v)
 {
     double sum = 0;
     for (int i = 0; i < l->n_node; i++)
-        if (!l->held[i]) sum += pal_dot3(v + 3 * i, v + 3 * i);
+        if (!l->fixed[i]) sum += pal_dot3(v + 3 * i, v + 3 * i);
     return sqrt(sum);
 }
 
@@ -264,7 +265,7 @@ static double dot(const pal_lattice *l, const double *a, const double *b)
 {
     double sum = 0;
     for (int i = 0; i < l->n_node; i++)
-        if (!l->held[i]) sum += pal_dot3(a + 3 * i, b + 3 * i);
+        if (!l->fixed[i]) sum += pal_dot3(a + 3 * i, b + 3 * i);
     return sum;
 }
 
@@ -274,7 +275,7 @@ static double residual(const search *s, const double *x, double *r)
     const pal_lattice *l = s->seat->lattice;
     double energy = pal_lattice_force(l, s->k_J, x, r);
     for (int i = 0; i < l->n_node; i++) {
-        if (l->held[i]) {
+        if (l->fixed[i]) {
             pal_set3(r + 3 * i, 0, 0, 0);
             continue;
         }
@@ -358,28 +359,29 @@ static pal_err newton(const search *s, double *x)
     bool stable = false;
     for (int k = 0;; k++) {
         s->report->residual = load > 0 ? size / load : size;
-        if (!isfinite(size)) return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: not finite at iteration %d", k);
+        if (!isfinite(size))
+            return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite at iteration %d", k);
         if (size <= target && stable) return PAL_ERR_OK;
         if (k == s->o->most_iteration)
-            return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest within %d iterations: residual %.2g", k,
-                                s->report->residual);
+            return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest within %d iterations: residual %.2g", k,
+                                      s->report->residual);
         int shifted = s->report->n_shift;
         pal_err err = factor_at(s, x);
-        if (err) return pal_note_set(s->note, err, "no rest: iteration %d, no factor (%s)", k, pal_err_text(err));
+        if (err) return pal_diagnostic_set(s->diag, err, "no rest: iteration %d, no factor (%s)", k, pal_err_text(err));
         stable = s->report->n_shift == shifted;
         if (size <= target)
             return stable ? PAL_ERR_OK
-                          : pal_note_set(s->note, PAL_ERR_NUMERIC, "the rest found is not stable (a saddle)");
+                          : pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "the rest found is not stable (a saddle)");
         PAL_TRY(pal_cholesky_solve(seat->factor, seat->r, seat->p));
         s->report->n_newton++;
         if (!advance(s, x, &energy, &size)) {
             if (size <= 1e3 * target && stable) return PAL_ERR_OK; /* rounding */
-            return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: no step lowers the energy at a residual of %.2g",
-                                s->report->residual);
+            return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC,
+                                      "no rest: no step lowers the energy at a residual of %.2g", s->report->residual);
         }
         if (stretch_of(l, x) > s->o->most_stretch)
-            return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: an edge is stretched more than %g times",
-                                s->o->most_stretch);
+            return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: an edge is stretched more than %g times",
+                                      s->o->most_stretch);
     }
 }
 
@@ -389,40 +391,40 @@ static pal_err linear(const search *s, double *x)
     const pal_lattice *l = seat->lattice;
     pal_err err = factor_at(s, l->x_rest);
     if (!err) err = pal_cholesky_solve(seat->factor, s->force_N, seat->p);
-    if (err) return pal_note_set(s->note, err, "no rest: no factor at rest (%s)", pal_err_text(err));
-    if (!isfinite(norm(l, seat->p))) return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: not finite");
+    if (err) return pal_diagnostic_set(s->diag, err, "no rest: no factor at rest (%s)", pal_err_text(err));
+    if (!isfinite(norm(l, seat->p))) return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite");
     /* constants too far apart for the factor leave a residual */
     double load = norm(l, s->force_N);
     memcpy(seat->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
-    pal_blocks_multiply(&seat->matrix, -1, seat->p, seat->r);
+    pal_block_matrix_multiply(&seat->matrix, -1, seat->p, seat->r);
     s->report->residual = load > 0 ? norm(l, seat->r) / load : 0;
     if (!(s->report->residual < MOST_LINEAR))
-        return pal_note_set(s->note, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
-                            s->report->residual);
-    for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->held[i / 3] ? 0 : seat->p[i]);
+        return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
+                                  s->report->residual);
+    for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->fixed[i / 3] ? 0 : seat->p[i]);
     s->report->energy_J = 0.5 * dot(l, s->force_N, seat->p);
     return PAL_ERR_OK;
 }
 
 pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *force_N,
                         const pal_equilibrium_options *options, double *x, pal_equilibrium_report *report,
-                        pal_note *note)
+                        pal_diagnostic *diag)
 {
     pal_equilibrium_report own;
     if (!report) report = &own;
     *report = (pal_equilibrium_report){0};
     const pal_lattice *l = seat->lattice;
     size_t n = 3 * (size_t)l->n_node;
-    search s = {seat, k_J, force_N, options, report, note};
+    search s = {seat, k_J, force_N, options, report, diag};
     for (size_t i = 0; i < n; i++)
         if (!isfinite(force_N[i]) || (!options->linear && !isfinite(x[i])))
-            return pal_note_set(note, PAL_ERR_NUMERIC, "node %zu: its load or position is not finite", i / 3);
+            return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "node %zu: its load or position is not finite", i / 3);
     if (options->linear) return linear(&s, x);
     double *at = malloc(n * sizeof(double));
-    if (!at) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d nodes", l->n_node);
+    if (!at) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d nodes", l->n_node);
     memcpy(at, x, n * sizeof(double));
     for (int i = 0; i < l->n_node; i++)
-        if (l->held[i]) pal_copy3(at + 3 * i, l->x_rest + 3 * i);
+        if (l->fixed[i]) pal_copy3(at + 3 * i, l->x_rest + 3 * i);
     pal_err err = newton(&s, at);
     if (!err) {
         memcpy(x, at, n * sizeof(double));
@@ -440,10 +442,10 @@ PAL_INLINE void slopes_of(const pal_springs *s, pal_spring_kind kind, const doub
     const int n_corner = pal_spring_corner_count(kind);
     for (int i = 0; i < s->n_item; i++) {
         const double *at[PAL_CORNERS];
-        pal_shape shape;
+        pal_constraint shape;
         double along = 0, c = 0;
         corners_of(s, linear ? x_rest : x, i, at);
-        pal_spring_shape(kind, at, s->w[i], &shape);
+        pal_spring_constraint(kind, at, s->w[i], &shape);
         for (int p = 0; p < n_corner; p++) {
             int node = s->item[n_corner * i + p];
             double u[3];
@@ -457,7 +459,7 @@ PAL_INLINE void slopes_of(const pal_springs *s, pal_spring_kind kind, const doub
 
 pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x,
                                 const pal_equilibrium_options *options, const double *dJ_du,
-                                double *const slope[PAL_SPRING_KINDS], pal_note *note)
+                                double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag)
 {
     const pal_lattice *l = seat->lattice;
     pal_err err = PAL_ERR_OK;
@@ -466,7 +468,7 @@ pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRI
         err = pal_cholesky_factor(seat->factor, &seat->matrix, false);
     }
     if (!err) err = pal_cholesky_solve(seat->factor, dJ_du, seat->p);
-    if (err) return pal_note_set(note, err, "no gradient: no factor at the rest found (%s)", pal_err_text(err));
+    if (err) return pal_diagnostic_set(diag, err, "no gradient: no factor at the rest found (%s)", pal_err_text(err));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         pal_spring_kind kind = (pal_spring_kind)k;
         slopes_of(&l->kind[k], kind, x, l->x_rest, seat->p, options->linear, slope[k]);

@@ -7,9 +7,9 @@
  * Linearised at rest, where every C is 0: K = sum q k g g', K u = f, dJ/dk = -q (g.u)(g.lambda).
  *
  * The lattice is shared and read only; a seat is one thread's own work space. Heap. */
-#ifndef PAL_LAB_EQUILIBRIUM_H
-#define PAL_LAB_EQUILIBRIUM_H
-#include "server/num/blocks.h"
+#ifndef PAL_CALIBRATE_EQUILIBRIUM_H
+#define PAL_CALIBRATE_EQUILIBRIUM_H
+#include "server/num/block_matrix.h"
 #include "server/sim/springs/spring_law.h"
 #include "server/sim/world/world.h"
 
@@ -19,23 +19,23 @@ enum { PAL_SPRING_KINDS = 3 };
 typedef struct pal_springs {
     int n_item, n_corner; /* n_item 0: no such row                                    */
     int32_t *item;        /* nodes                                 [n_item][n_corner] */
-    double *w, *q;        /* 1 / rest measure (spring_shape.h); weight      [n_item]  */
+    double *w, *q;        /* 1 / rest measure (spring_constraint.h); weight      [n_item]  */
     int32_t *place;       /* block of each pair of corners a >= b, negative: ~place, transposed [n_item][pairs] */
 } pal_springs;
 
 typedef struct pal_lattice {
     int n_node, n_free;
     double *x_rest; /* body frame, m [n_node][3] */
-    uint8_t *held;  /* [n_node]                  */
-    double h_m;
+    uint8_t *fixed; /* [n_node]                  */
+    double edge_m;
     pal_springs kind[PAL_SPRING_KINDS]; /* by pal_spring_kind */
     pal_arena *arena;
-    pal_blocks pattern;
+    pal_block_matrix pattern;
 } pal_lattice;
 
 /* copies the springs of the rows edge_distance, face_area, tet_volume of a body. REFUSED: it has no edges; nothing
  * holds it, or everything; MEMORY. [load] */
-pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_note *note);
+pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag);
 void pal_lattice_free(pal_lattice *lattice); /* a zeroed struct is fine */
 
 typedef struct pal_equilibrium_options {
@@ -62,12 +62,12 @@ void pal_seat_destroy(pal_seat *seat);                               /* NULL is 
  * positive definite at the end (no stable rest), a number that is not finite; MEMORY */
 pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *force_N,
                         const pal_equilibrium_options *options, double *x, pal_equilibrium_report *report,
-                        pal_note *note);
+                        pal_diagnostic *diag);
 /* after pal_equilibrium on this seat, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read at
  * held nodes). NUMERIC, MEMORY */
 pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x,
                                 const pal_equilibrium_options *options, const double *dJ_du,
-                                double *const slope[PAL_SPRING_KINDS], pal_note *note);
+                                double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag);
 /* -grad of the elastic energy [n_node][3] at x, held nodes too; returns the energy, J */
 double pal_lattice_force(const pal_lattice *lattice, const double *const k_J[PAL_SPRING_KINDS], const double *x,
                          double *force_N);

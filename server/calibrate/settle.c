@@ -29,7 +29,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
     double force = 0, mass = 0;
     for (int i = 0; i < body->n_dof; i++) {
         force += pal_norm3(force_N + 3 * i);
-        if (!body->held[i]) mass += body->mass_kg[i];
+        if (!body->fixed[i]) mass += body->mass_kg[i];
     }
     return force / mass;
 }
@@ -40,7 +40,7 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
     double v_most = 0, v_sum = 0, a_most = 0, a_sum = 0, u_most = 0;
     int n = 0;
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->held[i]) continue;
+        if (body->fixed[i]) continue;
         const double *v = body->v + 3 * i, *f = body->f + 3 * i;
         double a[3], speed = pal_norm3(v);
         for (int c = 0; c < 3; c++) a[c] = f[c] / body->mass_kg[i] - damping_1_s * v[c];
@@ -58,12 +58,12 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
 static void compare(const pal_body *body, const double *u, pal_settle_run *out)
 {
     double sum = 0, most = 0;
-    out->most_m = 0;
+    out->max_m = 0;
     out->difference_percent = NAN;
     for (int i = 0; i < body->n_dof; i++) {
         double d[3];
         pal_sub3(d, body->x + 3 * i, body->x_rest + 3 * i);
-        out->most_m = fmax(out->most_m, pal_norm3(d));
+        out->max_m = fmax(out->max_m, pal_norm3(d));
         if (!u) continue;
         pal_sub3(d, d, u + 3 * i);
         sum += pal_dot3(d, d);
@@ -76,15 +76,15 @@ static void compare(const pal_body *body, const double *u, pal_settle_run *out)
 static double damping_of(const pal_world *world)
 {
     double rate = 0;
-    for (int k = 0; k < pal_world_rows(world); k++) {
-        const pal_row *row = pal_world_effect(world, k);
+    for (int k = 0; k < pal_world_component_count(world); k++) {
+        const pal_component *row = pal_world_component(world, k);
         if (row->effect->drag) rate += row->effect->drag(row->self);
     }
     return rate;
 }
 
 pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load, const pal_settle_options *options,
-                   double *work, pal_settle_run *out, pal_note *note)
+                   double *work, pal_settle_run *out, pal_diagnostic *diag)
 {
     pal_body *body = pal_world_body(world, 0);
     double damping = damping_of(world), gain = mean_gain(body, load->force_N), since = 0, time = 0;
@@ -94,11 +94,11 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
     for (int i = 0; i < body->n_node; i++)
         if (pal_dot3(load->force_N + 3 * i, load->force_N + 3 * i) > 0) {
             pal_err err = pal_world_load(world, 0, i, load->force_N + 3 * i);
-            if (err) return pal_note_set(note, err, "no memory for the loads of a live run");
+            if (err) return pal_diagnostic_set(diag, err, "no memory for the loads of a live run");
         }
     while (!out->steady && time<options->most_s && * work> 0) {
         if (!say(options, "live body comes to rest", time / options->most_s))
-            return pal_note_set(note, PAL_ERR_STATE, "stopped while the live body was coming to rest");
+            return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped while the live body was coming to rest");
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;
         *work -= (double)pal_world_substeps(world) * body->tets->n_tet;
@@ -114,13 +114,14 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
 
 /* all loads at one rate; the mean is *mean, NaN when some is not steady within `most` seconds of all together */
 static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double most,
-                        pal_settle_options *options, double *work, pal_settle_run *run, double *mean, pal_note *note)
+                        pal_settle_options *options, double *work, pal_settle_run *run, double *mean,
+                        pal_diagnostic *diag)
 {
     double left = most, longest = options->most_s;
     *mean = NAN;
     for (int k = 0; k < n_load; k++) {
         options->most_s = fmin(longest, left);
-        pal_err err = pal_settle(world, step_s, &load[k], options, work, &run[k], note);
+        pal_err err = pal_settle(world, step_s, &load[k], options, work, &run[k], diag);
         options->most_s = longest;
         if (err) return err;
         left -= run[k].seconds;
@@ -139,7 +140,7 @@ typedef struct climb {
     pal_settle_options options;
     double work;
     pal_settle_report *out;
-    pal_note *note;
+    pal_diagnostic *diag;
 } climb;
 
 /* one rung; *better: sooner than all before */
@@ -150,8 +151,8 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     pal_material material = c->scene->body[0].material;
     double mean, most = c->n_load * (out->steady ? out->seconds : c->options.most_s);
     material.damping_1_s = pal_settle_ladder_1_s[rung];
-    PAL_TRY(pal_world_material(c->world, 0, &material, c->note));
-    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, most, &c->options, &c->work, run, &mean, c->note));
+    PAL_TRY(pal_world_material(c->world, 0, &material, c->diag));
+    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, most, &c->options, &c->work, run, &mean, c->diag));
     out->ladder_s[rung] = mean;
     *better = isfinite(mean) && (!out->steady || mean < out->seconds);
     /* of a body that never rests the first run is there to tell */
@@ -200,18 +201,18 @@ static pal_err run_climb(climb *c)
 }
 
 pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, int n_load,
-                           const pal_settle_options *options, pal_settle_report *out, pal_note *note)
+                           const pal_settle_options *options, pal_settle_report *out, pal_diagnostic *diag)
 {
     if (n_load < 1 || n_load > PAL_SETTLE_LOADS)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
     if (scene->n_body != 1)
-        return pal_note_set(note, PAL_ERR_REFUSED, "a scene of %d bodies, wanted one", scene->n_body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a scene of %d bodies, wanted one", scene->n_body);
     *out = (pal_settle_report){.damping_1_s = scene->body[0].material.damping_1_s, .seconds = NAN};
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->ladder_s[k] = NAN;
     for (int k = 0; k < PAL_SETTLE_LOADS; k++) out->load[k].difference_percent = NAN;
     pal_scene *own = malloc(sizeof *own);
     pal_world *world = NULL;
-    if (!own) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a live body");
+    if (!own) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a live body");
     *own = *scene;
     /* nobody looks and nobody touches; the row viscous is there when there is a rate */
     own->body[0].output.name[0] = 0;
@@ -224,8 +225,8 @@ pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, 
                .options = *options,
                .work = options->most_work,
                .out = out,
-               .note = note};
-    pal_err err = pal_world_create(own, note, &world);
+               .diag = diag};
+    pal_err err = pal_world_create(own, diag, &world);
     c.world = world;
     if (!err) err = run_climb(&c);
     pal_world_destroy(world);

@@ -8,8 +8,8 @@
  * same for a light load and a heavy one, for a stiff body and a soft one. Time is simulated time; what comes out
  * depends on the scene alone, not on the machine's speed.
  * Thread: [load]. */
-#ifndef PAL_LAB_SETTLE_H
-#define PAL_LAB_SETTLE_H
+#ifndef PAL_CALIBRATE_SETTLE_H
+#define PAL_CALIBRATE_SETTLE_H
 #include "server/sim/world/world.h"
 
 enum { PAL_SETTLE_LOADS = 8, PAL_SETTLE_STEPS = 6 };
@@ -33,14 +33,14 @@ void pal_settle_default(pal_settle_options *options);
 typedef struct pal_settle_run {
     bool steady;
     double seconds;            /* simulated until still, the quarter of a second included; else how long it was run */
-    double most_m;             /* largest displacement at the end                                         */
+    double max_m;              /* largest displacement at the end                                         */
     double difference_percent; /* RMS of displacement - u, in per cent of the largest u; NaN: no u          */
 } pal_settle_run;
 
 /* body 0 of a world that was made with damping_1_s > 0: reset, loaded, run. The world keeps shape and loads.
  * work: what may be spent, less what was. STATE: progress said stop; MEMORY */
 pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load, const pal_settle_options *options,
-                   double *work, pal_settle_run *out, pal_note *note);
+                   double *work, pal_settle_run *out, pal_diagnostic *diag);
 
 typedef struct pal_settle_report {
     bool steady;                       /* some rate brings all loads to rest                                         */
@@ -54,5 +54,5 @@ typedef struct pal_settle_report {
  * is given) upwards while that is sooner, else downwards; a rate is given up when its mean can not be the least any
  * more. REFUSED: no loads or too many, a scene of none or several bodies; what pal_world_create gives; STATE, MEMORY */
 pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, int n_load,
-                           const pal_settle_options *options, pal_settle_report *out, pal_note *note);
+                           const pal_settle_options *options, pal_settle_report *out, pal_diagnostic *diag);
 #endif

@@ -57,36 +57,40 @@ static const pal_config_key *find(const char *key)
 }
 
 static pal_err set_text(pal_config *config, const pal_config_key *s, const char *text, const char *where,
-                        pal_note *note)
+                        pal_diagnostic *diag)
 {
     uint32_t code;
     size_t n = strlen(text);
     if (n >= s->n_byte && strcmp(s->key, "log") != 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %zu bytes of text, more than %zu", where, n, s->n_byte - 1);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes of text, more than %zu", where, n,
+                                  s->n_byte - 1);
     for (size_t k = 0; k < n;) {
         int size = pal_utf8_next(text + k, n - k, &code);
-        if (size == 0 || !pal_utf8_shown(code))
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: has a control character", where);
+        if (size == 0 || !pal_utf8_printable(code))
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has a control character", where);
         k += (size_t)size;
     }
     if (!strcmp(s->key, "log")) {
         bool known = false;
         for (int k = 0; k < 4; k++) known = known || !strcmp(text, level_name[k]);
         if (!known)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.20s\" is not error, warn, info or debug", where, text);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.20s\" is not error, warn, info or debug", where,
+                                      text);
     }
-    if (!strcmp(s->key, "listen") && n == 0) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is empty", where);
+    if (!strcmp(s->key, "listen") && n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is empty", where);
     memcpy((char *)config + s->offset, text, n + 1);
     return PAL_ERR_OK;
 }
 
-static pal_err set_number(pal_config *config, const pal_config_key *s, double number, const char *where, pal_note *note)
+static pal_err set_number(pal_config *config, const pal_config_key *s, double number, const char *where,
+                          pal_diagnostic *diag)
 {
     void *place = (char *)config + s->offset;
     if (!(number >= s->low && number <= s->high))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.15g is outside %g .. %g", where, number, s->low, s->high);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is outside %g .. %g", where, number, s->low,
+                                  s->high);
     if (s->kind == PAL_CONFIG_KEY_INT && number != floor(number))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.15g is not a whole number", where, number);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is not a whole number", where, number);
     if (s->kind == PAL_CONFIG_KEY_INT)
         *(int *)place = (int)number;
     else
@@ -94,90 +98,91 @@ static pal_err set_number(pal_config *config, const pal_config_key *s, double nu
     return PAL_ERR_OK;
 }
 
-pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_note *note)
+pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag)
 {
     const pal_config_key *s = find(key);
-    if (!s) return pal_note_set(note, PAL_ERR_REFUSED, "%s: unknown key", where);
-    if (s->kind == PAL_CONFIG_KEY_TEXT) return set_text(config, s, text, where, note);
+    if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
+    if (s->kind == PAL_CONFIG_KEY_TEXT) return set_text(config, s, text, where, diag);
     if (s->kind == PAL_CONFIG_KEY_BOOL) {
         bool yes = !strcmp(text, "true") || !strcmp(text, "1"), no = !strcmp(text, "false") || !strcmp(text, "0");
-        if (!yes && !no) return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.40s\" is not true or false", where, text);
+        if (!yes && !no)
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is not true or false", where, text);
         *(bool *)((char *)config + s->offset) = yes;
         return PAL_ERR_OK;
     }
     char *end;
     double number = strtod(text, &end);
     if (end == text || *end || isspace((unsigned char)*text))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.40s\" is not a number", where, text);
-    return set_number(config, s, number, where, note);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is not a number", where, text);
+    return set_number(config, s, number, where, diag);
 }
 
 static pal_err set_json(pal_config *config, const pal_config_key *s, const cJSON *item, const char *where,
-                        pal_note *note)
+                        pal_diagnostic *diag)
 {
     switch (s->kind) {
     case PAL_CONFIG_KEY_TEXT:
-        if (!cJSON_IsString(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not a text", where);
-        return set_text(config, s, item->valuestring, where, note);
+        if (!cJSON_IsString(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not a text", where);
+        return set_text(config, s, item->valuestring, where, diag);
     case PAL_CONFIG_KEY_BOOL:
-        if (!cJSON_IsBool(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not true or false", where);
+        if (!cJSON_IsBool(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not true or false", where);
         *(bool *)((char *)config + s->offset) = cJSON_IsTrue(item);
         return PAL_ERR_OK;
     case PAL_CONFIG_KEY_INT:
     case PAL_CONFIG_KEY_NUMBER:
         break;
     }
-    if (!cJSON_IsNumber(item)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: is not a number", where);
-    return set_number(config, s, item->valuedouble, where, note);
+    if (!cJSON_IsNumber(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not a number", where);
+    return set_number(config, s, item->valuedouble, where, diag);
 }
 
-static pal_err read_keys(pal_config *config, const char *name, const cJSON *root, pal_note *note)
+static pal_err read_keys(pal_config *config, const char *name, const cJSON *root, pal_diagnostic *diag)
 {
     char where[PAL_CONFIG_TEXT];
-    if (!cJSON_IsObject(root)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a JSON object", name);
+    if (!cJSON_IsObject(root)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a JSON object", name);
     for (const cJSON *item = root->child; item; item = item->next) {
         const pal_config_key *s = find(item->string);
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
-        if (!s) return pal_note_set(note, PAL_ERR_REFUSED, "%s: unknown key", where);
+        if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: the key is there twice", where);
-        PAL_TRY(set_json(config, s, item, where, note));
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is there twice", where);
+        PAL_TRY(set_json(config, s, item, where, diag));
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_note *note)
+pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_diagnostic *diag)
 {
     const char *end = json;
     int line = 1;
     if (n_byte > FILE_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MOST);
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(json, n_byte, &end, false) : NULL;
     size_t at = end >= json ? (size_t)(end - json) : 0;
     while (root && at < n_byte && strchr(" \t\r\n", json[at])) at++;
     if (!root || at < n_byte) {
         for (size_t k = 0; k < at && k < n_byte; k++) line += json[k] == '\n';
         cJSON_Delete(root);
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: line %d: not JSON", name, line);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: line %d: not JSON", name, line);
     }
     pal_config fresh = *config;
-    pal_err err = read_keys(&fresh, name, root, note);
+    pal_err err = read_keys(&fresh, name, root, diag);
     cJSON_Delete(root);
     if (!err) *config = fresh;
     return err;
 }
 
-pal_err pal_config_file(pal_config *config, const char *path, pal_note *note)
+pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, FILE_MOST, &bytes, &n_byte, note));
-    pal_err err = pal_config_parse(config, path, (const char *)bytes, n_byte, note);
+    PAL_TRY(pal_file_read(path, FILE_MOST, &bytes, &n_byte, diag));
+    pal_err err = pal_config_parse(config, path, (const char *)bytes, n_byte, diag);
     free(bytes);
     return err;
 }
 
-pal_err pal_config_environment(pal_config *config, char *const *variable, pal_note *note)
+pal_err pal_config_environment(pal_config *config, char *const *variable, pal_diagnostic *diag)
 {
     static const char prefix[] = "PALPATE_";
     pal_config fresh = *config;
@@ -189,7 +194,7 @@ pal_err pal_config_environment(pal_config *config, char *const *variable, pal_no
         if (!strcmp(name, "PALPATE_CONFIG")) continue;
         snprintf(key, sizeof key, "%s", name + sizeof prefix - 1);
         for (char *c = key; *c; c++) *c = (char)tolower((unsigned char)*c);
-        PAL_TRY(pal_config_set(&fresh, key, text + 1, name, note));
+        PAL_TRY(pal_config_set(&fresh, key, text + 1, name, diag));
     }
     *config = fresh;
     return PAL_ERR_OK;

@@ -4,8 +4,8 @@
  * key is PALPATE_ and the key in capitals (PALPATE_ALLOW_REMOTE=true); the flag is the key with dashes
  * (--allow-remote). An unknown key, an unknown PALPATE_ variable and a value out of range are errors that name where
  * they stand. Thread: [load]. */
-#ifndef PAL_CONFIG_H
-#define PAL_CONFIG_H
+#ifndef PAL_CLI_CONFIG_H
+#define PAL_CLI_CONFIG_H
 #include "server/base/err.h"
 #include "server/base/log.h"
 
@@ -43,13 +43,13 @@ typedef struct pal_config_key {
 const pal_config_key *pal_config_settings(int *n);
 void pal_config_default(pal_config *config);
 /* reads a file over what is there; REFUSED names file and key, IO. All or nothing. */
-pal_err pal_config_file(pal_config *config, const char *path, pal_note *note);
+pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *diag);
 /* the same from memory: name is used in messages */
-pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_note *note);
+pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_diagnostic *diag);
 /* every PALPATE_ variable of environ-like list (NULL-terminated "KEY=value" texts); PALPATE_CONFIG is left out: it is
  * the file to read when there is no --config. All or nothing. */
-pal_err pal_config_environment(pal_config *config, char *const *variable, pal_note *note);
+pal_err pal_config_environment(pal_config *config, char *const *variable, pal_diagnostic *diag);
 /* one key from text; where ("--port", "PALPATE_PORT") is used in messages */
-pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_note *note);
+pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag);
 pal_log_level pal_config_log_level(const pal_config *config);
 #endif

@@ -174,17 +174,17 @@ static int take(parse *p, int argc, char **argv, int *at)
 static int configure(parse *p)
 {
     pal_config *config = p->table->config;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const char *file = p->config_file ? p->config_file : getenv("PALPATE_CONFIG");
     pal_config_default(config);
-    pal_err err = file && *file ? pal_config_file(config, file, &note) : PAL_ERR_OK;
-    if (!err) err = pal_config_environment(config, environ, &note);
-    if (err) return pal_report_refusal(p->common, err, &note);
+    pal_err err = file && *file ? pal_config_file(config, file, &diag) : PAL_ERR_OK;
+    if (!err) err = pal_config_environment(config, environ, &diag);
+    if (err) return pal_report_refusal(p->common, err, &diag);
     for (int k = 0; k < p->n_given; k++) {
         char name[KEY];
         flag_name(p->given[k].setting->key, name);
-        if (pal_config_set(config, p->given[k].setting->key, p->given[k].text, name, &note))
-            return wrong(p, "%s", note.text);
+        if (pal_config_set(config, p->given[k].setting->key, p->given[k].text, name, &diag))
+            return wrong(p, "%s", diag.text);
     }
     return -1;
 }

@@ -12,8 +12,8 @@
  *
  * `--name value` and `--name=value` are the same; `-o DIR` is a name like any other; `--` ends the flags. A flag may
  * stand anywhere and only once. Thread: [load]. */
-#ifndef PAL_COMMANDS_FLAGS_H
-#define PAL_COMMANDS_FLAGS_H
+#ifndef PAL_CLI_FLAGS_H
+#define PAL_CLI_FLAGS_H
 #include "server/cli/config.h"
 
 #include <stdbool.h>

@@ -19,10 +19,10 @@ int pal_report_code(pal_err err)
     }
 }
 
-int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_note *note)
+int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag)
 {
-    char text[sizeof note->text];
-    snprintf(text, sizeof text, "%s", note && note->text[0] ? note->text : pal_err_text(err));
+    char text[sizeof diag->text];
+    snprintf(text, sizeof text, "%s", diag && diag->text[0] ? diag->text : pal_err_text(err));
     for (char *c = text; *c; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
     pal_report_progress(NULL, 0, (void *)(uintptr_t)common);

@@ -1,6 +1,6 @@
 /* What a command says: refusals, progress and the one JSON object. Thread: [load]. */
-#ifndef PAL_COMMANDS_REPORT_H
-#define PAL_COMMANDS_REPORT_H
+#ifndef PAL_CLI_REPORT_H
+#define PAL_CLI_REPORT_H
 #include "server/base/err.h"
 #include "server/cli/flags.h"
 
@@ -10,7 +10,7 @@
 int pal_report_code(pal_err err);
 /* one line on stderr, "palpate COMMAND: sentence" (line ends in the sentence become blanks), with --json also
  * {"ok": false, "error": {"code": "REFUSED", "text": "..."}} on stdout; the result is the exit code */
-int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_note *note);
+int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag);
 /* prints the object on stdout (one line) and deletes it; the result is 0, or 3 when it could not be made or written */
 int pal_report_json(const pal_flag_common *common, cJSON *object);
 

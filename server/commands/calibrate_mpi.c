@@ -50,14 +50,14 @@ typedef struct job {
     pal_calibrate_set *set;
     pal_calibration *c;
     pal_calibration_info info;
-    pal_calibration_seat *seat[PAL_TEAM_MOST];
+    pal_calibration_seat *seat[PAL_TEAM_MAX];
     uint64_t print; /* fingerprint of what is evaluated */
     /* evaluations of the batch at hand */
     double *theta, *cost; /* [batch][n_parameter], [batch] */
     bool no_memory;       /* in one of them */
     int *missing;         /* points of the batch that the journal has not [batch] */
     int64_t n_computed, n_taken;
-    pal_note note;
+    pal_diagnostic diag;
 } job;
 
 /* ---- messages ---- */
@@ -80,7 +80,7 @@ static pal_err agree(job *j, pal_err err)
     MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
     if (first == j->n_rank) return PAL_ERR_OK;
     MPI_Bcast(&code, 1, MPI_INT, first, MPI_COMM_WORLD);
-    MPI_Bcast(j->note.text, sizeof j->note.text, MPI_CHAR, first, MPI_COMM_WORLD);
+    MPI_Bcast(j->diag.text, sizeof j->diag.text, MPI_CHAR, first, MPI_COMM_WORLD);
     return (pal_err)code;
 }
 
@@ -144,7 +144,7 @@ static pal_err gather(job *j, int rank, const double *theta, int m, double *cost
         if (isnan(cost[at]))
             j->no_memory = true;
         else if (!err && j->journal)
-            err = pal_journal_put(j->journal, theta + (size_t)at * (size_t)j->info.n_parameter, cost[at], &j->note);
+            err = pal_journal_put(j->journal, theta + (size_t)at * (size_t)j->info.n_parameter, cost[at], &j->diag);
     }
     return err;
 }
@@ -179,7 +179,7 @@ static pal_err evaluate(void *user, const double *theta, int n, double *cost)
         pal_err next = gather(j, from, theta, m, cost);
         if (!err) err = next;
     }
-    if (!err && j->no_memory) err = pal_note_set(&j->note, PAL_ERR_MEMORY, "no memory to evaluate constants");
+    if (!err && j->no_memory) err = pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory to evaluate constants");
     return err;
 }
 
@@ -204,7 +204,7 @@ static uint64_t fingerprint(const job *j, double start_percent)
         if (!one->fit) continue;
         sum = pal_journal_hash(sum, what, sizeof what);
         sum = pal_journal_hash(sum, pal_calibration_forces(j->c, k), n);
-        sum = pal_journal_hash(sum, &j->info.most_m[k], sizeof(double));
+        sum = pal_journal_hash(sum, &j->info.max_m[k], sizeof(double));
         if (one->samples) sum = pal_journal_hash(sum, one->samples->x, 3 * sizeof(double) * (size_t)one->samples->n);
         if (one->samples) sum = pal_journal_hash(sum, one->samples->u, 3 * sizeof(double) * (size_t)one->samples->n);
     }
@@ -213,32 +213,33 @@ static uint64_t fingerprint(const job *j, double start_percent)
 
 static pal_err make(job *j, const char *problem)
 {
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_calibration_value v;
     pal_calibrate_options o = j->options;
     j->wish.problem = problem;
-    PAL_TRY(pal_calibrate_cases_read(&j->wish, j->set, &j->note));
+    PAL_TRY(pal_calibrate_cases_read(&j->wish, j->set, &j->diag));
     pal_err err = PAL_ERR_OK;
-    if (o.voxel.resolution == 0) err = pal_calibrate_cases_resolution(j->set, &o.voxel, &o.voxel.resolution, &why);
-    if (!err) err = pal_calibration_create(j->set->problem, &j->set->surface, j->set->list, j->set->n, &o, &j->c, &why);
-    if (err) return pal_note_set(&j->note, err, "%s: %s", problem, why.text);
+    if (o.voxel.resolution == 0) err = pal_calibrate_cases_resolution(j->set, &o.voxel, &o.voxel.resolution, &reason);
+    if (!err)
+        err = pal_calibration_create(j->set->problem, &j->set->surface, j->set->list, j->set->n, &o, &j->c, &reason);
+    if (err) return pal_diagnostic_set(&j->diag, err, "%s: %s", problem, reason.text);
     pal_calibration_info_of(j->c, &j->info);
-    PAL_TRY(pal_calibrate_cases_check(j->set, j->info.mesh, &j->note));
+    PAL_TRY(pal_calibrate_cases_check(j->set, j->info.mesh, &j->diag));
     size_t batch = (size_t)j->n_batch;
     j->theta = malloc(batch * (size_t)j->info.n_parameter * sizeof *j->theta);
     j->cost = malloc(batch * sizeof *j->cost);
     j->missing = malloc(batch * sizeof *j->missing);
     bool room = j->theta && j->cost && j->missing;
     for (int w = 0; w < pal_team_size(j->team) && room; w++) room = !pal_calibration_seat_create(j->c, &j->seat[w]);
-    if (!room) return pal_note_set(&j->note, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
-    PAL_TRY(pal_calibration_evaluate(j->c, j->seat[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->note));
+    if (!room) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
+    PAL_TRY(pal_calibration_evaluate(j->c, j->seat[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->diag));
     j->print = fingerprint(j, v.error_percent);
     return PAL_ERR_OK;
 }
 
 static void unmake(job *j)
 {
-    for (int w = 0; w < PAL_TEAM_MOST; w++) {
+    for (int w = 0; w < PAL_TEAM_MAX; w++) {
         pal_calibration_seat_destroy(j->seat[w]);
         j->seat[w] = NULL;
     }
@@ -259,9 +260,9 @@ static pal_err same_everywhere(job *j, const char *problem)
     uint64_t root = j->print;
     MPI_Bcast(&root, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     if (root == j->print) return PAL_ERR_OK;
-    return pal_note_set(&j->note, PAL_ERR_REFUSED,
-                        "%s: rank %d makes another calibration of it than rank 0: the files or the machines differ",
-                        problem, j->rank);
+    return pal_diagnostic_set(
+        &j->diag, PAL_ERR_REFUSED,
+        "%s: rank %d makes another calibration of it than rank 0: the files or the machines differ", problem, j->rank);
 }
 
 /* ---- results ---- */
@@ -321,19 +322,20 @@ static pal_err write_result(job *j, const char *problem, int seed, const cJSON *
     if (!j->folder) return PAL_ERR_OK;
     if (j->n_seed > 1) snprintf(tail, sizeof tail, "_%d", seed);
     int n = snprintf(path, sizeof path, "%.900s/%.*s%s.json", j->folder, dot ? (int)(dot - name) : 200, name, tail);
-    if (n < 0 || (size_t)n >= sizeof path) return pal_note_set(&j->note, PAL_ERR_REFUSED, "%.200s: too long", problem);
+    if (n < 0 || (size_t)n >= sizeof path)
+        return pal_diagnostic_set(&j->diag, PAL_ERR_REFUSED, "%.200s: too long", problem);
     snprintf(temporary, sizeof temporary, "%s.part", path);
     char *text = result ? cJSON_Print(result) : NULL;
-    if (!text) return pal_note_set(&j->note, PAL_ERR_MEMORY, "%.200s: no memory for the result", path);
+    if (!text) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%.200s: no memory for the result", path);
     FILE *file = fopen(temporary, "we");
     bool good = file && fprintf(file, "%s\n", text) > 0;
     if (file) good = fclose(file) == 0 && good;
     if (good) good = rename(temporary, path) == 0;
     cJSON_free(text);
     if (good) return PAL_ERR_OK;
-    int why = errno;
+    int reason = errno;
     remove(temporary);
-    return pal_note_set(&j->note, PAL_ERR_IO, "%.300s: cannot be written: %s", path, strerror(why));
+    return pal_diagnostic_set(&j->diag, PAL_ERR_IO, "%.300s: cannot be written: %s", path, strerror(reason));
 }
 
 static void print(const job *j, const char *problem, int seed, const pal_fit_result *r)
@@ -359,9 +361,9 @@ static bool show(void *user, const pal_fit_step *step)
 static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
 {
     pal_fit_result r;
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_fit_options o = {.budget_s = j->budget_s,
-                         .most_evaluation = j->evaluations,
+                         .max_evaluation = j->evaluations,
                          .seed = (uint64_t)seed,
                          .enough_percent = j->enough_percent,
                          .evaluate = evaluate,
@@ -369,13 +371,13 @@ static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
                          .step = show,
                          .user = j};
     double *theta = malloc(sizeof *theta * (size_t)j->info.n_parameter);
-    if (!theta) return pal_note_set(&j->note, PAL_ERR_MEMORY, "%s: no memory", problem);
+    if (!theta) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory", problem);
     memcpy(theta, j->info.start, sizeof *theta * (size_t)j->info.n_parameter);
-    j->note.text[0] = 0;
-    pal_err err = pal_fit_anneal(j->c, &o, theta, &r, &why);
+    j->diag.text[0] = 0;
+    pal_err err = pal_fit_anneal(j->c, &o, theta, &r, &reason);
     pal_report_progress(NULL, 0, &j->common);
     if (err) {
-        if (!j->note.text[0]) pal_note_set(&j->note, err, "%s: %s", problem, why.text);
+        if (!j->diag.text[0]) pal_diagnostic_set(&j->diag, err, "%s: %s", problem, reason.text);
     } else {
         cJSON *one = as_json(j, seed, theta, &r);
         err = write_result(j, problem, seed, one);
@@ -393,7 +395,7 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
     if (!err) err = agree(j, same_everywhere(j, problem));
     if (!err)
         err =
-            agree(j, j->journal ? pal_journal_begin(j->journal, j->print, j->info.n_parameter, &j->note) : PAL_ERR_OK);
+            agree(j, j->journal ? pal_journal_begin(j->journal, j->print, j->info.n_parameter, &j->diag) : PAL_ERR_OK);
     if (!err && j->rank > 0) serve(j);
     if (!err && j->rank == 0) {
         for (int s = 0; s < j->n_seed && !err; s++) err = fit(j, problem, j->seed[s], results);
@@ -404,14 +406,14 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
     return err;
 }
 
-static void add_refusal(cJSON *results, const char *problem, pal_err err, const pal_note *note)
+static void add_refusal(cJSON *results, const char *problem, pal_err err, const pal_diagnostic *diag)
 {
     cJSON *one = cJSON_CreateObject();
     cJSON_AddBoolToObject(one, "ok", false);
     cJSON_AddStringToObject(one, "problem", problem);
     cJSON *error = cJSON_AddObjectToObject(one, "error");
     cJSON_AddStringToObject(error, "code", pal_err_name(err));
-    cJSON_AddStringToObject(error, "text", note->text);
+    cJSON_AddStringToObject(error, "text", diag->text);
     cJSON_AddItemToArray(results, one);
 }
 
@@ -429,12 +431,13 @@ static cJSON *add_run(const job *j, cJSON *object, double seconds)
 
 static pal_err prepare(job *j)
 {
-    if (pal_team_create(j->n_worker, &j->team)) return pal_note_set(&j->note, PAL_ERR_MEMORY, "no memory for workers");
+    if (pal_team_create(j->n_worker, &j->team))
+        return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory for workers");
     j->set = calloc(1, sizeof *j->set);
-    if (!j->set) return pal_note_set(&j->note, PAL_ERR_MEMORY, "no memory");
+    if (!j->set) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory");
     if (j->rank > 0) return PAL_ERR_OK;
-    if (j->folder) PAL_TRY(pal_scene_make_folder(j->folder, &j->note));
-    return j->journal_path ? pal_journal_open(j->journal_path, &j->journal, &j->note) : PAL_ERR_OK;
+    if (j->folder) PAL_TRY(pal_scene_make_folder(j->folder, &j->diag));
+    return j->journal_path ? pal_journal_open(j->journal_path, &j->journal, &j->diag) : PAL_ERR_OK;
 }
 
 static int run(job *j)
@@ -447,7 +450,7 @@ static int run(job *j)
     pal_err err = agree(j, prepare(j));
     int mine = err ? 1 : pal_team_size(j->team), most;
     MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
-    j->n_batch = j->n_rank * most < PAL_ANNEAL_MOST_BATCH ? j->n_rank * most : PAL_ANNEAL_MOST_BATCH;
+    j->n_batch = j->n_rank * most < PAL_ANNEAL_MAX_BATCH ? j->n_rank * most : PAL_ANNEAL_MAX_BATCH;
     for (int p = 0; p < j->n_problem && !err; p++) {
         pal_err one = run_one(j, j->problem[p], results);
         if (!one || j->rank > 0) continue;
@@ -456,11 +459,11 @@ static int run(job *j)
             err = one;
             break;
         }
-        add_refusal(results, j->problem[p], one, &j->note);
-        fprintf(stderr, "palpate-calibrate-mpi: %s\n", j->note.text);
+        add_refusal(results, j->problem[p], one, &j->diag);
+        fprintf(stderr, "palpate-calibrate-mpi: %s\n", j->diag.text);
     }
     if (j->rank == 0) {
-        if (err) code = pal_report_refusal(&j->common, err, &j->note);
+        if (err) code = pal_report_refusal(&j->common, err, &j->diag);
         if (!err && code) cJSON_ReplaceItemInObject(object, "ok", cJSON_CreateFalse());
         add_run(j, object, pal_clock_s() - begin);
         if (!err && !j->common.json && !j->common.quiet)
@@ -524,7 +527,7 @@ static int parse(job *j, int argc, char **argv)
         {"--resolution", "N", PAL_FLAG_COUNT, &j->options.voxel.resolution, 2, 200,
          "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &j->options.split, 1, 8, "finite elements of the truth: voxels as K^3 (2)"},
-        {"--workers", "N", PAL_FLAG_COUNT, &j->n_worker, 1, PAL_TEAM_MOST, "threads of each rank (1)"},
+        {"--workers", "N", PAL_FLAG_COUNT, &j->n_worker, 1, PAL_TEAM_MAX, "threads of each rank (1)"},
         {"--journal", "FILE", PAL_FLAG_TEXT, &j->journal_path, 0, 0, "evaluations are kept there and taken from there"},
         {"-o", "DIR", PAL_FLAG_TEXT, &j->folder, 0, 0, "writes DIR/NAME.json for each problem"},
     };

@@ -74,8 +74,8 @@ static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
     shown_s = now;
     if (step->best_percent < DBL_MAX) snprintf(best, sizeof best, "%.4g %%", step->best_percent);
     if (run->fit.budget_s > 0) end = run->fit.budget_s;
-    if (run->fit.most_evaluation > 0 && step->evaluation > 0)
-        end = fmin(end, step->seconds * (double)run->fit.most_evaluation / (double)(step->evaluation + 1));
+    if (run->fit.max_evaluation > 0 && step->evaluation > 0)
+        end = fmin(end, step->seconds * (double)run->fit.max_evaluation / (double)(step->evaluation + 1));
     if (isfinite(end)) snprintf(left, sizeof left, ", at most %.0f s left", fmax(0, end - step->seconds));
     snprintf(text, sizeof text, "%s: best error %s, %lld evaluations, %.0f s%s", pal_calibrate_method(run), best,
              (long long)step->evaluation + 1, step->seconds, left);
@@ -137,7 +137,7 @@ static const char *take_words(pal_calibrate_run *run, const words *w)
     run->options.equal = w->weights && !strcmp(w->weights, "equal");
     if (w->area) run->options.without_area = !strcmp(w->area, "off");
     run->fit.budget_s = w->budget_s;
-    run->fit.most_evaluation = w->evaluations;
+    run->fit.max_evaluation = w->evaluations;
     run->fit.seed = (uint64_t)w->seed;
     return NULL;
 }
@@ -163,7 +163,7 @@ static bool is_same_file(const char *a, const char *b)
 }
 
 /* can a file of this name be written? Said before the work, not after it */
-static pal_err check_target(const char *flag, const char *path, pal_note *note)
+static pal_err check_target(const char *flag, const char *path, pal_diagnostic *diag)
 {
     char folder[PAL_CALIBRATE_PATH];
     struct stat facts;
@@ -173,105 +173,106 @@ static pal_err check_target(const char *flag, const char *path, pal_note *note)
             : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
                           : snprintf(folder, sizeof folder, ".");
     if (n < 0 || (size_t)n + 64 >= sizeof folder || !path[0] || (slash && !slash[1]))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
     if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
     snprintf(folder + n, sizeof folder - (size_t)n, "/.palpate_XXXXXX");
     int file = mkstemp(folder);
     if (file < 0)
-        return pal_note_set(note, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
     close(file);
     unlink(folder);
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
     if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is there and not a file", flag, path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is there and not a file", flag, path);
     return PAL_ERR_OK;
 }
 
 /* is it none of those that are read? */
-static pal_err check_source(const char *flag, const char *path, const char *source, const char *what, pal_note *note)
+static pal_err check_source(const char *flag, const char *path, const char *source, const char *what,
+                            pal_diagnostic *diag)
 {
     char own[PATH_MAX], other[PATH_MAX];
     if (path && source && realpath(path, own) && realpath(source, other) && !strcmp(own, other))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is the %s itself", flag, path, what);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is the %s itself", flag, path, what);
     return PAL_ERR_OK;
 }
 
-static pal_err check_targets(const pal_calibrate_run *run, pal_note *note)
+static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
     const int *grid = run->options.grid;
     if ((int64_t)grid[0] * grid[1] * grid[2] > MOST_GRID)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0], grid[1],
-                            grid[2], MOST_GRID);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
+                                  grid[1], grid[2], MOST_GRID);
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_target(target_flag[a], path[a], note));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.problem, "problem", note));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.truth, "truth", note));
+        PAL_TRY(check_target(target_flag[a], path[a], diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->wish.problem, "problem", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->wish.truth, "truth", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
-                return pal_note_set(note, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", target_flag[a], path[a],
-                                    target_flag[b]);
+                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", target_flag[a],
+                                          path[a], target_flag[b]);
     }
     return PAL_ERR_OK;
 }
 
 /* files that the problem names */
-static pal_err check_sources(const pal_calibrate_run *run, pal_note *note)
+static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     const pal_problem *p = run->set.problem;
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_source(target_flag[a], path[a], p->surface, "problem's surface", note));
+        PAL_TRY(check_source(target_flag[a], path[a], p->surface, "problem's surface", diag));
         for (int k = 0; k < p->n_reference; k++)
-            PAL_TRY(check_source(target_flag[a], path[a], p->reference[k].file, "problem's reference", note));
+            PAL_TRY(check_source(target_flag[a], path[a], p->reference[k].file, "problem's reference", diag));
     }
     return PAL_ERR_OK;
 }
 
 /* ---- work ---- */
 
-static pal_err make(pal_calibrate_run *run, pal_note *note)
+static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
 {
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_voxel_wish *voxel = &run->options.voxel;
     run->options.progress = show_making;
     run->options.user = &run->common;
     pal_err err = PAL_ERR_OK;
-    if (voxel->resolution == 0) err = pal_calibrate_cases_resolution(&run->set, voxel, &voxel->resolution, &why);
+    if (voxel->resolution == 0) err = pal_calibrate_cases_resolution(&run->set, voxel, &voxel->resolution, &reason);
     if (!err)
         err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
-                                     &run->calibration, &why);
-    if (err) return pal_note_set(note, err, "%s: %s", run->wish.problem, why.text);
+                                     &run->calibration, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
     pal_calibration_info_of(run->calibration, &run->info);
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
     if (!run->theta || pal_calibration_seat_create(run->calibration, &run->seat))
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
-    return pal_calibrate_cases_check(&run->set, run->info.mesh, note);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
+    return pal_calibrate_cases_check(&run->set, run->info.mesh, diag);
 }
 
-static pal_err search(pal_calibrate_run *run, pal_note *note)
+static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     const pal_calibration *c = run->calibration;
     size_t n = sizeof *run->theta * (size_t)run->info.n_parameter;
     pal_calibration_by_hand(c, run->theta);
-    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->hand, NULL, note));
+    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->hand, NULL, diag));
     memcpy(run->theta, run->info.start, n);
-    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->start, NULL, note));
+    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->start, NULL, diag));
     run->fit.step = take_step;
     run->fit.user = run;
-    pal_note why = {""};
-    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &why)
-                                 : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &why);
-    if (err) return pal_note_set(note, err, "%s: %s", run->wish.problem, why.text);
-    return pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->last, NULL, note);
+    pal_diagnostic reason = {""};
+    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
+                                 : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
+    return pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->last, NULL, diag);
 }
 
 /* how the springs move when they run */
-static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note *note)
+static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     pal_settle_load load[PAL_CALIBRATE_CASES];
     size_t n = 3 * (size_t)run->info.n_node;
@@ -282,14 +283,14 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note 
     options.user = &run->common;
     /* a short search is not followed by a long run; a number of sub-steps, so that scenes do not depend on the clock */
     if (run->fit.budget_s > 0) options.most_work = fmin(options.most_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
-    if (!u) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
+    if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
         bool rests = pal_calibration_moved(run->calibration, run->seat, k, u + n * (size_t)k);
         load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
                                     .u = rests ? u + n * (size_t)k : NULL};
     }
     pal_err err =
-        stop_asked ? PAL_ERR_STATE : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, note);
+        stop_asked ? PAL_ERR_STATE : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
     run->settled = !err;
     run->settle_s = pal_clock_s() - begin;
     free(u);
@@ -298,31 +299,31 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_note 
     return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene's own damping has to do */
 }
 
-static pal_err write_files(pal_calibrate_run *run, const pal_loaded_scene *scene, pal_note *note)
+static pal_err write_files(pal_calibrate_run *run, const pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
-    pal_err err = pal_scene_save_file(scene, run->scene, note);
-    if (!err && run->trajectory) err = pal_calibrate_draw_trajectory(run, run->trajectory, note);
-    if (!err && run->picture) err = pal_calibrate_draw_body(run, run->picture, note);
-    if (!err && run->vtk) err = pal_calibrate_write_vtk(run, run->vtk, note);
+    pal_err err = pal_scene_save_file(scene, run->scene, diag);
+    if (!err && run->trajectory) err = pal_calibrate_draw_trajectory(run, run->trajectory, diag);
+    if (!err && run->picture) err = pal_calibrate_draw_body(run, run->picture, diag);
+    if (!err && run->vtk) err = pal_calibrate_write_vtk(run, run->vtk, diag);
     for (int k = 0; k < PAL_CALIBRATE_FILES && !err; k++)
         if (path[k]) snprintf(run->file[run->n_file++], PAL_CALIBRATE_PATH, "%s", path[k]);
     return err;
 }
 
-static pal_err work(pal_calibrate_run *run, pal_note *note)
+static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     pal_loaded_scene *scene = NULL;
-    PAL_TRY(check_targets(run, note));
-    PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, note));
-    PAL_TRY(check_sources(run, note));
-    PAL_TRY(make(run, note));
-    PAL_TRY(search(run, note));
-    PAL_TRY(pal_calibrate_scene(run, &scene, note));
-    pal_err err = settle(run, scene, note);
+    PAL_TRY(check_targets(run, diag));
+    PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, diag));
+    PAL_TRY(check_sources(run, diag));
+    PAL_TRY(make(run, diag));
+    PAL_TRY(search(run, diag));
+    PAL_TRY(pal_calibrate_scene(run, &scene, diag));
+    pal_err err = settle(run, scene, diag);
     if (!err) {
         pal_calibrate_accuracy(run, scene->scene.accuracy, sizeof scene->scene.accuracy);
-        err = write_files(run, scene, note);
+        err = write_files(run, scene, diag);
     }
     pal_scene_free(scene);
     return err;
@@ -330,13 +331,13 @@ static pal_err work(pal_calibrate_run *run, pal_note *note)
 
 static int start(pal_calibrate_run *run)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double begin = pal_clock_s();
     watch_stop();
-    pal_err err = work(run, &note);
+    pal_err err = work(run, &diag);
     run->total_s = pal_clock_s() - begin;
     pal_report_progress(NULL, 0, &run->common);
-    int code = err                ? pal_report_refusal(&run->common, err, &note)
+    int code = err                ? pal_report_refusal(&run->common, err, &diag)
                : run->common.json ? pal_report_json(&run->common, pal_calibrate_json(run))
                                   : 0;
     if (!err && !run->common.json && !run->common.quiet) pal_calibrate_print(run);

@@ -20,11 +20,11 @@ static const char about[] =
     "or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk get the cells, FILE.ply, .obj and .stl the\n"
     "boundary. Without -o only the figures are shown; --list shows those of all named solids beside the paper's.\n";
 
-typedef struct wishes {
+typedef struct plan_requests {
     const char *file, *rule, *cells, *size;
     int n_level;
     bool list;
-} wishes;
+} plan_requests;
 
 /* a solid, its control cells and what is known of them */
 typedef struct outcome {
@@ -35,7 +35,7 @@ typedef struct outcome {
     bool has_elements; /* cells that are no hexahedra have none before the first level */
     pal_cell_elements elements;
     pal_cells_topology topology;
-    double control_m3, volume_m3, size_m[3];
+    double control_m3, volume_m3, length_scale_m[3];
     int n_boundary_vertex, n_triangle;
 } outcome;
 
@@ -52,7 +52,7 @@ static void free_outcome(outcome *o)
 typedef struct primitive {
     const char *name, *cells_are, *sizes_are;
     int n_count, n_size;
-    double count[3], size_m[3];
+    double count[3], length_scale_m[3];
 } primitive;
 
 static const primitive primitive_list[] = {
@@ -89,25 +89,25 @@ static bool read_list(const char *text, int n, bool whole, double *out)
     return true;
 }
 
-static pal_err make_primitive(const primitive *p, const double count[3], const double size_m[3], pal_cells *out,
-                              pal_note *note)
+static pal_err make_primitive(const primitive *p, const double count[3], const double length_scale_m[3], pal_cells *out,
+                              pal_diagnostic *diag)
 {
     const int32_t n[3] = {(int32_t)count[0], (int32_t)count[1], (int32_t)count[2]};
     switch (p - primitive_list) {
     case 0:
-        return pal_cells_block(n, size_m, out, note);
+        return pal_cells_block(n, length_scale_m, out, diag);
     case 1:
-        return pal_cells_ring(n[0], size_m[0], size_m[1], out, note);
+        return pal_cells_ring(n[0], length_scale_m[0], length_scale_m[1], out, diag);
     case 2:
-        return pal_cells_tube(n, size_m[0], size_m[1], size_m[2], out, note);
+        return pal_cells_tube(n, length_scale_m[0], length_scale_m[1], length_scale_m[2], out, diag);
     default:
-        return pal_cells_torus(n[0], n[1], size_m[0], size_m[1], out, note);
+        return pal_cells_torus(n[0], n[1], length_scale_m[0], length_scale_m[1], out, diag);
     }
 }
 
 /* ---- figures ---- */
 
-static pal_err measure(outcome *o, pal_note *note)
+static pal_err measure(outcome *o, pal_diagnostic *diag)
 {
     const pal_cells *c = &o->made.cells;
     pal_surface surface;
@@ -117,22 +117,23 @@ static pal_err measure(outcome *o, pal_note *note)
     PAL_TRY(pal_cells_boundary(c, &surface, NULL, NULL));
     double low[3], high[3];
     pal_surface_box(&surface, low, high);
-    for (int a = 0; a < 3; a++) o->size_m[a] = high[a] - low[a];
+    for (int a = 0; a < 3; a++) o->length_scale_m[a] = high[a] - low[a];
     o->n_triangle = surface.n_tri;
     o->n_boundary_vertex = surface.n_vertex;
     pal_surface_free(&surface);
-    pal_err err = pal_cell_elements_make(c, &o->elements, o->made.n_level ? note : NULL);
+    pal_err err = pal_cell_elements_make(c, &o->elements, o->made.n_level ? diag : NULL);
     o->has_elements = !err;
     return err == PAL_ERR_REFUSED && o->made.n_level == 0 ? PAL_ERR_OK : err;
 }
 
-static pal_err subdivide(outcome *o, int n_level, pal_subdivision_rule rule, pal_note *note)
+static pal_err subdivide(outcome *o, int n_level, pal_subdivision_rule rule, pal_diagnostic *diag)
 {
     const pal_subdivision_options options = {.n_level = n_level, .rule = rule};
-    pal_note why = {""};
-    pal_err err = pal_subdivision_make(&o->control, &options, &o->made, &why);
-    if (!err) err = measure(o, &why);
-    return err ? pal_note_set(note, err, "%s: %s", o->name, why.text[0] ? why.text : pal_err_text(err)) : err;
+    pal_diagnostic reason = {""};
+    pal_err err = pal_subdivision_make(&o->control, &options, &o->made, &reason);
+    if (!err) err = measure(o, &reason);
+    return err ? pal_diagnostic_set(diag, err, "%s: %s", o->name, reason.text[0] ? reason.text : pal_err_text(err))
+               : err;
 }
 
 static cJSON *as_json(const outcome *o, const char *rule)
@@ -165,7 +166,7 @@ static cJSON *as_json(const outcome *o, const char *rule)
     cJSON_AddNumberToObject(to, "cavities", o->topology.n_cavity);
     cJSON_AddNumberToObject(to, "pinched_edges", c->n_pinched_edge);
     cJSON_AddNumberToObject(to, "pinched_vertices", c->n_pinched_vertex);
-    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->size_m, 3));
+    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->length_scale_m, 3));
     cJSON_AddNumberToObject(to, "control_volume_m3", o->control_m3);
     cJSON_AddNumberToObject(to, "volume_m3", o->volume_m3);
     cJSON_AddNumberToObject(to, "boundary_vertices", o->n_boundary_vertex);
@@ -183,7 +184,7 @@ static void print(const outcome *o, const char *rule)
 {
     const pal_cells *c = &o->made.cells;
     printf("%s: %d control cell%s, %.0f x %.0f x %.0f mm\n", o->name, o->control.n_cell, plural(o->control.n_cell),
-           1e3 * o->size_m[0], 1e3 * o->size_m[1], 1e3 * o->size_m[2]);
+           1e3 * o->length_scale_m[0], 1e3 * o->length_scale_m[1], 1e3 * o->length_scale_m[2]);
     printf("%d level%s of %s: %d cell%s, %d vertices\n", o->made.n_level, plural(o->made.n_level), rule, c->n_cell,
            plural(c->n_cell), c->n_vertex);
     if (o->has_elements)
@@ -221,7 +222,7 @@ static void print_row(const outcome *o)
 static int list_models(const pal_flag_common *common, pal_subdivision_rule rule, const char *rule_name)
 {
     cJSON *all = cJSON_CreateObject(), *list = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_err err = PAL_ERR_OK;
     cJSON_AddBoolToObject(all, "ok", true);
     list = cJSON_AddArrayToObject(all, "models");
@@ -231,15 +232,15 @@ static int list_models(const pal_flag_common *common, pal_subdivision_rule rule,
     for (int k = 0; k < PAL_CELL_MODELS && !err; k++) {
         outcome o = {.model = &pal_cell_model_list[k]};
         snprintf(o.name, sizeof o.name, "%s", o.model->name);
-        err = pal_cell_model_make(o.model, &o.control, &note);
-        if (!err) err = subdivide(&o, o.model->n_level, rule, &note);
+        err = pal_cell_model_make(o.model, &o.control, &diag);
+        if (!err) err = subdivide(&o, o.model->n_level, rule, &diag);
         if (!err && common->json) cJSON_AddItemToArray(list, as_json(&o, rule_name));
         if (!err && !common->json && !common->quiet) print_row(&o);
         free_outcome(&o);
     }
     if (!err && common->json) return pal_report_json(common, all);
     cJSON_Delete(all);
-    return err ? pal_report_refusal(common, err, &note) : 0;
+    return err ? pal_report_refusal(common, err, &diag) : 0;
 }
 
 /* ---- the command ---- */
@@ -260,22 +261,22 @@ static bool ends_in(const char *path, const char *const *end)
 static const char *const cell_end[] = {".palcells", ".vtk", NULL};
 static const char *const surface_end[] = {".ply", ".obj", ".stl", NULL};
 
-static pal_err write_file(const outcome *o, const char *path, pal_note *note)
+static pal_err write_file(const outcome *o, const char *path, pal_diagnostic *diag)
 {
     pal_surface surface;
-    if (ends_in(path, cell_end)) return pal_cell_file_save(&o->made.cells, path, note);
+    if (ends_in(path, cell_end)) return pal_cell_file_save(&o->made.cells, path, diag);
     PAL_TRY(pal_cells_boundary(&o->made.cells, &surface, NULL, NULL));
-    pal_err err = pal_mesh_file_write(path, &surface, note);
+    pal_err err = pal_mesh_file_write(path, &surface, diag);
     pal_surface_free(&surface);
     return err;
 }
 
-static int run(const pal_flag_common *common, outcome *o, const wishes *wish, pal_subdivision_rule rule)
+static int run(const pal_flag_common *common, outcome *o, const plan_requests *wish, pal_subdivision_rule rule)
 {
-    pal_note note = {""};
-    pal_err err = subdivide(o, wish->n_level, rule, &note);
-    if (!err && wish->file) err = write_file(o, wish->file, &note);
-    if (err) return pal_report_refusal(common, err, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = subdivide(o, wish->n_level, rule, &diag);
+    if (!err && wish->file) err = write_file(o, wish->file, &diag);
+    if (err) return pal_report_refusal(common, err, &diag);
     if (common->json) {
         cJSON *object = as_json(o, wish->rule);
         if (wish->file) cJSON_AddStringToObject(object, "file", wish->file);
@@ -290,47 +291,47 @@ static int run(const pal_flag_common *common, outcome *o, const wishes *wish, pa
 }
 
 /* -1: the control cells are there, else the exit code */
-static int make_control(const pal_flag_common *common, const char *shape, const wishes *wish, outcome *o)
+static int make_control(const pal_flag_common *common, const char *shape, const plan_requests *wish, outcome *o)
 {
     const primitive *p = find_primitive(shape);
     char sentence[200];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_err err;
     snprintf(o->name, sizeof o->name, "%.100s", shape);
     o->model = pal_cell_model_find(shape);
     if (p) {
-        double count[3], size_m[3];
+        double count[3], length_scale_m[3];
         memcpy(count, p->count, sizeof count);
-        memcpy(size_m, p->size_m, sizeof size_m);
+        memcpy(length_scale_m, p->length_scale_m, sizeof length_scale_m);
         if (wish->cells && !read_list(wish->cells, p->n_count, true, count)) {
             snprintf(sentence, sizeof sentence, "--cells: \"%.40s\" is not %d whole number%s with commas between (%s)",
                      wish->cells, p->n_count, plural(p->n_count), p->cells_are);
             return usage(common, sentence);
         }
-        if (wish->size && !read_list(wish->size, p->n_size, false, size_m)) {
+        if (wish->size && !read_list(wish->size, p->n_size, false, length_scale_m)) {
             snprintf(sentence, sizeof sentence, "--size-m: \"%.40s\" is not %d numbers with commas between (%s)",
                      wish->size, p->n_size, p->sizes_are);
             return usage(common, sentence);
         }
-        err = make_primitive(p, count, size_m, &o->control, &note);
+        err = make_primitive(p, count, length_scale_m, &o->control, &diag);
     } else if (wish->cells || wish->size) {
         return usage(common, wish->cells ? "--cells: only goes with block, ring, tube and torus"
                                          : "--size-m: only goes with block, ring, tube and torus");
     } else if (o->model) {
-        err = pal_cell_model_make(o->model, &o->control, &note);
+        err = pal_cell_model_make(o->model, &o->control, &diag);
     } else if (ends_in(shape, cell_end) || strchr(shape, '/')) {
-        err = pal_cell_file_load(shape, &o->control, &note);
+        err = pal_cell_file_load(shape, &o->control, &diag);
     } else {
         snprintf(sentence, sizeof sentence, "there is no shape \"%.60s\"", shape);
         return usage(common, sentence);
     }
-    return err ? pal_report_refusal(common, err, &note) : -1;
+    return err ? pal_report_refusal(common, err, &diag) : -1;
 }
 
-static wishes wish = {.rule = "maccracken_joy"};
+static plan_requests wish = {.rule = "maccracken_joy"};
 static const pal_flag flag[] = {
     {"-o", "FILE", PAL_FLAG_TEXT, &wish.file, 0, 0, "file to write to, .palcells, .vtk, .ply, .obj or .stl"},
-    {"--levels", "N", PAL_FLAG_COUNT, &wish.n_level, 0, PAL_SUBDIVISION_MOST,
+    {"--levels", "N", PAL_FLAG_COUNT, &wish.n_level, 0, PAL_SUBDIVISION_MAX,
      "levels of subdivision, each with eight times the cells (0)"},
     {"--rule", "WORD", PAL_FLAG_TEXT, &wish.rule, 0, 0, "maccracken_joy or averaging (maccracken_joy)"},
     {"--cells", "N,...", PAL_FLAG_TEXT, &wish.cells, 0, 0,

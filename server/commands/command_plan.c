@@ -10,8 +10,8 @@
 #include "server/commands/preflight_report.h"
 #include "server/scene/scene_arg.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/solid.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/subdivision/subdivision_solid.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "server/study/studied_scene.h"
 
@@ -24,13 +24,13 @@ enum { STEPS = 60, MOST_S = 2 };
 
 typedef struct cost {
     int n_step;
-    double row_ms[PAL_FRAME_ROWS][STEPS], step_ms[STEPS];
+    double row_ms[PAL_FRAME_COMPONENT_MAX][STEPS], step_ms[STEPS];
 } cost;
 
 static pal_err measure(pal_world *world, double step_s, cost *out)
 {
     double start = pal_clock_s();
-    int n_row = pal_world_rows(world);
+    int n_row = pal_world_component_count(world);
     for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MOST_S); k++, out->n_step++) {
         pal_world_wake(world);
         uint64_t before = pal_clock_thread_ns(), began = pal_clock_ns();
@@ -38,9 +38,9 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
         out->step_ms[k] = 1e-6 * (double)(pal_clock_thread_ns() - before);
         /* rows are timed by the wall's clock, which goes on while others have the processor: its share is ours */
         double wall_ms = 1e-6 * (double)(pal_clock_ns() - began), ours = fmin(out->step_ms[k] / fmax(wall_ms, 1e-6), 1);
-        for (int r = 0; r < n_row && r < PAL_FRAME_ROWS; r++) {
-            pal_row_info row;
-            pal_world_row(world, r, &row);
+        for (int r = 0; r < n_row && r < PAL_FRAME_COMPONENT_MAX; r++) {
+            pal_component_info row;
+            pal_world_component_info(world, r, &row);
             out->row_ms[r][k] = ours * 1e-6 * (double)row.spent_ns;
         }
     }
@@ -48,11 +48,11 @@ static pal_err measure(pal_world *world, double step_s, cost *out)
 }
 
 /* nodes and springs of every level, and of the present mixture */
-static void add_levels(cJSON *body, const pal_shell *shell)
+static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
 {
-    const pal_levels *levels = &shell->levels;
-    cJSON_AddNumberToObject(body, "nodes", shell->n_node);
-    cJSON_AddNumberToObject(body, "springs", shell->n_spring);
+    const pal_levels *levels = &adaptive->levels;
+    cJSON_AddNumberToObject(body, "nodes", adaptive->n_node);
+    cJSON_AddNumberToObject(body, "springs", adaptive->n_spring);
     cJSON *list = cJSON_AddArrayToObject(body, "levels");
     for (int l = 0; l < levels->n_level; l++) {
         cJSON *level = cJSON_CreateObject();
@@ -65,7 +65,7 @@ static void add_levels(cJSON *body, const pal_shell *shell)
 /* elements of each kind, what moves them and what that takes */
 static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
 {
-    const pal_solid *solid = b->solid;
+    const pal_subdivision_solid *solid = b->solid;
     static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "hex_percent", "pyramid_percent"};
     cJSON_AddNumberToObject(body, "control_cells", def->cells->n_cell);
     cJSON_AddNumberToObject(body, "control_points", b->n_dof);
@@ -95,13 +95,13 @@ static void add_absent(cJSON *o, const pal_world *world)
 /* the setting that was picked from the study, and what is to be known about that */
 static void add_setting(cJSON *o, const pal_studied *studied)
 {
-    char text[PAL_SETTING_TEXT];
+    char text[PAL_CONFIGURATION_TEXT];
     if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
     if (studied->picked < 0) return;
-    const pal_priced_setting *p = &studied->file->study.point[studied->picked].priced;
+    const pal_measured_configuration *p = &studied->file->study.point[studied->picked].priced;
     cJSON *picked = cJSON_AddObjectToObject(o, "picked");
     cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
-    cJSON_AddStringToObject(picked, "setting", pal_setting_text(&p->setting, text));
+    cJSON_AddStringToObject(picked, "setting", pal_configuration_text(&p->setting, text));
     cJSON_AddNumberToObject(picked, "ms", p->ms);
     cJSON_AddNumberToObject(picked, "error_m", p->error_m);
 }
@@ -127,8 +127,8 @@ static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
         cJSON_AddItemToArray(bodies, body);
         cJSON_AddStringToObject(body, "name", scene->body[b].name);
         const pal_body *moving = pal_world_body(world, b);
-        if (moving->shell) {
-            add_levels(body, moving->shell);
+        if (moving->adaptive) {
+            add_levels(body, moving->adaptive);
         } else if (moving->solid) {
             add_solid(body, &scene->body[b], moving);
         } else {
@@ -139,26 +139,26 @@ static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
                                 moving->solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
     }
     cJSON *rows = cJSON_AddArrayToObject(o, "rows");
-    for (int r = 0; r < pal_world_rows(world); r++) {
-        pal_row_info row;
+    for (int r = 0; r < pal_world_component_count(world); r++) {
+        pal_component_info row;
         cJSON *entry = cJSON_CreateObject();
-        pal_world_row(world, r, &row);
+        pal_world_component_info(world, r, &row);
         cJSON_AddItemToArray(rows, entry);
         cJSON_AddStringToObject(entry, "name", row.name);
         cJSON_AddStringToObject(entry, "body", row.body);
         cJSON_AddStringToObject(entry, "stage", row.stage);
         cJSON_AddNumberToObject(entry, "bytes", (double)row.n_byte);
-        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0);
-        cJSON_AddStringToObject(entry, "why", row.why);
+        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_COMPONENT_MAX ? pal_median(c->row_ms[r], c->n_step) : 0);
+        cJSON_AddStringToObject(entry, "why", row.reason);
     }
     add_absent(o, world);
     return o;
 }
 
-static void print_shell(const char *name, const pal_shell *shell)
+static void print_shell(const char *name, const pal_adaptive_surface *adaptive)
 {
-    const pal_levels *levels = &shell->levels;
-    printf("%s: a surface that adapts, %d nodes and %d springs of\n", name, shell->n_node, shell->n_spring);
+    const pal_levels *levels = &adaptive->levels;
+    printf("%s: a surface that adapts, %d nodes and %d springs of\n", name, adaptive->n_node, adaptive->n_spring);
     for (int l = 0; l < levels->n_level; l++)
         printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
 }
@@ -190,9 +190,9 @@ static void print(const pal_studied *studied, pal_world *world, cost *c)
     if (studied->said[0]) printf("%s\n", studied->said);
     if (studied->warn[0]) printf("%s\n", studied->warn);
     for (int b = 0; b < scene->n_body; b++) {
-        const pal_shell *shell = pal_world_body(world, b)->shell;
-        if (shell) {
-            print_shell(scene->body[b].name, shell);
+        const pal_adaptive_surface *adaptive = pal_world_body(world, b)->adaptive;
+        if (adaptive) {
+            print_shell(scene->body[b].name, adaptive);
             continue;
         }
         if (pal_world_body(world, b)->solid) {
@@ -203,11 +203,11 @@ static void print(const pal_studied *studied, pal_world *world, cost *c)
                scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
     }
     printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "row", "body", "kB", "ms a step", "because of");
-    for (int r = 0; r < pal_world_rows(world); r++) {
-        pal_row_info row;
-        pal_world_row(world, r, &row);
+    for (int r = 0; r < pal_world_component_count(world); r++) {
+        pal_component_info row;
+        pal_world_component_info(world, r, &row);
         printf("%-9s %-16s %-16s %10.1f %10.4f  %s\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
-               r < PAL_FRAME_ROWS ? pal_median(c->row_ms[r], c->n_step) : 0, row.why);
+               r < PAL_FRAME_COMPONENT_MAX ? pal_median(c->row_ms[r], c->n_step) : 0, row.reason);
     }
     print_absent(world);
     double step_ms = pal_median(c->step_ms, c->n_step), limit_s = pal_world_limit_s(world);
@@ -238,21 +238,21 @@ int command_plan(int argc, char **argv)
     if (code >= 0) return code;
     pal_loaded_scene *loaded = NULL;
     pal_world *world = NULL;
-    pal_note note = {""}, why = {""};
+    pal_diagnostic diag = {""}, reason = {""};
     static cost measured;
     pal_studied studied = {0};
-    pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note);
-    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &note);
-    if (!err && (err = pal_world_create(studied.scene, &why, &world)))
-        pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &diag);
+    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &diag);
+    if (!err && (err = pal_world_create(studied.scene, &reason, &world)))
+        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_preflight preflight = {0};
-    if (!err && (err = pal_preflight_look(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &why)))
-        pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    if (!err && (err = pal_preflight_look(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &reason)))
+        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, studied.scene->step_s, &measured);
     pal_report_progress(NULL, 0, &common);
     if (err)
-        code = pal_report_refusal(&common, err, &note);
+        code = pal_report_refusal(&common, err, &diag);
     else if (common.json)
         code = pal_report_json(&common, with_preflight(as_json(&studied, world, &measured), &preflight));
     else

@@ -27,16 +27,19 @@ static const char about[] =
     "scene\n"
     "that `palpate serve DIR/scene.json` runs: tetrahedra (paper B 2.2), skin, tissue, supports, tools.\n"
     "With --model adaptive a hollow organ: springs on the surface as it is, refined where it is touched (paper C).\n"
+    "Voxels are joined by faces. A component of them without support is dropped, and told, when it is below 1 % of\n"
+    "the largest one. A larger one is refused: --largest keeps only the largest, --hold may reach the others, finer\n"
+    "voxels may join them. In a scene.json each may have a support, or the body none at all: then it is free.\n"
     "Files written: DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at "
     "most\n"
     "1,000,000 tetrahedra (--tetgen writes them for any mesh, --no-tetgen for none). Either all of them or none.\n";
 
-typedef struct wishes {
+typedef struct plan_requests {
     pal_surface_scene scene;
     const char *folder, *units, *up, *name, *title, *source, *model;
     double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
-} wishes;
+} plan_requests;
 
 typedef struct outcome {
     pal_surface_scene_report report;
@@ -44,7 +47,7 @@ typedef struct outcome {
     size_t world_byte; /* of model adaptive_springs, whose world is made once to see that it can be */
     double limit_s;
     int n_substep, fine_substep; /* a step at rest; with a leaf of the finest level, as each level halves the bound */
-    int most_node;               /* put into the row refine; 0: no limit is needed */
+    int max_node;                /* put into the row refine; 0: no limit is needed */
     double busy;                 /* of real time, by node_s, with as many nodes as there may be */
     char file[FILES][80];
     int n_file;
@@ -56,9 +59,9 @@ static int list_labels(const pal_flag_common *common, const char *path)
 {
     pal_label_volume volume;
     static pal_label_count count[LABELS];
-    pal_note note = {""};
-    pal_err err = pal_label_volume_read(path, &volume, &note);
-    if (err) return pal_report_refusal(common, err, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_label_volume_read(path, &volume, &diag);
+    if (err) return pal_report_refusal(common, err, &diag);
     int n = pal_label_volume_list(&volume, count, LABELS);
     pal_label_volume_free(&volume);
     if (!common->json) {
@@ -88,11 +91,11 @@ static int by_name(const void *a, const void *b)
 }
 
 /* moves every file of the staging folder up into its parent, scene.json last */
-static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_note *note)
+static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_diagnostic *diag)
 {
     char from[PATH + 300], to[PATH + 300];
     DIR *list = opendir(stage);
-    if (!list) return pal_note_set(note, PAL_ERR_IO, "%s: %s", stage, strerror(errno));
+    if (!list) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", stage, strerror(errno));
     out->n_file = 0;
     for (struct dirent *entry; (entry = readdir(list)) && out->n_file < FILES - 1;)
         if (entry->d_name[0] != '.' && strcmp(entry->d_name, "scene.json"))
@@ -103,7 +106,8 @@ static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_
     for (int k = 0; k < out->n_file; k++) {
         snprintf(from, sizeof from, "%s/%s", stage, out->file[k]);
         snprintf(to, sizeof to, "%s/%s", folder, out->file[k]);
-        if (rename(from, to)) return pal_note_set(note, PAL_ERR_IO, "%s: cannot be written: %s", to, strerror(errno));
+        if (rename(from, to))
+            return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: cannot be written: %s", to, strerror(errno));
     }
     return PAL_ERR_OK;
 }
@@ -120,16 +124,16 @@ static void remove_folder(const char *folder)
     rmdir(folder);
 }
 
-static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bool tetgen, pal_note *note)
+static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bool tetgen, pal_diagnostic *diag)
 {
     char stem[PATH + 100];
-    PAL_TRY(pal_scene_save(loaded, stage, note));
+    PAL_TRY(pal_scene_save(loaded, stage, diag));
     if (!tetgen) return PAL_ERR_OK;
     snprintf(stem, sizeof stem, "%s/%s", stage, loaded->scene.body[0].name);
-    return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, note);
+    return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
 }
 
-static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome *out, pal_note *note)
+static pal_err save(const pal_loaded_scene *loaded, const plan_requests *wish, outcome *out, pal_diagnostic *diag)
 {
     char stage[PATH];
     bool was_there = access(wish->folder, F_OK) == 0;
@@ -137,7 +141,7 @@ static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome 
     bool tetgen = wish->tetgen || (!wish->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MOST);
     int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", wish->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
     /* an interrupt waits until the files are there or gone */
     sigset_t asked, old;
     sigemptyset(&asked);
@@ -145,9 +149,9 @@ static pal_err save(const pal_loaded_scene *loaded, const wishes *wish, outcome 
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGHUP);
     sigprocmask(SIG_BLOCK, &asked, &old);
-    pal_err err = pal_scene_make_folder(wish->folder, note);
-    if (!err) err = write_files(loaded, stage, tetgen, note);
-    if (!err) err = move_up(stage, wish->folder, out, note);
+    pal_err err = pal_scene_make_folder(wish->folder, diag);
+    if (!err) err = write_files(loaded, stage, tetgen, diag);
+    if (!err) err = move_up(stage, wish->folder, out, diag);
     remove_folder(stage);
     if (err && !was_there) rmdir(wish->folder);
     sigprocmask(SIG_SETMASK, &old, NULL);
@@ -195,11 +199,11 @@ static void add_levels(cJSON *o, const outcome *out)
     cJSON_AddNumberToObject(o, "substeps", out->n_substep);
     cJSON_AddNumberToObject(o, "limit_s", out->limit_s);
     cJSON_AddNumberToObject(o, "finest_substeps", out->fine_substep);
-    if (out->most_node > 0) cJSON_AddNumberToObject(o, "most_node", out->most_node);
+    if (out->max_node > 0) cJSON_AddNumberToObject(o, "most_node", out->max_node);
     cJSON_AddNumberToObject(o, "share_of_real_time", out->busy);
 }
 
-static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
+static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *wish, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_prepared *mesh = &loaded->mesh[0];
@@ -229,7 +233,9 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const wishes *wish, const 
     cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
     cJSON_AddNumberToObject(dropped, "nonfinite", (double)r->surface.n_nonfinite);
     cJSON_AddNumberToObject(dropped, "folded", (double)r->surface.n_folded);
-    cJSON_AddNumberToObject(o, "mended", (double)r->surface.n_mended);
+    cJSON_AddNumberToObject(dropped, "loose_components", loaded->loose[0].n_dropped);
+    cJSON_AddNumberToObject(dropped, "loose_m3", loaded->loose[0].dropped_m3);
+    cJSON_AddNumberToObject(o, "mended", (double)r->surface.n_repaired);
     cJSON_AddNumberToObject(o, "welded", (double)r->surface.n_welded);
     cJSON *seconds = cJSON_AddObjectToObject(o, "seconds");
     cJSON_AddNumberToObject(seconds, "read", r->read_s);
@@ -272,7 +278,7 @@ static void print_solid(const pal_prepared *mesh, const pal_surface_scene_report
            whole.text);
 }
 
-static void print_levels(const pal_prepared *mesh, const wishes *wish, const outcome *out)
+static void print_levels(const pal_prepared *mesh, const plan_requests *wish, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     for (int l = 0; l < r->n_level; l++) printf("level %d: %d nodes, %d springs\n", l, r->n_node[l], r->n_spring[l]);
@@ -287,23 +293,24 @@ static void print_levels(const pal_prepared *mesh, const wishes *wish, const out
     if (!wish->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
         printf("made coarser from %lld triangles, so that it keeps real time (--triangles says otherwise)\n",
                (long long)r->surface.n_tri_read);
-    if (out->most_node > 0)
+    if (out->max_node > 0)
         printf(
             "refined to at most %d nodes at a time (most_node of refine); the finest level needs %d sub-steps a step\n",
-            out->most_node, out->fine_substep);
+            out->max_node, out->fine_substep);
     if (out->busy > 1)
         printf("too much for real time, about %.1f times: --triangles makes the surface coarser; fewer --levels or a "
                "smaller --young-Pa need fewer sub-steps\n",
                out->busy);
 }
 
-static void print(const pal_loaded_scene *loaded, const wishes *wish, const outcome *out)
+static void print(const pal_loaded_scene *loaded, const plan_requests *wish, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_surface_report *d = &r->surface;
     const pal_prepared *mesh = &loaded->mesh[0];
     int n_component = r->n_level > 0 ? r->n_piece : r->prepare.voxel.n_component;
     double low[3], high[3];
+    pal_diagnostic told;
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
            1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
@@ -318,8 +325,9 @@ static void print(const pal_loaded_scene *loaded, const wishes *wish, const outc
         print_levels(mesh, wish, out);
     else
         print_solid(mesh, r);
-    if (n_component > 1)
-        printf("the components do not hang together; those without support drift (--largest keeps one)\n");
+    if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
+    pal_loose_parts_tell(&loaded->loose[0], loaded->scene.body[0].name, &told);
+    if (told.text[0]) printf("%s\n", told.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -338,12 +346,12 @@ static int usage(const pal_flag_common *common, const char *sentence)
 }
 
 /* a body that adapts is made once: what its model and rows refuse is said now and not when it is served */
-static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outcome *out, pal_note *note)
+static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outcome *out, pal_diagnostic *diag)
 {
     pal_world *world;
-    pal_note why = {""};
-    pal_err err = pal_world_create(&loaded->scene, &why, &world);
-    if (err) return pal_note_set(note, err, "%s: %s", name, why.text);
+    pal_diagnostic reason = {""};
+    pal_err err = pal_world_create(&loaded->scene, &reason, &world);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     out->world_byte = pal_world_bytes(world);
     out->n_substep = pal_world_substeps(world);
     out->limit_s = pal_world_limit_s(world);
@@ -357,7 +365,7 @@ static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outco
 static const double node_s = 120e-9, most_busy = 0.5;
 enum { LEAST_MORE = 400 };
 
-static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_note *note)
+static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     const pal_surface_scene_report *r = &out->report;
@@ -367,35 +375,35 @@ static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_note *note)
     if (finest > 0) most = fmax(most_busy * pace / out->fine_substep, 1.125 * r->n_node[0] + LEAST_MORE);
     out->busy = fmin(most, n) * out->fine_substep / pace;
     if (most >= n) return PAL_ERR_OK;
-    out->most_node = (int)most;
+    out->max_node = (int)most;
     pal_body_def *body = &scene->body[0];
-    pal_item *refine = &body->effect[body->n_effect];
-    pal_item_init(refine, "", "refine");
+    pal_config_entry *refine = &body->effect[body->n_effect];
+    pal_entry_init(refine, "", "refine");
     snprintf(refine->path, sizeof refine->path, "bodies[0].effects[%d]", body->n_effect++);
-    return pal_item_put_number(refine, "most_node", out->most_node, note);
+    return pal_entry_put_number(refine, "most_node", out->max_node, diag);
 }
 
-static int run(pal_flag_common *common, const char *in, wishes *wish)
+static int run(pal_flag_common *common, const char *in, plan_requests *wish)
 {
     pal_loaded_scene *loaded = NULL;
     static outcome out;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double start = pal_clock_s();
     wish->scene.progress = pal_report_progress;
     wish->scene.user = common;
-    pal_err err = !in ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &note)
-                      : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &note);
-    if (err) return pal_report_refusal(common, err, &note);
-    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &note);
-    if (!err && wish->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &note);
-    if (!err && wish->scene.adaptive) err = keep_up(loaded, &out, &note);
+    pal_err err = !in ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &diag)
+                      : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &diag);
+    if (err) return pal_report_refusal(common, err, &diag);
+    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &diag);
+    if (!err && wish->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
+    if (!err && wish->scene.adaptive) err = keep_up(loaded, &out, &diag);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
-    if (!err) err = save(loaded, wish, &out, &note);
+    if (!err) err = save(loaded, wish, &out, &diag);
     out.write_s = pal_clock_s() - before;
     out.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
-    int code = err            ? pal_report_refusal(common, err, &note)
+    int code = err            ? pal_report_refusal(common, err, &diag)
                : common->json ? pal_report_json(common, as_json(loaded, wish, &out))
                               : 0;
     if (!err && !common->json && !common->quiet) print(loaded, wish, &out);
@@ -412,7 +420,7 @@ static bool is_one(const char *word, const char *const *list)
 }
 
 /* what only goes with other models; NULL: all fine, else the sentence */
-static const char *check_adaptive(const wishes *wish)
+static const char *check_adaptive(const plan_requests *wish)
 {
     const pal_surface_scene *s = &wish->scene;
     if (!s->adaptive) {
@@ -428,7 +436,7 @@ static const char *check_adaptive(const wishes *wish)
 }
 
 /* shape, model, element, law and solver; NULL: all fine, else the sentence */
-static const char *check_model(wishes *wish)
+static const char *check_model(plan_requests *wish)
 {
     pal_surface_scene *s = &wish->scene;
     if (!is_one(s->shape, (const char *const[]){"organ", "stomach", "sphere", "sheet", NULL}))
@@ -465,7 +473,7 @@ static bool read_axis(const char *word, double axis[3])
 #define SOLID_YOUNG_PA 5000
 #define WALL_YOUNG_PA  50000
 
-static wishes wish = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
+static plan_requests wish = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
 static const pal_flag flag[] = {
     {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
     {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
@@ -479,7 +487,7 @@ static const pal_flag flag[] = {
      "of fem: corotational, neo_hookean or linear (corotational)"},
     {"--solver", "WORD", PAL_FLAG_TEXT, &wish.scene.solver, 0, 0,
      "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
-    {"--levels", "N", PAL_FLAG_COUNT, &wish.scene.n_level, 1, PAL_LEVELS_MOST,
+    {"--levels", "N", PAL_FLAG_COUNT, &wish.scene.n_level, 1, PAL_LEVELS_MAX,
      "of adaptive: levels of detail; the surface itself is the coarsest, each has four times the springs of the one "
      "before (2)"},
     {"--thickness-mm", "T", PAL_FLAG_NUMBER, &wish.thickness_mm, 1e-3, 1000, "of adaptive: thickness of the wall (3)"},
@@ -494,7 +502,7 @@ static const pal_flag flag[] = {
      "shown triangles of a scan's surface or of the procedural organ (50,000); of adaptive the coarsest level\nof a "
      "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
     {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
-     "keep only the largest of several pieces that do not hang together"},
+     "keep only the largest of several components (of adaptive: pieces)"},
     {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, 1e-6, 1e12,
      "stiffness of the tissue (5000; adaptive: 50,000)"},
     {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},

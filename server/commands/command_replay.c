@@ -41,18 +41,18 @@ int command_replay(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_replay_report report;
     double start = pal_clock_s();
-    pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &note);
+    pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &diag);
     pal_studied studied = {0};
     pal_report_progress("replay", 0, &common);
-    if (!err) err = pal_studied_open(word[1], &loaded->scene, &studied, &note);
-    if (!err) err = pal_replay_run(word[0], studied.scene, &report, &note);
+    if (!err) err = pal_studied_open(word[1], &loaded->scene, &studied, &diag);
+    if (!err) err = pal_replay_run(word[0], studied.scene, &report, &diag);
     pal_report_progress(NULL, 0, &common);
     pal_studied_close(&studied);
     pal_scene_free(loaded);
-    if (err) return pal_report_refusal(&common, err, &note);
+    if (err) return pal_report_refusal(&common, err, &diag);
     bool equal = report.n_hash == report.n_hash_equal;
     if (!equal)
         fprintf(stderr, "palpate replay: %s: the world differs from step %llu on: %llu of %llu hashes are equal\n",

@@ -26,12 +26,12 @@ static const char about[] =
     "resolution to the next, the change of displacement between them, the order and the error that the changes speak\n"
     "for (Richardson), seconds. Example: --resolution 8,16,32 --element hex8_bbar,tet4,tet10:16 --plot error.svg\n";
 
-typedef struct wishes {
+typedef struct plan_requests {
     const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *linear, *free,
         *folder, *vtk, *csv, *plot;
     pal_study_list list;
     pal_solve_options solve;
-} wishes;
+} plan_requests;
 
 /* what is solved and what it is compared with */
 typedef struct study {
@@ -56,7 +56,7 @@ static int usage(const pal_flag_common *common, const char *sentence)
 
 /* ---- what is meant ---- */
 
-static pal_err no_case(const study *s, const char *id, pal_note *note)
+static pal_err no_case(const study *s, const char *id, pal_diagnostic *diag)
 {
     char list[320] = "";
     size_t n = 0;
@@ -64,13 +64,13 @@ static pal_err no_case(const study *s, const char *id, pal_note *note)
     for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
         n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
                               k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    if (!id) return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case is missing; known are %s", p->path, list);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: there is no load case or reference \"%.40s\"; known are %s",
-                        p->path, id, list);
+    if (!id) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --case is missing; known are %s", p->path, list);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: there is no load case or reference \"%.40s\"; known are %s",
+                              p->path, id, list);
 }
 
 /* the law: --law, or what --kinematics, or the reference, asks for */
-static const char *law_of(const wishes *wish, const pal_problem_reference *reference)
+static const char *law_of(const plan_requests *wish, const pal_problem_reference *reference)
 {
     bool finite = wish->kinematics ? !strcmp(wish->kinematics, "finite") : reference && reference->finite;
     if (wish->law) return wish->law;
@@ -85,7 +85,7 @@ static bool same(double a, double b)
 }
 
 /* does the reference answer what is asked? */
-static bool answers(const study *s, const wishes *wish, const pal_problem_reference *r)
+static bool answers(const study *s, const plan_requests *wish, const pal_problem_reference *r)
 {
     const pal_problem_material *m = &s->problem->material[0];
     double young = isnan(r->young_Pa) ? m->young_Pa : r->young_Pa;
@@ -96,13 +96,13 @@ static bool answers(const study *s, const wishes *wish, const pal_problem_refere
 }
 
 /* --case -> load case, law, E, nu and what to compare with */
-static pal_err choose(study *s, wishes *wish, pal_note *note)
+static pal_err choose(study *s, plan_requests *wish, pal_diagnostic *diag)
 {
     const pal_problem *p = s->problem;
     const char *id = wish->load_case ? wish->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
     const pal_problem_reference *named = id ? pal_problem_reference_find(p, id) : NULL;
     s->load_case = named ? pal_problem_case_find(p, named->load_case) : id ? pal_problem_case_find(p, id) : NULL;
-    if (!s->load_case) return no_case(s, id, note);
+    if (!s->load_case) return no_case(s, id, diag);
     wish->solve.law = law_of(wish, named);
     if (named && isnan(wish->solve.young_Pa)) wish->solve.young_Pa = named->young_Pa;
     if (named && isnan(wish->solve.poisson)) wish->solve.poisson = named->poisson;
@@ -120,55 +120,55 @@ static pal_err choose(study *s, wishes *wish, pal_note *note)
 
 /* ---- work ---- */
 
-static pal_err compare(study *s, pal_note *note)
+static pal_err compare(study *s, pal_diagnostic *diag)
 {
     if (!s->samples_file) return PAL_ERR_OK;
     double *u = malloc(3 * (size_t)s->samples.n * sizeof *u);
-    if (!u) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for %d samples", s->samples.n);
+    if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d samples", s->samples.n);
     for (int k = 0; k < s->samples.n; k++) pal_solution_at(s->solution, s->samples.x + 3 * k, u + 3 * k);
     pal_samples_error(&s->samples, u, &s->rms_percent, &s->max_percent);
     free(u);
     return PAL_ERR_OK;
 }
 
-static pal_err write_one(study *s, const char *path, bool vtk, pal_note *note)
+static pal_err write_one(study *s, const char *path, bool vtk, pal_diagnostic *diag)
 {
-    PAL_TRY(vtk ? pal_solution_vtk(s->solution, path, note) : pal_solution_csv(s->solution, path, note));
+    PAL_TRY(vtk ? pal_solution_vtk(s->solution, path, diag) : pal_solution_csv(s->solution, path, diag));
     if (s->n_file < 2) snprintf(s->file[s->n_file++], PATH, "%s", path);
     return PAL_ERR_OK;
 }
 
-static pal_err write_files(study *s, const wishes *wish, pal_note *note)
+static pal_err write_files(study *s, const plan_requests *wish, pal_diagnostic *diag)
 {
     char csv[PATH], vtk[PATH];
     if (wish->folder) {
-        PAL_TRY(pal_scene_make_folder(wish->folder, note));
+        PAL_TRY(pal_scene_make_folder(wish->folder, diag));
         snprintf(csv, sizeof csv, "%s/solution.csv", wish->folder);
         snprintf(vtk, sizeof vtk, "%s/solution.vtk", wish->folder);
-        PAL_TRY(write_one(s, wish->csv ? wish->csv : csv, false, note));
-        return write_one(s, wish->vtk ? wish->vtk : vtk, true, note);
+        PAL_TRY(write_one(s, wish->csv ? wish->csv : csv, false, diag));
+        return write_one(s, wish->vtk ? wish->vtk : vtk, true, diag);
     }
-    if (wish->csv) PAL_TRY(write_one(s, wish->csv, false, note));
-    return wish->vtk ? write_one(s, wish->vtk, true, note) : PAL_ERR_OK;
+    if (wish->csv) PAL_TRY(write_one(s, wish->csv, false, diag));
+    return wish->vtk ? write_one(s, wish->vtk, true, diag) : PAL_ERR_OK;
 }
 
-static pal_err read_all(study *s, wishes *wish, pal_note *note)
+static pal_err read_all(study *s, plan_requests *wish, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_problem_read(wish->problem, &s->problem, note));
-    PAL_TRY(choose(s, wish, note));
-    if (s->samples_file) PAL_TRY(pal_samples_read(s->samples_file, &s->samples, note));
+    PAL_TRY(pal_problem_read(wish->problem, &s->problem, diag));
+    PAL_TRY(choose(s, wish, diag));
+    if (s->samples_file) PAL_TRY(pal_samples_read(s->samples_file, &s->samples, diag));
     pal_mesh_file_options file = {.unit_m = s->problem->unit_m, .weld = PAL_MESH_WELD};
     pal_surface_report report = {0};
-    return pal_mesh_file_read(s->problem->surface, &file, &s->surface, &report, NULL, NULL, note);
+    return pal_mesh_file_read(s->problem->surface, &file, &s->surface, &report, NULL, NULL, diag);
 }
 
-static pal_err work(study *s, const wishes *wish, pal_note *note)
+static pal_err work(study *s, const plan_requests *wish, pal_diagnostic *diag)
 {
-    pal_note why = {""};
-    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &wish->solve, &s->solution, &s->result, &why);
-    if (err) return pal_note_set(note, err, "%s: %s", wish->problem, why.text);
-    PAL_TRY(compare(s, note));
-    return write_files(s, wish, note);
+    pal_diagnostic reason = {""};
+    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &wish->solve, &s->solution, &s->result, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", wish->problem, reason.text);
+    PAL_TRY(compare(s, diag));
+    return write_files(s, wish, diag);
 }
 
 /* ---- saying ---- */
@@ -197,7 +197,7 @@ static void add_seconds(cJSON *object, const study *s)
     cJSON_AddNumberToObject(seconds, "total", s->total_s);
 }
 
-static cJSON *as_json(const study *s, const wishes *wish)
+static cJSON *as_json(const study *s, const plan_requests *wish)
 {
     const pal_solve_result *r = &s->result;
     cJSON *o = cJSON_CreateObject();
@@ -224,14 +224,14 @@ static cJSON *as_json(const study *s, const wishes *wish)
     cJSON_AddNumberToObject(o, "iterations", r->n_newton);
     cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
     cJSON_AddNumberToObject(o, "residual", r->residual);
-    cJSON_AddNumberToObject(o, "voxel_m", r->h_m);
+    cJSON_AddNumberToObject(o, "voxel_m", r->edge_m);
     cJSON_AddNumberToObject(o, "volume_m3", r->volume_m3);
     cJSON_AddItemToObject(o, "load_area_m2", cJSON_CreateDoubleArray(r->area_m2, s->load_case->n_load));
     add_vector(o, "load_N", r->load_N);
     add_vector(o, "reaction_N", r->reaction_N);
     cJSON_AddNumberToObject(o, "work_J", r->work_J);
     cJSON_AddNumberToObject(o, "energy_J", r->energy_J);
-    cJSON_AddNumberToObject(o, "max_displacement_m", r->most_m);
+    cJSON_AddNumberToObject(o, "max_displacement_m", r->max_m);
     cJSON_AddBoolToObject(o, "poisson_clamped", r->clamped);
     cJSON *files = cJSON_AddArrayToObject(o, "files");
     for (int k = 0; k < s->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(s->file[k]));
@@ -239,16 +239,16 @@ static cJSON *as_json(const study *s, const wishes *wish)
     return o;
 }
 
-static void print(const study *s, const wishes *wish)
+static void print(const study *s, const plan_requests *wish)
 {
     const pal_solve_result *r = &s->result;
     printf("%s, load case %s: %s, %s, %d nodes, %d elements of %g m, %d unknowns\n", s->problem->name, s->load_case->id,
-           wish->solve.element, wish->solve.law, r->n_node, r->n_element, r->h_m, r->n_dof);
+           wish->solve.element, wish->solve.law, r->n_node, r->n_element, r->edge_m, r->n_dof);
     if (r->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
     printf("%d Newton iteration%s", r->n_newton, r->n_newton == 1 ? "" : "s");
     if (r->n_cg > 0) printf(" with %d conjugate gradients", r->n_cg);
     printf(", residual %.1e; largest displacement %.6g m, work of the loads %.6g J, elastic energy %.6g J\n",
-           r->residual, r->most_m, r->work_J, r->energy_J);
+           r->residual, r->max_m, r->work_J, r->energy_J);
     printf("loads (%.4g, %.4g, %.4g) N, supports (%.4g, %.4g, %.4g) N\n", r->load_N[0], r->load_N[1], r->load_N[2],
            r->reaction_N[0], r->reaction_N[1], r->reaction_N[2]);
     if (s->samples_file)
@@ -268,12 +268,12 @@ static bool show_progress(const char *what, double fraction, void *user)
 }
 
 /* several elements or resolutions, or a plot of them */
-static bool is_many(const wishes *wish)
+static bool is_many(const plan_requests *wish)
 {
     return wish->list.n_element * wish->list.n_resolution > 1 || wish->plot;
 }
 
-static int run_many(const pal_flag_common *common, const study *s, const wishes *wish)
+static int run_many(const pal_flag_common *common, const study *s, const plan_requests *wish)
 {
     const pal_study_case what = {.problem = s->problem,
                                  .load_case = s->load_case,
@@ -286,19 +286,19 @@ static int run_many(const pal_flag_common *common, const study *s, const wishes 
     return pal_study_run(common, &what, &wish->list);
 }
 
-static int run(pal_flag_common *common, wishes *wish)
+static int run(pal_flag_common *common, plan_requests *wish)
 {
     study s = {0};
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double start = pal_clock_s();
     wish->solve.progress = show_progress;
     wish->solve.user = common;
-    pal_err err = read_all(&s, wish, &note);
+    pal_err err = read_all(&s, wish, &diag);
     bool many = !err && is_many(wish);
-    if (!err && !many) err = work(&s, wish, &note);
+    if (!err && !many) err = work(&s, wish, &diag);
     s.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
-    int code = err            ? pal_report_refusal(common, err, &note)
+    int code = err            ? pal_report_refusal(common, err, &diag)
                : many         ? run_many(common, &s, wish)
                : common->json ? pal_report_json(common, as_json(&s, wish))
                               : 0;
@@ -319,7 +319,7 @@ static bool is_one(const char *word, const char *const *list)
 }
 
 /* the words of flags; NULL: all fine, else the sentence */
-static const char *check_words(const wishes *wish)
+static const char *check_words(const plan_requests *wish)
 {
     if (!is_one(wish->kinematics, (const char *const[]){"linear", "finite", NULL}))
         return "--kinematics: is not linear or finite";
@@ -339,7 +339,7 @@ static const char *check_words(const wishes *wish)
 
 int command_solve(int argc, char **argv)
 {
-    wishes wish = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
+    plan_requests wish = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
     pal_solve_options *o = &wish.solve;
     const pal_flag flag[] = {
         {"--case", "ID", PAL_FLAG_TEXT, &wish.load_case, 0, 0, "load case or reference (the only load case)"},
@@ -354,7 +354,7 @@ int command_solve(int argc, char **argv)
          "voxels on the longest axis, 1 to 1024, or several with commas between, ascending (32)"},
         {"--fill", "WORD", PAL_FLAG_TEXT, &wish.fill, 0, 0,
          "on: voxels that the surface cuts count by their filled share; off: those at least half filled, whole (on)"},
-        {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->least_fill, 1e-6, 1,
+        {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->min_fill, 1e-6, 1,
          "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
          "of the volume; 0.5 without)"},
         {"--align", "WORD", PAL_FLAG_TEXT, &wish.align, 0, 0,
@@ -387,8 +387,8 @@ int command_solve(int argc, char **argv)
     pal_flag_common common;
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &wish.problem, &n);
     if (code >= 0) return code;
-    pal_note note = {""};
-    if (!pal_study_parse(wish.element, wish.resolution, &wish.list, &note)) return usage(&common, note.text);
+    pal_diagnostic diag = {""};
+    if (!pal_study_parse(wish.element, wish.resolution, &wish.list, &diag)) return usage(&common, diag.text);
     const char *sentence = check_words(&wish);
     if (sentence) return usage(&common, sentence);
     o->element = wish.list.element[0];

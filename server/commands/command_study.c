@@ -60,7 +60,7 @@ typedef struct study_run {
     double begin_s, first_s; /* clock when anything began, when the first new setting did */
     char doing[160];
     pal_err kept; /* of the last writing */
-    pal_note kept_note;
+    pal_diagnostic kept_note;
     int picked; /* -1: none was asked for */
     char written[MOST_PATH];
 } study_run;
@@ -157,7 +157,7 @@ static void take_command(pal_study_file *file, int argc, char **argv)
 
 /* is it of the same body, loads and machine? Which setting of it serves is asked of a study that goes with a scene
  * whatever its loads were, and a row's setting whatever the machine */
-static pal_err check_same(const study_run *run, const pal_study_file *old, bool answers, pal_note *note)
+static pal_err check_same(const study_run *run, const pal_study_file *old, bool answers, pal_diagnostic *diag)
 {
     const pal_study_file *now = run->file;
     const char *what = NULL;
@@ -174,11 +174,11 @@ static pal_err check_same(const study_run *run, const pal_study_file *old, bool 
     char other[sizeof now->loads + 8];
     snprintf(other, sizeof other, "%s, quick", now->loads);
     if (!strcmp(other, old->loads))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "%.200s: is of a quick study: --quick goes on with it, --again starts over, --out keeps it",
-                            run->path);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
-                        run->path, what, detail);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "%.200s: is of a quick study: --quick goes on with it, --again starts over, --out keeps it", run->path);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
+                              run->path, what, detail);
 }
 
 /* were all methods that are asked for swept? */
@@ -207,7 +207,7 @@ static void join_methods(pal_study_file *now, const pal_study_file *old)
 
 /* which setting is to be picked is asked of the study that is there, whatever loads it has; those that are typed count
  */
-static pal_err take_kept_loads(study_run *run, pal_note *note)
+static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
     pal_study_question *q = &run->question;
@@ -215,9 +215,9 @@ static pal_err take_kept_loads(study_run *run, pal_note *note)
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     double seconds = 0;
     if (asks && !given && !run->again && !access(run->path, F_OK)) {
-        pal_note why = {""};
-        pal_err err = pal_study_file_read(run->path, &old, &why);
-        if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
+        pal_diagnostic reason = {""};
+        pal_err err = pal_study_file_read(run->path, &old, &reason);
+        if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
         pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
         if (run->load_case[0]) q->load_case = run->load_case, q->kept_case = true;
         run->of_kept = true;
@@ -229,21 +229,21 @@ static pal_err take_kept_loads(study_run *run, pal_note *note)
 }
 
 /* *whole: nothing is left to be measured */
-static pal_err look_before(study_run *run, bool *whole, pal_note *note)
+static pal_err look_before(study_run *run, bool *whole, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     *whole = false;
     bool is_there = !access(run->path, F_OK);
     if (run->row && !is_there)
-        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
-                            run->row, run->path, run->question.word);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
+                                  run->row, run->path, run->question.word);
     if (run->again || !is_there) return PAL_ERR_OK;
-    pal_err err = pal_study_file_read(run->path, &old, &why);
-    if (err) return pal_note_set(note, err, "%.400s: --again starts over", why.text);
+    pal_err err = pal_study_file_read(run->path, &old, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
     /* a row is of the table that is there, also of one that was broken off */
     bool there = run->row || covers(old, run->methods);
-    err = check_same(run, old, there && run->of_kept, note);
+    err = check_same(run, old, there && run->of_kept, diag);
     if (!err && there) {
         *whole = true;
         run->n_before = old->study.n_point;
@@ -252,7 +252,7 @@ static pal_err look_before(study_run *run, bool *whole, pal_note *note)
     } else if (!err) {
         join_methods(run->file, old);
         run->before = malloc(sizeof *run->before);
-        if (!run->before) err = pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+        if (!run->before) err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
         if (!err) *run->before = old->study, run->n_before = old->study.n_point;
     }
     free(old);
@@ -266,7 +266,7 @@ static bool has_point(const pal_study *study, const pal_study_point *point)
 {
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (p->err == point->err && pal_setting_same(&p->priced.setting, &point->priced.setting)) return true;
+        if (p->err == point->err && pal_configuration_equal(&p->priced.setting, &point->priced.setting)) return true;
     }
     return false;
 }
@@ -286,17 +286,17 @@ static void take_study(study_run *run, const pal_study *study)
 }
 
 /* the file after every point: a kill loses the one that is under way */
-static bool keep(const pal_study *study, int n_all, void *user)
+static bool keep(const pal_study *study, int n_finest, void *user)
 {
     study_run *run = user;
     take_study(run, study);
     bool is_new = study->n_point > 0 && !(run->before && has_point(run->before, &study->point[study->n_point - 1]));
     run->n_new += is_new;
-    run->file->n_all = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
+    run->file->n_finest = n_finest > run->file->study.n_point ? n_finest : run->file->study.n_point;
     run->file->whole = false;
     run->kept = pal_study_file_write(run->file, run->path, &run->kept_note);
     /* the last one ends it anyway */
-    return !run->kept && (!stop_asked || study->n_point == n_all);
+    return !run->kept && (!stop_asked || study->n_point == n_finest);
 }
 
 static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n, void *user)
@@ -323,14 +323,14 @@ static bool show(const char *what, double fraction, void *user)
     /* of the reference, which may have to be made again */
     if (!strncmp(what, "reference", 9) && fraction > 0 && fraction < 1)
         snprintf(left, sizeof left, ", about %.0f s of it left", (now - run->begin_s) * (1 - fraction) / fraction);
-    if (run->n_new > 0 && f->n_all > f->study.n_point) {
-        double rest = (now - run->first_s) / run->n_new * (f->n_all - f->study.n_point);
+    if (run->n_new > 0 && f->n_finest > f->study.n_point) {
+        double rest = (now - run->first_s) / run->n_new * (f->n_finest - f->study.n_point);
         snprintf(left, sizeof left, rest < 90 ? ", about %.0f s left" : ", about %.0f min left",
                  rest < 90 ? rest : rest / 60);
     }
     if (fraction > 0) snprintf(share, sizeof share, " %.0f %%", 100 * fraction);
     if (run->n_new > 0)
-        snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_all, what, share, left);
+        snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_finest, what, share, left);
     else
         snprintf(text, sizeof text, "%s%s%s", what, share, left);
     pal_report_progress(text, 0, &run->common);
@@ -344,7 +344,7 @@ static bool goes_on(void *user)
 }
 
 /* of the same body, loads and machine */
-static pal_err open_journal(study_run *run, pal_note *note)
+static pal_err open_journal(study_run *run, pal_diagnostic *diag)
 {
     const pal_study_file *f = run->file;
     char path[MOST_PATH + 4];
@@ -352,10 +352,10 @@ static pal_err open_journal(study_run *run, pal_note *note)
     of = pal_study_sum(pal_study_sum(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
     of = pal_study_sum(of, f->study.machine, strlen(f->study.machine));
     snprintf(path, sizeof path, "%.*s.reference", PAL_STUDY_PATH, run->stem);
-    return pal_study_journal_open(path, of, run->again, &run->journal, note);
+    return pal_study_journal_open(path, of, run->again, &run->journal, diag);
 }
 
-static pal_err measure(study_run *run, pal_note *note)
+static pal_err measure(study_run *run, pal_diagnostic *diag)
 {
     const char *method[PAL_STUDY_METHODS] = {NULL};
     char words[sizeof run->file->methods] = "", *save = NULL;
@@ -371,8 +371,8 @@ static pal_err measure(study_run *run, pal_note *note)
                            .progress = show,
                            .goes_on = goes_on,
                            .user = run};
-    if (!out) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
-    pal_err opened = open_journal(run, note);
+    if (!out) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
+    pal_err opened = open_journal(run, diag);
     if (opened) {
         free(out);
         return opened;
@@ -382,17 +382,17 @@ static pal_err measure(study_run *run, pal_note *note)
         method[o.n_method++] = w;
     o.method = o.n_method ? method : NULL;
     const pal_study_input *in = &run->input;
-    pal_note why = {""};
-    pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &why)
-                              : pal_study_scene(in->scene, &o, out, &why);
+    pal_diagnostic reason = {""};
+    pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
+                              : pal_study_scene(in->scene, &o, out, &reason);
     if (!err || out->n_point > 0) take_study(run, out);
     if (run->kept) {
         err = run->kept;
-        *note = run->kept_note;
+        *diag = run->kept_note;
     } else if (err) {
-        pal_note_set(note, err, "%s: %s", run->question.word, why.text);
+        pal_diagnostic_set(diag, err, "%s: %s", run->question.word, reason.text);
     }
-    run->file->n_all = err ? run->file->n_all : run->file->study.n_point;
+    run->file->n_finest = err ? run->file->n_finest : run->file->study.n_point;
     run->file->whole = !err;
     free(out);
     return err;
@@ -422,91 +422,92 @@ static bool is_beside_source(const study_run *run, const char *path)
 }
 
 /* "out.json" or a folder -> the file of the scene */
-static pal_err scene_path(study_run *run, pal_note *note)
+static pal_err scene_path(study_run *run, pal_diagnostic *diag)
 {
     size_t n = strlen(run->scene);
     bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
     int size = snprintf(run->written, sizeof run->written, json ? "%s" : "%s/scene.json", run->scene);
     if (size < 0 || (size_t)size >= PAL_STUDY_PATH - 16)
-        return pal_note_set(note, PAL_ERR_REFUSED, "-o: %.80s...: the path is too long", run->scene);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "-o: %.80s...: the path is too long", run->scene);
     if (is_beside_source(run, run->written))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "-o: %.300s lies beside what is read, whose meshes it could replace: name another folder",
-                            run->written);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "-o: %.300s lies beside what is read, whose meshes it could replace: name another folder", run->written);
     return PAL_ERR_OK;
 }
 
 /* the study goes with the scene that was made of it, so that it can be switched live */
-static pal_err copy_study(const study_run *run, const pal_scene *scene, pal_note *note)
+static pal_err copy_study(const study_run *run, const pal_scene *scene, pal_diagnostic *diag)
 {
     char stem[PAL_STUDY_PATH], path[MOST_PATH];
     pal_study_file *copy = malloc(sizeof *copy);
-    if (!copy) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the study");
+    if (!copy) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
     *copy = *run->file;
     pal_study_shape(&scene->body[run->input.body], copy->shape);
-    pal_err err = pal_study_stem(run->written, NULL, stem, note);
+    pal_err err = pal_study_stem(run->written, NULL, stem, diag);
     if (!err) snprintf(path, sizeof path, "%s.json", stem);
-    if (!err) err = pal_study_file_write(copy, path, note);
+    if (!err) err = pal_study_file_write(copy, path, diag);
     free(copy);
     return err;
 }
 
-static pal_err write_scene(study_run *run, pal_note *note)
+static pal_err write_scene(study_run *run, pal_diagnostic *diag)
 {
     const pal_study *study = &run->file->study;
-    const pal_priced_setting *p = &study->point[run->picked].priced;
-    pal_setting setting = p->setting;
-    pal_set_scene *set = NULL;
-    pal_note why = {""};
+    const pal_measured_configuration *p = &study->point[run->picked].priced;
+    pal_configuration setting = p->setting;
+    pal_configured_scene *set = NULL;
+    pal_diagnostic reason = {""};
     if (setting.step_s == 0) setting.step_s = study->step_s;
-    pal_err err = pal_setting_make(run->input.scene, run->input.body, &setting, &why, &set);
-    if (err) return pal_note_set(note, err, "-o: %s", why.text);
+    pal_err err = pal_configuration_make(run->input.scene, run->input.body, &setting, &reason, &set);
+    if (err) return pal_diagnostic_set(diag, err, "-o: %s", reason.text);
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     if (!loaded) {
-        pal_set_scene_free(set);
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
+        pal_configured_scene_free(set);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
     }
     loaded->scene = set->scene;
     loaded->scene.max_error_m = loaded->scene.budget_ms = 0;
     pal_study_accuracy_text(study, p->error_m, loaded->scene.accuracy, sizeof loaded->scene.accuracy);
     size_t n = strlen(run->scene);
     bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
-    err = json ? pal_scene_save_file(loaded, run->scene, note) : pal_scene_save(loaded, run->scene, note);
-    if (!err) err = copy_study(run, &set->scene, note);
+    err = json ? pal_scene_save_file(loaded, run->scene, diag) : pal_scene_save(loaded, run->scene, diag);
+    if (!err) err = copy_study(run, &set->scene, diag);
     free(loaded);
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     return err;
 }
 
 /* the setting of a row of the table, whether on the front or not */
-static pal_err pick_row(study_run *run, pal_note *note)
+static pal_err pick_row(study_run *run, pal_diagnostic *diag)
 {
-    char text[PAL_SETTING_TEXT];
+    char text[PAL_CONFIGURATION_TEXT];
     int order[PAL_STUDY_POINTS];
     const pal_study *study = &run->file->study;
     if (run->row > study->n_point)
-        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: the table of %.200s has rows 1 to %d", run->row,
-                            run->path, study->n_point);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: the table of %.200s has rows 1 to %d", run->row,
+                                  run->path, study->n_point);
     pal_study_order(study, order);
     const pal_study_point *p = &study->point[order[run->row - 1]];
     if (p->err || !isfinite(p->priced.ms) || !isfinite(p->priced.error_m))
-        return pal_note_set(note, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
-                            pal_setting_text(&p->priced.setting, text), p->why[0] ? p->why : pal_err_text(p->err));
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
+                                  pal_configuration_text(&p->priced.setting, text),
+                                  p->reason[0] ? p->reason : pal_err_text(p->err));
     run->picked = order[run->row - 1];
-    return run->scene ? write_scene(run, note) : PAL_ERR_OK;
+    return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
 }
 
-static pal_err answer(study_run *run, pal_note *note)
+static pal_err answer(study_run *run, pal_diagnostic *diag)
 {
     char text[400];
     const pal_study *study = &run->file->study;
     const char *methods = run->methods ? run->methods : "";
-    if (run->row) return pick_row(run, note);
+    if (run->row) return pick_row(run, diag);
     if (!(run->wish.within_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
     run->picked = pal_study_serving(study, methods, &run->wish);
-    if (run->picked >= 0) return run->scene ? write_scene(run, note) : PAL_ERR_OK;
+    if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
     pal_study_none(study, methods, &run->wish, text, sizeof text);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", run->question.word, text);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->question.word, text);
 }
 
 /* ---- saying ---- */
@@ -525,18 +526,18 @@ static int n_files(const study_run *run, char file[FILES][MOST_PATH])
 
 static void print(const study_run *run)
 {
-    char text[PAL_SETTING_TEXT], asked[80], off[PAL_STUDY_OFF], file[FILES][MOST_PATH];
+    char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_OFF], file[FILES][MOST_PATH];
     const pal_study *study = &run->file->study;
-    if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_all);
+    if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_finest);
     /* of a study that is there already only the answer is news */
     if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
         const pal_study_point *point = &study->point[run->picked];
-        const pal_priced_setting *p = &point->priced;
+        const pal_measured_configuration *p = &point->priced;
         pal_setting_wish_text(&run->wish, asked);
         if (run->row) snprintf(asked, sizeof asked, "row %d", run->row);
-        printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_setting_text(&p->setting, text),
-               pal_study_off_text(run->file, p->error_m, off), p->ms, point->why[0] ? "; " : "", point->why);
+        printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_configuration_text(&p->setting, text),
+               pal_study_off_text(run->file, p->error_m, off), p->ms, point->reason[0] ? "; " : "", point->reason);
     }
     int n = n_files(run, file);
     for (int k = 0; k < n; k++)
@@ -546,18 +547,18 @@ static void print(const study_run *run)
 
 static cJSON *as_json(const study_run *run)
 {
-    char text[PAL_SETTING_TEXT], file[FILES][MOST_PATH];
+    char text[PAL_CONFIGURATION_TEXT], file[FILES][MOST_PATH];
     cJSON *o = pal_study_file_tree(run->file), *list;
     if (!o) return NULL;
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddNumberToObject(o, "measured_before", run->n_before);
     cJSON_AddNumberToObject(o, "measured", run->n_new);
     if (run->picked >= 0) {
-        const pal_priced_setting *p = &run->file->study.point[run->picked].priced;
+        const pal_measured_configuration *p = &run->file->study.point[run->picked].priced;
         cJSON *picked = cJSON_AddObjectToObject(o, "picked");
         cJSON_AddNumberToObject(picked, "point", run->picked);
         if (run->row) cJSON_AddNumberToObject(picked, "row", run->row);
-        cJSON_AddStringToObject(picked, "setting", pal_setting_text(&p->setting, text));
+        cJSON_AddStringToObject(picked, "setting", pal_configuration_text(&p->setting, text));
         cJSON_AddNumberToObject(picked, "ms", p->ms);
         cJSON_AddNumberToObject(picked, "error_m", p->error_m);
     }
@@ -568,63 +569,64 @@ static cJSON *as_json(const study_run *run)
 }
 
 /* a study that is there whole and has lost its drawing gets it anew from what was measured */
-static pal_err draw_again(const study_run *run, pal_note *note)
+static pal_err draw_again(const study_run *run, pal_diagnostic *diag)
 {
     char path[PAL_STUDY_PATH + 8];
     snprintf(path, sizeof path, "%s.svg", run->stem);
-    return access(path, F_OK) ? pal_study_publish(run->file, run->stem, note) : PAL_ERR_OK;
+    return access(path, F_OK) ? pal_study_publish(run->file, run->stem, diag) : PAL_ERR_OK;
 }
 
 /* ---- the whole ---- */
 
-static pal_err work(study_run *run, int argc, char **argv, pal_note *note)
+static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
 {
     bool whole;
-    if (run->scene) PAL_TRY(scene_path(run, note));
-    PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, note));
+    if (run->scene) PAL_TRY(scene_path(run, diag));
+    PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, diag));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
-    PAL_TRY(take_kept_loads(run, note));
-    PAL_TRY(pal_study_input_open(&run->question, &run->input, note));
+    PAL_TRY(take_kept_loads(run, diag));
+    PAL_TRY(pal_study_input_open(&run->question, &run->input, diag));
     pal_study_input_describe(&run->input, &run->question, run->file);
     snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
     pal_machine_name(run->file->study.machine);
     run->file->study.step_s = run->input.scene->step_s;
     take_command(run->file, argc, argv);
-    PAL_TRY(look_before(run, &whole, note));
+    PAL_TRY(look_before(run, &whole, diag));
     if (!whole) {
-        if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, note));
-        pal_err err = measure(run, note);
+        if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, diag));
+        pal_err err = measure(run, diag);
         /* also what was broken off can be looked at */
-        pal_note why = {""};
-        pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &why) : 0;
-        if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &why);
+        pal_diagnostic reason = {""};
+        pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &reason) : 0;
+        if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &reason);
         int n = run->file->study.n_point > run->n_before ? run->file->study.n_point : run->n_before;
         if (err && stop_asked && n == 0)
-            return pal_note_set(note, PAL_ERR_STATE,
-                                "stopped before the first setting was measured; %d answers of the reference are kept "
-                                "in %.200s.reference; the same command goes on",
-                                run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
+            return pal_diagnostic_set(
+                diag, PAL_ERR_STATE,
+                "stopped before the first setting was measured; %d answers of the reference are kept "
+                "in %.200s.reference; the same command goes on",
+                run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
         if (err && stop_asked)
-            return pal_note_set(note, PAL_ERR_STATE,
-                                "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
-                                run->file->n_all > n ? run->file->n_all : n, run->path);
+            return pal_diagnostic_set(diag, PAL_ERR_STATE,
+                                      "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
+                                      run->file->n_finest > n ? run->file->n_finest : n, run->path);
         if (err) return err;
-        if (kept) return pal_note_set(note, kept, "%s", why.text);
+        if (kept) return pal_diagnostic_set(diag, kept, "%s", reason.text);
     } else {
-        PAL_TRY(draw_again(run, note));
+        PAL_TRY(draw_again(run, diag));
     }
-    return answer(run, note);
+    return answer(run, diag);
 }
 
 static int start(study_run *run, int argc, char **argv)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     run->file = calloc(1, sizeof *run->file);
     run->picked = -1;
     watch_stop();
-    pal_err err = run->file ? work(run, argc, argv, &note) : PAL_ERR_MEMORY;
+    pal_err err = run->file ? work(run, argc, argv, &diag) : PAL_ERR_MEMORY;
     pal_report_progress(NULL, 0, &run->common);
-    int code = err                ? pal_report_refusal(&run->common, err, &note)
+    int code = err                ? pal_report_refusal(&run->common, err, &diag)
                : run->common.json ? pal_report_json(&run->common, as_json(run))
                                   : 0;
     if (!err && !run->common.json && !run->common.quiet) print(run);

@@ -20,19 +20,19 @@ static void add_number(cJSON *o, const char *key, double value)
 static cJSON *result_json(const pal_torture_result *r)
 {
     static const char *const verdict[] = {"passed", "failed", "undecided", "skipped", "collapsed"};
-    cJSON *o = cJSON_CreateObject(), *rescue = cJSON_AddObjectToObject(o, "rescues");
+    cJSON *o = cJSON_CreateObject(), *safeguards = cJSON_AddObjectToObject(o, "rescues");
     const struct {
         const char *key;
         uint64_t n;
-    } count[] = {{"capped", r->rescue.n_capped},   {"clamped", r->rescue.n_clamped},
-                 {"heavy", r->rescue.n_heavy},     {"tangled", r->rescue.n_tangled},
-                 {"search", r->rescue.n_search},   {"slipped", r->rescue.n_slipped},
-                 {"stopped", r->rescue.n_stopped}, {"ns", r->rescue.ns}};
+    } count[] = {{"capped", r->safeguards.n_capped},     {"clamped", r->safeguards.n_clamped},
+                 {"heavy", r->safeguards.n_mass_scaled}, {"tangled", r->safeguards.n_inversion},
+                 {"search", r->safeguards.n_search},     {"slipped", r->safeguards.n_tool_reset},
+                 {"stopped", r->safeguards.n_stopped},   {"ns", r->safeguards.ns}};
     cJSON_AddStringToObject(o, "name", r->name);
     cJSON_AddStringToObject(o, "what", r->what);
     cJSON_AddStringToObject(o, "criterion", r->criterion);
     cJSON_AddStringToObject(o, "verdict", verdict[r->verdict]);
-    cJSON_AddStringToObject(o, "happened", r->note);
+    cJSON_AddStringToObject(o, "happened", r->diag);
     cJSON_AddBoolToObject(o, "finite", r->finite);
     cJSON_AddBoolToObject(o, "stopped", r->frozen);
     add_number(o, "energy_excess", r->energy);
@@ -43,7 +43,7 @@ static cJSON *result_json(const pal_torture_result *r)
     add_number(o, "simulated_s", r->simulated_s);
     add_number(o, "cpu_s", r->took_s);
     for (size_t k = 0; k < sizeof count / sizeof count[0]; k++)
-        cJSON_AddNumberToObject(rescue, count[k].key, (double)count[k].n);
+        cJSON_AddNumberToObject(safeguards, count[k].key, (double)count[k].n);
     return o;
 }
 
@@ -68,15 +68,16 @@ static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options
 
 static void print_result(const pal_torture_result *r)
 {
-    char energy[24] = "-", forgiven[24] = "-", left[24] = "-", rescue[64] = "";
+    char energy[24] = "-", forgiven[24] = "-", left[24] = "-", safeguards[64] = "";
     if (isfinite(r->forgiven)) snprintf(forgiven, sizeof forgiven, "%.1g", r->forgiven);
     if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
     if (isfinite(r->left_S)) snprintf(left, sizeof left, "%.2g", 100 * r->left_S);
-    uint64_t n = pal_rescues_sum(&r->rescue);
+    uint64_t n = pal_safeguards_sum(&r->safeguards);
     if (n > 0)
-        snprintf(rescue, sizeof rescue, " (%llu rescues, %.3g ms)", (unsigned long long)n, 1e-6 * (double)r->rescue.ns);
+        snprintf(safeguards, sizeof safeguards, " (%llu rescues, %.3g ms)", (unsigned long long)n,
+                 1e-6 * (double)r->safeguards.ns);
     printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, forgiven, left,
-           r->simulated_s, r->took_s, r->note, rescue);
+           r->simulated_s, r->took_s, r->diag, safeguards);
     if (r->verdict != PAL_VERDICT_FAILED) return;
     printf("%26s%s\n%26sasked: %s\n", "", r->what, "", r->criterion);
 }
@@ -147,18 +148,18 @@ int command_torture(int argc, char **argv)
     options.progress = show, options.user = &common;
     pal_loaded_scene *loaded = NULL;
     pal_studied studied = {0};
-    pal_note note = {""}, why = {""};
+    pal_diagnostic diag = {""}, reason = {""};
     pal_torture_report *report = calloc(1, sizeof *report);
-    pal_err err = report ? pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &note) : PAL_ERR_MEMORY;
+    pal_err err = report ? pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &diag) : PAL_ERR_MEMORY;
     /* what serve would run: the setting that the scene asks for */
-    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &note);
+    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &diag);
     const pal_scene *scene = studied.scene;
-    if (!err && (err = pal_torture(scene, &options, report, &why)))
-        pal_note_set(&note, err, "%s: %s", word[0], why.text);
+    if (!err && (err = pal_torture(scene, &options, report, &reason)))
+        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress(NULL, 0, &common);
-    if (!err && picture) err = pal_torture_picture(report, scene->title, picture, &note);
+    if (!err && picture) err = pal_torture_picture(report, scene->title, picture, &diag);
     if (err) {
-        code = pal_report_refusal(&common, err, &note);
+        code = pal_report_refusal(&common, err, &diag);
     } else {
         code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
         if (!common.json && !common.quiet && studied.said[0]) printf("%s\n", studied.said);

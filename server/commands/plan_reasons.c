@@ -30,7 +30,7 @@ const char *pal_effect_words(const char *name, char text[128])
         }
     if (effect && effect->stage == PAL_STAGE_SOLVE)
         snprintf(text, 128, "solver \"%s\"", name);
-    else if (effect && effect->stage == PAL_STAGE_OUTPUT && strcmp(name, "field_out") != 0)
+    else if (effect && effect->stage == PAL_STAGE_OUTPUT && strcmp(name, "field_output") != 0)
         snprintf(text, 128, "output \"%s\"", name);
     else
         snprintf(text, 128, "an entry \"%s\" in effects", name);
@@ -39,9 +39,9 @@ const char *pal_effect_words(const char *name, char text[128])
 
 bool pal_plan_has(const pal_world *world, const char *name)
 {
-    pal_row_info row;
-    for (int r = 0; r < pal_world_rows(world); r++) {
-        pal_world_row(world, r, &row);
+    pal_component_info row;
+    for (int r = 0; r < pal_world_component_count(world); r++) {
+        pal_world_component_info(world, r, &row);
         if (!strcmp(row.name, name)) return true;
     }
     return false;

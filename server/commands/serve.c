@@ -45,7 +45,7 @@ typedef struct serve_run {
     pal_studied studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
     pal_preflight preflight[MOST_SESSIONS];
     pal_session *session[MOST_SESSIONS];
-    const pal_priced_setting *setting[MOST_SESSIONS]; /* what the server borrows of them */
+    const pal_measured_configuration *setting[MOST_SESSIONS]; /* what the server borrows of them */
     int n_setting[MOST_SESSIONS], setting_body[MOST_SESSIONS];
     double reference_m[MOST_SESSIONS];
     pal_server_gate *gate;
@@ -95,15 +95,15 @@ static void tell_surface(const serve_run *run, const char *path, const pal_surfa
            report->unit_guessed ? ", guessed from its size: --units says otherwise" : "");
 }
 
-static pal_err load_input(serve_run *run, const char *path, pal_note *note)
+static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag)
 {
     pal_surface_scene_report report;
     pal_loaded_scene **out = &run->scene[run->n];
     bool is_surface = false;
     if (path)
-        PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, note));
+        PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, diag));
     else
-        PAL_TRY(pal_scene_procedural(&run->surface, out, &report, note));
+        PAL_TRY(pal_scene_procedural(&run->surface, out, &report, diag));
     if (is_surface) tell_surface(run, path, &report);
     run->word[run->n++] = path;
     return PAL_ERR_OK;
@@ -122,36 +122,36 @@ static void make_unique(serve_run *run, int index)
 }
 
 /* the settings that scenes ask for, and what their sessions may switch to */
-static pal_err open_studies(serve_run *run, pal_note *note)
+static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
 {
     for (int i = 0; i < run->n; i++) {
         pal_studied *s = &run->studied[i];
         const pal_scene *scene = &run->scene[i]->scene;
         *s = (pal_studied){.scene = scene, .picked = -1};
         if (!run->word[i]) continue;
-        PAL_TRY(pal_studied_open(run->word[i], scene, s, note));
+        PAL_TRY(pal_studied_open(run->word[i], scene, s, diag));
         if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
         if (s->said[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->said);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err open_sessions(serve_run *run, pal_note *note)
+static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
 {
     char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
-        PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], note));
+        PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
-        PAL_TRY(pal_session_open(scene, &options, note, &run->session[i]));
+        PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
     }
     return PAL_ERR_OK;
 }
 
-static pal_err open_server(serve_run *run, pal_note *note)
+static pal_err open_server(serve_run *run, pal_diagnostic *diag)
 {
     char folder[PATH_MAX + 32];
     for (int i = 0; i < run->n; i++) {
@@ -170,7 +170,7 @@ static pal_err open_server(serve_run *run, pal_note *note)
                                   .n_setting = run->n_setting,
                                   .setting_body = run->setting_body,
                                   .reference_m = run->reference_m};
-    PAL_TRY(pal_server_open(&options, run->session, run->n, note, &run->server));
+    PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");
     pal_server_connect(run->server, run->gate);
@@ -214,14 +214,15 @@ static int announce(const serve_run *run)
 /* ---- palpate-lcm ---- */
 
 /* one per session, so that each has its own tools and channels */
-static pal_err find_lcm(serve_run *run, pal_note *note)
+static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
 {
     char folder[PATH_MAX - 16], address[MOST_URL / 2];
     if (!run->config.lcm[0]) return PAL_ERR_OK;
-    if (!program_folder(folder, sizeof folder)) return pal_note_set(note, PAL_ERR_IO, "where am I? (/proc/self/exe)");
+    if (!program_folder(folder, sizeof folder))
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "where am I? (/proc/self/exe)");
     snprintf(run->lcm_program, sizeof run->lcm_program, "%s/palpate-lcm", folder);
     if (access(run->lcm_program, X_OK))
-        return pal_note_set(note, PAL_ERR_REFUSED, "--lcm needs %s, which is not there", run->lcm_program);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--lcm needs %s, which is not there", run->lcm_program);
     make_address(run, address, sizeof address);
     for (int i = 0; i < run->n; i++)
         snprintf(run->lcm[i].server, MOST_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
@@ -351,14 +352,14 @@ static void wait_for_end(serve_run *run, const sigset_t *signals)
     }
 }
 
-static pal_err run_all(serve_run *run, pal_note *note)
+static pal_err run_all(serve_run *run, pal_diagnostic *diag)
 {
     sigset_t signals;
     block_signals(&signals);
-    PAL_TRY(open_studies(run, note));
-    PAL_TRY(open_sessions(run, note));
-    PAL_TRY(open_server(run, note));
-    PAL_TRY(find_lcm(run, note));
+    PAL_TRY(open_studies(run, diag));
+    PAL_TRY(open_sessions(run, diag));
+    PAL_TRY(open_server(run, diag));
+    PAL_TRY(find_lcm(run, diag));
     run->main_thread = pthread_self();
     if (pthread_create(&run->net_thread, NULL, net_main, run)) return PAL_ERR_INTERNAL;
     if (announce(run)) run->net_err = PAL_ERR_IO;
@@ -389,12 +390,15 @@ int command_serve(int argc, char **argv)
     static serve_run run; /* large, and there is one */
     const char *input[MOST_SESSIONS], *unit = NULL;
     int n_input = 0, resolution = 0, label = -1;
-    pal_note note = {""};
+    bool largest_only = false;
+    pal_diagnostic diag = {""};
     const pal_flag flag[] = {
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of surfaces: m, cm, mm, um, in (guessed from the size)"},
         {"--label", "N", PAL_FLAG_COUNT, &label, 0, INT_MAX, "label of a label volume (the most frequent)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &resolution, 1, 1024,
          "voxels on the longest axis of a surface (about 13,000 tetrahedra)"},
+        {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
+         "keep only the largest of several components of a surface or of cells (see palpate prepare --help)"},
     };
     const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
                                   .about = about,
@@ -407,16 +411,17 @@ int command_serve(int argc, char **argv)
     pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
     run.surface = (pal_surface_scene){.resolution = resolution,
                                       .label = label,
+                                      .largest_only = largest_only,
                                       .unit_m = unit ? pal_mesh_unit_named(unit) : 0,
                                       .progress = pal_report_progress,
                                       .user = &run.common};
     pal_err err = PAL_ERR_OK;
     if (unit && run.surface.unit_m == 0)
-        err = pal_note_set(&note, PAL_ERR_REFUSED, "--units: \"%.20s\" is not a unit", unit);
-    for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &note);
+        err = pal_diagnostic_set(&diag, PAL_ERR_REFUSED, "--units: \"%.20s\" is not a unit", unit);
+    for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
     pal_report_progress(NULL, 0, &run.common);
     for (int i = 0; i < run.n; i++) make_unique(&run, i);
-    if (!err) err = run_all(&run, &note);
+    if (!err) err = run_all(&run, &diag);
     close_all(&run);
-    return err ? pal_report_refusal(&run.common, err, &note) : 0;
+    return err ? pal_report_refusal(&run.common, err, &diag) : 0;
 }

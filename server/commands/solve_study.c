@@ -18,48 +18,48 @@ typedef struct series {
 
 static const char *const known[PAL_STUDY_ELEMENTS] = {"hex8_bbar", "hex8", "tet4", "tet10"};
 
-static bool wrong(pal_note *note, const char *flag, const char *word, const char *what)
+static bool wrong(pal_diagnostic *diag, const char *flag, const char *word, const char *what)
 {
-    pal_note_set(note, PAL_ERR_REFUSED, "%s: %.40s %s", flag, word[0] ? word : "\"\"", what);
-    for (char *c = note->text; *c; c++)
+    pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.40s %s", flag, word[0] ? word : "\"\"", what);
+    for (char *c = diag->text; *c; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
     return false;
 }
 
 /* a whole number of 1 to 1024 and nothing else */
-static bool read_resolution(const char *flag, const char *word, int *out, pal_note *note)
+static bool read_resolution(const char *flag, const char *word, int *out, pal_diagnostic *diag)
 {
     char *end;
     long n = strtol(word, &end, 10);
-    if (end == word || *end) return wrong(note, flag, word, "is not a whole number");
+    if (end == word || *end) return wrong(diag, flag, word, "is not a whole number");
     *out = (int)n;
-    return (n >= 1 && n <= 1024) || wrong(note, flag, word, "is outside 1 .. 1024");
+    return (n >= 1 && n <= 1024) || wrong(diag, flag, word, "is outside 1 .. 1024");
 }
 
-static bool add_element(char *word, pal_study_list *out, pal_note *note)
+static bool add_element(char *word, pal_study_list *out, pal_diagnostic *diag)
 {
     char *most = strchr(word, ':');
     int limit = 1024;
     if (most) *most++ = 0;
-    if (most && !read_resolution("--element", most, &limit, note)) return false;
+    if (most && !read_resolution("--element", most, &limit, diag)) return false;
     for (int k = 0; k < PAL_STUDY_ELEMENTS; k++) {
         if (strcmp(word, known[k])) continue;
         for (int j = 0; j < out->n_element; j++)
-            if (out->element[j] == known[k]) return wrong(note, "--element", word, "stands there twice");
+            if (out->element[j] == known[k]) return wrong(diag, "--element", word, "stands there twice");
         out->element[out->n_element] = known[k];
         out->most[out->n_element++] = limit;
         return true;
     }
-    return wrong(note, "--element", word, "is not hex8_bbar, hex8, tet4 or tet10");
+    return wrong(diag, "--element", word, "is not hex8_bbar, hex8, tet4 or tet10");
 }
 
-static bool add_resolution(const char *word, pal_study_list *out, pal_note *note)
+static bool add_resolution(const char *word, pal_study_list *out, pal_diagnostic *diag)
 {
     static const char flag[] = "--resolution";
     int n = 0, before = out->n_resolution > 0 ? out->resolution[out->n_resolution - 1] : 0;
-    if (!read_resolution(flag, word, &n, note)) return false;
-    if (out->n_resolution == PAL_CONVERGENCE_MOST) return wrong(note, flag, word, "is the 17th, 16 is the most");
-    if (n <= before) return wrong(note, flag, word, "does not come after a coarser one, wanted them ascending");
+    if (!read_resolution(flag, word, &n, diag)) return false;
+    if (out->n_resolution == PAL_CONVERGENCE_MOST) return wrong(diag, flag, word, "is the 17th, 16 is the most");
+    if (n <= before) return wrong(diag, flag, word, "does not come after a coarser one, wanted them ascending");
     out->resolution[out->n_resolution++] = n;
     return true;
 }
@@ -73,24 +73,24 @@ static char *next_word(char **rest)
     return word;
 }
 
-bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_note *note)
+bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag)
 {
     char text[WORDS], *rest = text, *word;
     *out = (pal_study_list){0};
-    if (strlen(element) >= WORDS) return wrong(note, "--element", element, "... is too long");
-    if (strlen(resolution) >= WORDS) return wrong(note, "--resolution", resolution, "... is too long");
+    if (strlen(element) >= WORDS) return wrong(diag, "--element", element, "... is too long");
+    if (strlen(resolution) >= WORDS) return wrong(diag, "--resolution", resolution, "... is too long");
     strcpy(text, element);
     while ((word = next_word(&rest)))
-        if (!add_element(word, out, note)) return false;
+        if (!add_element(word, out, diag)) return false;
     strcpy(rest = text, resolution);
     while ((word = next_word(&rest)))
-        if (!add_resolution(word, out, note)) return false;
+        if (!add_resolution(word, out, diag)) return false;
     return true;
 }
 
 /* ---- work ---- */
 
-static pal_err solve_all(const pal_study_case *study, const pal_study_list *list, series *out, pal_note *note)
+static pal_err solve_all(const pal_study_case *study, const pal_study_list *list, series *out, pal_diagnostic *diag)
 {
     for (int e = 0; e < list->n_element; e++) {
         pal_solve_options options = *study->options;
@@ -98,12 +98,12 @@ static pal_err solve_all(const pal_study_case *study, const pal_study_list *list
         options.element = list->element[e];
         while (n < list->n_resolution && list->resolution[n] <= list->most[e]) n++;
         if (n == 0) continue;
-        pal_note why = {""};
+        pal_diagnostic reason = {""};
         pal_err err = pal_convergence(study->problem, study->load_case, study->surface, &options, study->samples,
-                                      list->resolution, n, out[e].point, &out[e].n, &why);
+                                      list->resolution, n, out[e].point, &out[e].n, &reason);
         if (err)
-            return pal_note_set(note, err, "%s: %s at resolution %d: %s", study->problem->path, list->element[e],
-                                list->resolution[out[e].n], why.text);
+            return pal_diagnostic_set(diag, err, "%s: %s at resolution %d: %s", study->problem->path, list->element[e],
+                                      list->resolution[out[e].n], reason.text);
     }
     return PAL_ERR_OK;
 }
@@ -123,7 +123,7 @@ static void seconds_path(const char *plot, char out[PATH])
 
 /* over nodes, or over seconds */
 static pal_err draw(const pal_study_case *study, const pal_study_list *list, const series *all, bool seconds,
-                    const char *path, pal_note *note)
+                    const char *path, pal_diagnostic *diag)
 {
     enum { MOST = PAL_CONVERGENCE_MOST };
     double x[PAL_STUDY_ELEMENTS][MOST], y[PAL_STUDY_ELEMENTS][MOST], guide_x[2] = {0}, guide_y[2] = {0};
@@ -153,7 +153,7 @@ static pal_err draw(const pal_study_case *study, const pal_study_list *list, con
         plot.curve[plot.n_curve++] =
             (pal_curve){.name = "order 2 in h", .n = 2, .x = guide_x, .y = guide_y, .dashed = true, .bare = true};
     }
-    return pal_plot_write(&plot, path, note);
+    return pal_plot_write(&plot, path, diag);
 }
 
 /* ---- saying ---- */
@@ -172,7 +172,7 @@ static void put_point(cJSON *table, const char *element, const pal_convergence_p
     cJSON *o = cJSON_CreateObject(), *seconds;
     cJSON_AddStringToObject(o, "element", element);
     cJSON_AddNumberToObject(o, "resolution", p->resolution);
-    cJSON_AddNumberToObject(o, "voxel_m", r->h_m);
+    cJSON_AddNumberToObject(o, "voxel_m", r->edge_m);
     cJSON_AddNumberToObject(o, "nodes", r->n_node);
     cJSON_AddNumberToObject(o, "elements", r->n_element);
     cJSON_AddNumberToObject(o, "dof", r->n_dof);
@@ -251,18 +251,18 @@ static void print(const pal_study_case *study, const pal_study_list *list, const
 int pal_study_run(const pal_flag_common *common, const pal_study_case *study, const pal_study_list *list)
 {
     series *all = calloc(PAL_STUDY_ELEMENTS, sizeof *all);
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     char second[PATH];
     const char *file[2] = {NULL, NULL};
-    pal_err err = all ? solve_all(study, list, all, &note) : PAL_ERR_MEMORY;
+    pal_err err = all ? solve_all(study, list, all, &diag) : PAL_ERR_MEMORY;
     if (study->plot && !err) {
         seconds_path(study->plot, second);
-        err = draw(study, list, all, false, study->plot, &note);
-        if (!err) err = draw(study, list, all, true, second, &note);
+        err = draw(study, list, all, false, study->plot, &diag);
+        if (!err) err = draw(study, list, all, true, second, &diag);
         file[0] = study->plot, file[1] = second;
     }
     pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
-    int code = err            ? pal_report_refusal(common, err, &note)
+    int code = err            ? pal_report_refusal(common, err, &diag)
                : common->json ? pal_report_json(common, as_json(study, list, all, file))
                               : 0;
     if (!err && !common->json && !common->quiet) print(study, list, all, file);

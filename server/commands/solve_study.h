@@ -27,7 +27,7 @@ typedef struct pal_study_case {
 } pal_study_case;
 
 /* words like "hex8_bbar,tet10:8" and "8,16,32"; false: note says what is wrong with them */
-bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_note *note);
+bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag);
 /* solves all of it; what is said, in JSON or as a table; the result is the exit code */
 int pal_study_run(const pal_flag_common *common, const pal_study_case *study, const pal_study_list *list);
 #endif

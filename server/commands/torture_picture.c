@@ -61,12 +61,12 @@ static void curve(FILE *to, const pal_torture_result *r, double x, double y)
     pal_svg_text(to, x + PLOT_WIDE, y + PLOT_HIGH + 13, "end", " font-size=\"10\"", text, 0);
 }
 
-pal_err pal_torture_picture(const pal_torture_report *report, const char *title, const char *path, pal_note *note)
+pal_err pal_torture_picture(const pal_torture_report *report, const char *title, const char *path, pal_diagnostic *diag)
 {
     pal_svg svg;
     char text[80];
     int rows = (report->n + COLUMNS - 1) / COLUMNS;
-    PAL_TRY(pal_svg_begin(&svg, COLUMNS * WIDE, HEAD + rows * HIGH, note));
+    PAL_TRY(pal_svg_begin(&svg, COLUMNS * WIDE, HEAD + rows * HIGH, diag));
     pal_svg_text(svg.to, 16, 26, "start", " font-size=\"15\" font-weight=\"bold\"", title, 60);
     pal_svg_text(svg.to, COLUMNS * WIDE - 16, 26, "end", " font-size=\"12\"",
                  "energy above that at rest, J, over simulated time", 0);
@@ -77,5 +77,5 @@ pal_err pal_torture_picture(const pal_torture_report *report, const char *title,
         pal_svg_text(svg.to, x, y - 7, "start", " font-size=\"12\" font-weight=\"bold\"", text, 0);
         curve(svg.to, r, x, y);
     }
-    return pal_svg_end(&svg, path, note);
+    return pal_svg_end(&svg, path, diag);
 }

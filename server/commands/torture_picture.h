@@ -4,5 +4,6 @@
 #include "server/robustness/torture.h"
 
 /* writes PATH whole or not at all; title: the scene's. MEMORY, IO */
-pal_err pal_torture_picture(const pal_torture_report *report, const char *title, const char *path, pal_note *note);
+pal_err pal_torture_picture(const pal_torture_report *report, const char *title, const char *path,
+                            pal_diagnostic *diag);
 #endif

@@ -26,7 +26,7 @@ static const int niceness = 10; /* the simulation goes first */
 
 static _Atomic int n_thread;
 static _Atomic uint64_t n_made;
-static _Atomic bool held;
+static _Atomic bool fixed;
 
 struct pal_estimator {
     const pal_scene *scene;
@@ -68,7 +68,7 @@ static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused
 }
 
 /* nothing is known, and why */
-static pal_estimate nothing(const char *why)
+static pal_estimate nothing(const char *reason)
 {
     pal_estimate none = {.error_m = NAN,
                          .discretisation_m = NAN,
@@ -76,15 +76,15 @@ static pal_estimate nothing(const char *why)
                          .time_m = NAN,
                          .model_m = NAN,
                          .zz_percent = NAN,
-                         .most_m = NAN,
+                         .max_m = NAN,
                          .ms = NAN};
-    snprintf(none.note, sizeof none.note, "%.159s", why);
+    snprintf(none.diag, sizeof none.diag, "%.159s", reason);
     return none;
 }
 
-static void publish_refusal(pal_estimator *e, const pal_note *note)
+static void publish_refusal(pal_estimator *e, const pal_diagnostic *diag)
 {
-    pal_estimate none = nothing(note->text);
+    pal_estimate none = nothing(diag->text);
     publish(e, &none, true);
 }
 
@@ -101,11 +101,11 @@ static bool wait_state(pal_estimator *e)
 static void *estimate(void *user)
 {
     pal_estimator *e = user;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     (void)setpriority(PRIO_PROCESS, (id_t)syscall(SYS_gettid), niceness);
-    pal_err err = pal_estimate_work_open(e->scene, e->body, &e->stop, &note, &e->work);
+    pal_err err = pal_estimate_work_open(e->scene, e->body, &e->stop, &diag, &e->work);
     if (!err) e->state = pal_estimate_work_state(e->work);
-    if (err && err != PAL_ERR_STATE) publish_refusal(e, &note);
+    if (err && err != PAL_ERR_STATE) publish_refusal(e, &diag);
     while (!err && wait_state(e)) {
         pal_estimate out;
         uint64_t before = pal_clock_thread_ns();
@@ -120,7 +120,7 @@ static void *estimate(void *user)
     return NULL;
 }
 
-static pal_err start(pal_estimator *e, pal_note *note)
+static pal_err start(pal_estimator *e, pal_diagnostic *diag)
 {
     /* signals belong to the thread that waits for them */
     sigset_t all, old;
@@ -131,7 +131,7 @@ static pal_err start(pal_estimator *e, pal_note *note)
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     if (!failed) return PAL_ERR_OK;
     atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
-    return pal_note_set(note, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
+    return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
 }
 
 static void release(pal_estimator *e)
@@ -141,16 +141,17 @@ static void release(pal_estimator *e)
     free(e);
 }
 
-pal_err pal_estimator_open(const pal_scene *scene, int body, pal_note *note, pal_estimator **out)
+pal_err pal_estimator_open(const pal_scene *scene, int body, pal_diagnostic *diag, pal_estimator **out)
 {
     if (body < 0 || body >= scene->n_body)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body, scene->n_body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body,
+                                  scene->n_body);
     pal_estimator *e = calloc(1, sizeof *e);
-    if (!e) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for an estimator");
+    if (!e) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for an estimator");
     e->scene = scene, e->body = body, e->step_s = scene->step_s;
     pthread_mutex_init(&e->lock, NULL);
     sem_init(&e->wake, 0, 0);
-    pal_err err = start(e, note);
+    pal_err err = start(e, diag);
     if (err)
         release(e);
     else
@@ -202,14 +203,14 @@ static void note_frozen(pal_estimator *e, const pal_world *world, bool frozen)
 
 void pal_estimator_look(pal_estimator *e, const pal_world *world, double step_ms)
 {
-    const pal_body *body = pal_world_look(world, e->body);
+    const pal_body *body = pal_world_view_body(world, e->body);
     note_frozen(e, world, body->frozen);
     if (!isnan(step_ms) && !body->asleep) {
         e->cost[e->n_cost++ % PAL_ESTIMATE_STEPS] = pal_estimate_cost_of(world, e->body, step_ms);
         atomic_fetch_add_explicit(&e->n_awake, 1, memory_order_relaxed);
     }
     if (!body->asleep) e->slept = false;
-    if (e->slept || atomic_load_explicit(&held, memory_order_relaxed)) return;
+    if (e->slept || atomic_load_explicit(&fixed, memory_order_relaxed)) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
     uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
     /* nothing has moved since */
@@ -230,13 +231,13 @@ static void grow_old(pal_estimate *e, uint64_t n_step, double step_s)
 {
     e->age_s = (double)n_step * step_s;
     if (!e->asleep || n_step == 0) return;
-    char *said = strstr(e->note, PAL_ESTIMATE_ASLEEP);
+    char *said = strstr(e->diag, PAL_ESTIMATE_ASLEEP);
     if (!said) return;
     const char *rest = said + strlen(PAL_ESTIMATE_ASLEEP);
     rest += 2 * !strncmp(rest, "; ", 2);
     memmove(said, rest, strlen(rest) + 1);
-    size_t n = strlen(e->note);
-    if (n > 1 && !strcmp(e->note + n - 2, "; ")) e->note[n - 2] = 0;
+    size_t n = strlen(e->diag);
+    if (n > 1 && !strcmp(e->diag + n - 2, "; ")) e->diag[n - 2] = 0;
 }
 
 bool pal_estimator_read(pal_estimator *e, pal_estimate *out)
@@ -266,5 +267,5 @@ uint64_t pal_estimator_made(void)
 
 void pal_estimator_hold(bool hold)
 {
-    atomic_store_explicit(&held, hold, memory_order_relaxed);
+    atomic_store_explicit(&fixed, hold, memory_order_relaxed);
 }

@@ -11,7 +11,7 @@
  *                   where the other gave a fifth. Springs: of finite elements on their voxels.
  *                   Of finite elements where many voxels are cut, or there are two across: that distance, times what
  *                   meshes of other sizes that are made and solved beside it say is left (estimate_family.h)
- *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz.h) on this mesh; about
+ *   zz              the same in energy, by the recovery of Zienkiewicz and Zhu (sim/zz_estimator.h) on this mesh; about
  *                   twice too large for tetrahedra of ten nodes
  *   model           the largest distance between the rest by the neo-Hookean law and by the body's own; of springs:
  *                   between where they are and where finite elements (hex8_bbar, corotational) come to rest; of
@@ -34,9 +34,9 @@
  * and so no sum, of bodies that adapt nothing.
  *
  * Nothing of it exists while nobody looks: no thread, no world, no copy. Thread: as said at each function. */
-#ifndef PAL_SESSION_ESTIMATE_H
-#define PAL_SESSION_ESTIMATE_H
-#include "server/sim/core/setting.h"
+#ifndef PAL_ESTIMATE_ESTIMATE_H
+#define PAL_ESTIMATE_ESTIMATE_H
+#include "server/sim/core/configuration.h"
 #include "server/sim/world/world.h"
 
 enum { PAL_ESTIMATE_NEIGHBOURS = 6 };
@@ -44,9 +44,9 @@ enum { PAL_ESTIMATE_NEIGHBOURS = 6 };
 typedef struct pal_estimate {
     uint64_t tick; /* of the state that was looked at; 0: there is none yet */
     double time_s;
-    double age_s;  /* steps in which the body was awake since then, as it is read: 0 while it sleeps as it did   */
-    bool asleep;   /* it slept then; with age_s 0 it still does                */
-    double most_m; /* largest displacement then                              */
+    double age_s; /* steps in which the body was awake since then, as it is read: 0 while it sleeps as it did   */
+    bool asleep;  /* it slept then; with age_s 0 it still does                */
+    double max_m; /* largest displacement then                              */
     /* largest displacement errors, m; NaN: not known for this body (note says why) */
     double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
     double discretisation_m, algebraic_m, time_m, model_m;
@@ -56,18 +56,18 @@ typedef struct pal_estimate {
     double own_ms;     /* processor time that this estimate took                 */
     /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
     int n_neighbour;
-    pal_priced_setting neighbour[PAL_ESTIMATE_NEIGHBOURS];
-    /* nodes that each is thought to have (within 25 %, pal_setting_nodes; as many as now where the mesh stays), and
-     * sub-steps in a step of its own at rest [n_neighbour] */
+    pal_measured_configuration neighbour[PAL_ESTIMATE_NEIGHBOURS];
+    /* nodes that each is thought to have (within 25 %, pal_configuration_estimate_nodes; as many as now where the mesh
+     * stays), and sub-steps in a step of its own at rest [n_neighbour] */
     int neighbour_nodes[PAL_ESTIMATE_NEIGHBOURS], neighbour_substeps[PAL_ESTIMATE_NEIGHBOURS];
-    char note[160];
+    char diag[160];
 } pal_estimate;
 
 typedef struct pal_estimator pal_estimator;
 /* Starts the thread of one body of a scene, which is borrowed until close, and returns; meshes and worlds are made on
  * that thread. What cannot be estimated is said in the note of the first estimate. REFUSED: no such body; MEMORY;
  * INTERNAL: no thread. Short enough for [sim]. [any] */
-pal_err pal_estimator_open(const pal_scene *scene, int body, pal_note *note, pal_estimator **out);
+pal_err pal_estimator_open(const pal_scene *scene, int body, pal_diagnostic *diag, pal_estimator **out);
 /* asks the thread to end as soon as it can; never waits. The estimator gives no more estimates. [any] */
 void pal_estimator_leave(pal_estimator *estimator);
 bool pal_estimator_gone(const pal_estimator *estimator); /* the thread has ended: close does not wait. [any] */

@@ -4,7 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -32,7 +32,7 @@ typedef struct sized {
 typedef struct family {
     const pal_scene *scene;
     const pal_body *body;
-    const pal_setting *setting;
+    const pal_configuration *setting;
     const pal_estimate_state *state;
     const _Atomic bool *stop;
     const pal_surface *surface;
@@ -45,9 +45,9 @@ typedef struct family {
 
 static double nodes_of(const family *f, int size)
 {
-    pal_setting s = *f->setting;
+    pal_configuration s = *f->setting;
     s.size = size;
-    return pal_setting_nodes(f->scene, 0, &s);
+    return pal_configuration_estimate_nodes(f->scene, 0, &s);
 }
 
 /* the finest that may be had; 0: none that tells anything */
@@ -62,7 +62,7 @@ static int finest_size(const family *f)
 
 static bool probe(const family *f, sized *m)
 {
-    const pal_body *own = pal_world_look(m->rest.world, 0);
+    const pal_body *own = pal_world_view_body(m->rest.world, 0);
     const pal_prepared *mesh = m->rest.scene->body[0].mesh;
     pal_locate *locate = NULL;
     m->u = calloc(3 * (size_t)f->n_probe, sizeof *m->u);
@@ -192,7 +192,7 @@ static bool take_loads(const pal_body *body, const pal_estimate_state *state, do
 {
     double sum = 0;
     for (int i = 0; i < 3 * state->n_node; i++) {
-        out[i] = body->held[i / 3] ? 0 : state->borne[i];
+        out[i] = body->fixed[i / 3] ? 0 : state->borne[i];
         sum += out[i] * out[i];
     }
     for (int i = 0; i < 3 * state->n_node && sum > 0; i++) out[i] /= sqrt(sum);
@@ -215,7 +215,7 @@ static bool is_same(const family *f, const pal_estimate_family *of, const double
            now->poisson == of->material.poisson && (!regions || now->young_Pa == of->material.young_Pa);
 }
 
-bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
+bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
                                  const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
                                  pal_estimate_family *out)
 {

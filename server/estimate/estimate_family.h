@@ -1,15 +1,15 @@
 /* What a body of cut voxels, or of two across, leaves in other sizes, measured: its own mesh, half and twice as many
  * voxels and a finer mesh yet (four times as many, or up to 16,000 nodes), made as a switch makes them
- * (pal_setting_make), at rest by the linear law under the same loads.
+ * (pal_configuration_make), at rest by the linear law under the same loads.
  *
  * No power of h says it. Voxels that the surface cuts count by the share that lies inside: as stiff along the surface
  * as they shall be, and 1 / share^2 too stiff to bend, so that thin parts of few voxels hardly move and the error is as
- * large as the solution; and from the size on from which those less than a quarter full can be dropped (setting.h) the
- * error falls to a third at once. Merged voxels do not see that: the error that was left was 0.2 to 6 times what they
- * told, of four organs in 5 to 40 voxels. Here the error in size s is the largest distance at vertices of the shown
- * surface from the finest one, of size r, over sqrt((1 - q) sqrt(1 + q^2)), q = (s / r)^2: between errors of the same
- * sign and such that have nothing to do with each other. That of twice as many voxels, where these are too near to the
- * finest to be told from it, goes on from half and this size, not faster than h^2.
+ * large as the solution; and from the size on from which those less than a quarter full can be dropped
+ * (configuration.h) the error falls to a third at once. Merged voxels do not see that: the error that was left was 0.2
+ * to 6 times what they told, of four organs in 5 to 40 voxels. Here the error in size s is the largest distance at
+ * vertices of the shown surface from the finest one, of size r, over sqrt((1 - q) sqrt(1 + q^2)), q = (s / r)^2:
+ * between errors of the same sign and such that have nothing to do with each other. That of twice as many voxels, where
+ * these are too near to the finest to be told from it, goes on from half and this size, not faster than h^2.
  *
  * What is random in the finest mesh stays in it: the gear in 30 voxels was told 0.44, 1.5 and 2 times its error by
  * finest meshes of 42, 46 and none.
@@ -20,8 +20,8 @@
  * Private to estimate_*.c. Heap memory, up to 80 MB while it lasts, as meshes of many nodes are solved without a factor
  * (estimate_rest.h); slow: half a second of an organ of 20 voxels, three of a nearly incompressible one. Thread: one at
  * a time. */
-#ifndef PAL_SESSION_ESTIMATE_FAMILY_H
-#define PAL_SESSION_ESTIMATE_FAMILY_H
+#ifndef PAL_ESTIMATE_ESTIMATE_FAMILY_H
+#define PAL_ESTIMATE_ESTIMATE_FAMILY_H
 #include "server/estimate/estimate_rest.h"
 
 typedef struct pal_estimate_family {
@@ -46,7 +46,7 @@ typedef struct pal_estimate_family {
  * is; state: what it bears; shown: `times` is of changes at vertices of the shown surface, else at nodes; fits: voxels
  * fit the body, so that only whole multiples of their number do; out: begins zeroed. Stays unknown where this body has
  * no such meshes (no surface, finer ones too large, no rest) or it was stopped */
-bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_setting *setting,
+bool pal_estimate_family_refresh(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
                                  const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
                                  pal_estimate_family *out);
 /* one clause on what the error of many cut voxels is good to: 3 was observed without a family. fresh: as refresh said

@@ -18,22 +18,10 @@ static const double locks_above = 0.47;
 /* ---- own scene ---- */
 
 /* a moving support stands where it is: its nodes are held, and put in place with the state */
-static void hold_led(pal_body_def *def, const pal_item *item)
+static void hold_led(pal_body_def *def, const pal_config_entry *item)
 {
-    pal_support *to = &def->support[def->n_support];
-    pal_item read = *item;
-    double low[3], high[3];
     if (def->n_support == PAL_SUPPORT_MAX) return;
-    *to = (pal_support){.lowest = true, .fraction = 0.05};
-    if (pal_item_has(item, "low_m") && !pal_item_numbers(&read, "low_m", 3, low, NULL) &&
-        !pal_item_numbers(&read, "high_m", 3, high, NULL)) {
-        to->lowest = false;
-        pal_copy3(to->low_m, low);
-        pal_copy3(to->high_m, high);
-    } else {
-        (void)pal_item_number(&read, "lowest", 0, 1, &to->fraction, NULL);
-    }
-    def->n_support++;
+    if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
 }
 
 /* what bears on the body but for contact, which the state's loads stand for */
@@ -50,10 +38,11 @@ static void keep_forces(pal_body_def *def)
     def->n_effect = n;
 }
 
-static pal_err make_scene(pal_estimate_work *w, const pal_scene *scene, int body, pal_note *note)
+static pal_err make_scene(pal_estimate_work *w, const pal_scene *scene, int body, pal_diagnostic *diag)
 {
     if (body < 0 || body >= scene->n_body)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body, scene->n_body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body,
+                                  scene->n_body);
     w->scene = malloc(sizeof *w->scene);
     if (!w->scene) return PAL_ERR_MEMORY;
     *w->scene = *scene;
@@ -61,7 +50,7 @@ static pal_err make_scene(pal_estimate_work *w, const pal_scene *scene, int body
     w->scene->n_tool = 0;
     pal_body_def *def = &w->scene->body[0];
     if (body > 0) *def = scene->body[body];
-    w->skinned = !strcmp(def->output.name, "skin_out");
+    w->skinned = !strcmp(def->output.name, "skin_output");
     def->output.name[0] = 0;
     keep_forces(def);
     return PAL_ERR_OK;
@@ -69,26 +58,26 @@ static pal_err make_scene(pal_estimate_work *w, const pal_scene *scene, int body
 
 /* ---- worlds ---- */
 
-static const pal_row *solver_of(const pal_world *world)
+static const pal_component *solver_of(const pal_world *world)
 {
-    for (int i = 0; i < pal_world_rows(world); i++)
-        if (pal_world_effect(world, i)->effect->stage == PAL_STAGE_SOLVE) return pal_world_effect(world, i);
+    for (int i = 0; i < pal_world_component_count(world); i++)
+        if (pal_world_component(world, i)->effect->stage == PAL_STAGE_SOLVE) return pal_world_component(world, i);
     return NULL;
 }
 
-static void put_number(pal_item *item, const char *key, double number)
+static void put_number(pal_config_entry *item, const char *key, double number)
 {
     for (int i = 0; i < item->n_value; i++)
         if (!strcmp(item->value[i].key, key)) {
             item->value[i].number[0] = number;
             return;
         }
-    (void)pal_item_put_number(item, key, number, NULL);
+    (void)pal_entry_put_number(item, key, number, NULL);
 }
 
-static pal_err make_live(pal_estimate_work *w, pal_note *note)
+static pal_err make_live(pal_estimate_work *w, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_world_create(w->scene, note, &w->live));
+    PAL_TRY(pal_world_create(w->scene, diag, &w->live));
     pal_world_body(w->live, 0)->load_cap_N = INFINITY;
     const char *solver = solver_of(w->live)->effect->name;
     bool implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2"), cg = !strcmp(solver, "central_cg");
@@ -103,11 +92,11 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
     w->exact_scene = malloc(sizeof *w->exact_scene);
     if (!w->exact_scene) return PAL_ERR_MEMORY;
     *w->exact_scene = *w->scene;
-    pal_item *item = &w->exact_scene->body[0].solver;
-    if (!item->name[0]) pal_item_init(item, "solver", solver);
+    pal_config_entry *item = &w->exact_scene->body[0].solver;
+    if (!item->name[0]) pal_entry_init(item, "solver", solver);
     put_number(item, "tolerance", pal_estimate_tight);
     if (implicit) put_number(item, "iterations", 400);
-    PAL_TRY(pal_world_create(w->exact_scene, note, &w->exact));
+    PAL_TRY(pal_world_create(w->exact_scene, diag, &w->exact));
     pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
     return PAL_ERR_OK;
 }
@@ -116,8 +105,8 @@ static pal_err make_live(pal_estimate_work *w, pal_note *note)
 
 static void say(pal_estimate_work *w, const char *text)
 {
-    size_t n = strlen(w->note);
-    snprintf(w->note + n, sizeof w->note - n, "%s%s", n > 0 ? "; " : "", text);
+    size_t n = strlen(w->diag);
+    snprintf(w->diag + n, sizeof w->diag - n, "%s%s", n > 0 ? "; " : "", text);
 }
 
 const char *pal_estimate_model_text(const pal_body_def *def, const char *key, const char *otherwise)
@@ -169,7 +158,7 @@ static bool is_thin(const pal_tets *tets)
             low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
         least = fmin(least, high - low);
     }
-    return least < few_across * tets->h_m;
+    return least < few_across * tets->edge_m;
 }
 
 /* a mesh or law that cannot be had leaves its part unknown */
@@ -178,7 +167,7 @@ static pal_err make_rests(pal_estimate_work *w)
     const pal_body *body = pal_world_body(w->live, 0);
     pal_body_def *def = &w->scene->body[0];
     const char *element = NULL, *law = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     w->springs = !strcmp(def->model.name, "tet_springs");
     if (!w->springs && strcmp(def->model.name, "fem")) {
         say(w, "discretisation and model: not known of control cells");
@@ -189,14 +178,14 @@ static pal_err make_rests(pal_estimate_work *w)
     if (w->springs) element = hexes ? "hex8_bbar" : "tet4", law = "corotational";
     const char *is = element ? element : pal_estimate_model_text(def, "element", hexes ? "hex8_bbar" : "tet4");
     w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
-    pal_err err = pal_rest_make(w->scene, body, element, law, &note, &w->fine);
+    pal_err err = pal_rest_make(w->scene, body, element, law, &diag, &w->fine);
     if (err) {
-        say(w, note.text);
+        say(w, diag.text);
         return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
     }
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
-    err = pal_rest_coarser(w->scene, body, element, law, &note, &w->coarse);
-    if (err) say(w, note.text);
+    err = pal_rest_coarser(w->scene, body, element, law, &diag, &w->coarse);
+    if (err) say(w, diag.text);
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
     w->thin = !err && hexes && is_thin(&def->mesh->tets);
@@ -205,7 +194,7 @@ static pal_err make_rests(pal_estimate_work *w)
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     if (w->skinned) PAL_TRY(pal_estimate_shown_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
     bool neo = !strcmp(pal_estimate_model_text(def, "law", ""), "neo_hookean");
-    if (!w->springs && !neo && pal_rest_make(w->scene, body, NULL, "neo_hookean", &note, &w->model)) say(w, note.text);
+    if (!w->springs && !neo && pal_rest_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model)) say(w, diag.text);
     return PAL_ERR_OK;
 }
 
@@ -218,26 +207,27 @@ static pal_err take_state(pal_estimate_work *w)
     s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
     s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
     s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
-    s->outer = calloc(3 * (size_t)body->n_node, sizeof(double));
+    s->external_force = calloc(3 * (size_t)body->n_node, sizeof(double));
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
-    for (int i = 0; i < pal_world_rows(w->live); i++) {
-        const pal_effect *effect = pal_world_effect(w->live, i)->effect;
+    for (int i = 0; i < pal_world_component_count(w->live); i++) {
+        const pal_effect *effect = pal_world_component(w->live, i)->effect;
         if (effect->stage != PAL_STAGE_FORCE || s->n_row == PAL_ESTIMATE_ROWS) continue;
         s->row[s->n_row] = effect->name;
         s->row_on[s->n_row++] = true;
     }
-    return s->x && s->v && s->load && s->outer && s->borne && w->first && w->second ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second ? PAL_ERR_OK
+                                                                                             : PAL_ERR_MEMORY;
 }
 
-static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body, pal_note *note)
+static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body, pal_diagnostic *diag)
 {
-    PAL_TRY(make_scene(w, scene, body, note));
-    pal_setting_of(scene, body, &w->foresight.setting);
+    PAL_TRY(make_scene(w, scene, body, diag));
+    pal_configuration_of(scene, body, &w->foresight.setting);
     w->foresight.scene = w->scene, w->foresight.body = 0;
-    PAL_TRY(make_live(w, note));
-    if (pal_world_body(w->live, 0)->shell)
-        return pal_note_set(
-            note, PAL_ERR_REFUSED,
+    PAL_TRY(make_live(w, diag));
+    if (pal_world_body(w->live, 0)->adaptive)
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
             "body \"%s\" is refined while it runs: its error is not estimated (`palpate study` measures "
             "it against its finest level)",
             w->scene->body[0].name);
@@ -246,14 +236,14 @@ static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body,
     return pal_estimate_stopped(w) ? PAL_ERR_STATE : PAL_ERR_OK;
 }
 
-pal_err pal_estimate_work_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_note *note,
+pal_err pal_estimate_work_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_diagnostic *diag,
                                pal_estimate_work **out)
 {
     pal_estimate_work *w = calloc(1, sizeof *w);
-    if (!w) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for an estimator");
+    if (!w) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for an estimator");
     w->stop = stop;
-    pal_err err = open_work(w, scene, body, note);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "no memory for the worlds of an estimator");
+    pal_err err = open_work(w, scene, body, diag);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "no memory for the worlds of an estimator");
     if (err)
         pal_estimate_work_close(w);
     else
@@ -271,7 +261,7 @@ void pal_estimate_work_close(pal_estimate_work *w)
     pal_estimate_shown_free(&w->shown);
     pal_hexes_free(&w->voxels.hexes);
     free(w->scene), free(w->exact_scene);
-    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.outer), free(w->state.borne);
+    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.external_force), free(w->state.borne);
     free(w->first), free(w->second);
     pal_estimate_family_free(&w->family);
     free(w);
@@ -284,10 +274,10 @@ pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work)
 
 static bool has_row(const pal_world *world, int body, const char *name)
 {
-    const char *of = pal_world_look(world, body)->name;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info row;
-        pal_world_row(world, i, &row);
+    const char *of = pal_world_view_body(world, body)->name;
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info row;
+        pal_world_component_info(world, i, &row);
         if (row.body == of && !strcmp(row.name, name)) return true;
     }
     return false;
@@ -300,7 +290,7 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
         bool has = has_row(world, 0, state->row[k]), may = recipe || has;
         for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->row[k]);
         if (has == state->row_on[k] || !may) continue;
-        PAL_TRY(pal_world_switch_row(world, scene, 0, state->row[k], state->row_on[k], NULL));
+        PAL_TRY(pal_world_switch_component(world, scene, 0, state->row[k], state->row_on[k], NULL));
         pal_world_body(world, 0)->load_cap_N = INFINITY;
     }
     return PAL_ERR_OK;
@@ -308,14 +298,14 @@ pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, con
 
 pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
 {
-    const char *of = pal_world_look(world, body)->name;
+    const char *of = pal_world_view_body(world, body)->name;
     double once_ns = 0, beside_ns = 0, own_ns = 0;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        const pal_row *row = pal_world_effect(world, i);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *row = pal_world_component(world, i);
         const pal_stage stage = row->effect->stage;
         const bool inner = stage == PAL_STAGE_FORCE || stage == PAL_STAGE_SOLVE;
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         double *sum_ns = inner && info.body == of              ? &own_ns
                          : inner || stage == PAL_STAGE_CONTACT ? &beside_ns
                                                                : &once_ns;
@@ -336,15 +326,15 @@ static bool is_touched(const pal_world *world, const pal_body *body)
     for (int t = 0; t < tools->n_tool; t++)
         any = any || pal_dot3(tools->tool[t].mean_force_N, tools->tool[t].mean_force_N) > 0;
     for (int i = 0; i < 3 * body->n_node && any && !borne; i++)
-        borne = body->load[i] != (body->outer ? body->outer[i] : 0);
+        borne = body->load[i] != (body->external_force ? body->external_force[i] : 0);
     return borne;
 }
 
 static double beside_limit_s(const pal_world *world, int body)
 {
     double least = INFINITY;
-    for (int b = 0; b < pal_world_bodies(world); b++) {
-        const pal_body *other = pal_world_look(world, b);
+    for (int b = 0; b < pal_world_body_count(world); b++) {
+        const pal_body *other = pal_world_view_body(world, b);
         if (b != body && !other->asleep && !other->frozen) least = fmin(least, other->dt_limit_s);
     }
     return least;
@@ -352,7 +342,7 @@ static double beside_limit_s(const pal_world *world, int body)
 
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
 {
-    const pal_body *from = pal_world_look(world, body);
+    const pal_body *from = pal_world_view_body(world, body);
     size_t n_byte = 3 * sizeof(double) * (size_t)from->n_dof;
     if (from->n_dof != state->n_dof || from->n_node != state->n_node || from->frozen || !pal_body_finite(from))
         return false;
@@ -360,16 +350,16 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     memcpy(state->v, from->v, n_byte);
     memcpy(state->load, from->load, 3 * sizeof(double) * (size_t)from->n_node);
     state->touched = is_touched(world, from);
-    if (from->outer)
-        memcpy(state->outer, from->outer, 3 * sizeof(double) * (size_t)from->n_node);
+    if (from->external_force)
+        memcpy(state->external_force, from->external_force, 3 * sizeof(double) * (size_t)from->n_node);
     else
-        memset(state->outer, 0, 3 * sizeof(double) * (size_t)from->n_node);
+        memset(state->external_force, 0, 3 * sizeof(double) * (size_t)from->n_node);
     state->tick = pal_world_tick(world);
     state->time_s = pal_world_time_s(world);
     state->n_substep = pal_world_substeps(world);
     state->beside_limit_s = beside_limit_s(world, body);
     state->asleep = from->asleep;
-    pal_world_material_now(world, body, &state->material);
+    pal_world_current_material(world, body, &state->material);
     for (int k = 0; k < state->n_row; k++) state->row_on[k] = has_row(world, body, state->row[k]);
     return true;
 }

@@ -1,7 +1,7 @@
 /* What estimate_open.c, which makes the scenes, worlds and meshes of an estimator, and estimate_work.c, which
  * estimates, share: its record. Private to these. */
-#ifndef PAL_SESSION_ESTIMATE_PARTS_H
-#define PAL_SESSION_ESTIMATE_PARTS_H
+#ifndef PAL_ESTIMATE_ESTIMATE_PARTS_H
+#define PAL_ESTIMATE_ESTIMATE_PARTS_H
 #include "server/estimate/estimate_family.h"
 #include "server/estimate/estimate_price.h"
 #include "server/estimate/estimate_shown.h"
@@ -33,7 +33,7 @@ struct pal_estimate_work {
     pal_estimate_family family; /* of cut voxels */
     bool priced;                /* what more nodes cost has been measured, or cannot be */
     double awake_ms;            /* of a step of a body that was never seen awake; 0: not measured yet */
-    char note[160];
+    char diag[160];
 };
 
 static inline bool pal_estimate_stopped(const pal_estimate_work *w)

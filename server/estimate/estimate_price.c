@@ -10,7 +10,7 @@
 
 enum { TIMED = 15 };
 /* of a step's time with fewer nodes; of the factor's entries with more */
-static const double least_growth = 0.6, most_growth = 2.2, least_fill = 1.1, most_fill = 1.6;
+static const double least_growth = 0.6, most_growth = 2.2, min_fill = 1.1, most_fill = 1.6;
 /* the factor's share of a sub-step at most; power of iterations with nodes */
 static const double most_factor = 0.7, most_more = 0.15;
 /* an entry is a float, read forwards and backwards */
@@ -27,7 +27,7 @@ static void rest(pal_world *world)
     pal_body *body = pal_world_body(world, 0);
     memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_dof);
     memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    pal_world_moved(world, 0);
+    pal_world_invalidate_limits(world, 0);
 }
 
 /* a few steps of both from rest under the loads they have; what a sub-step took, medians, ms, and iterations of a step
@@ -53,11 +53,11 @@ static bool time_steps(pal_world *const world[2], double step_s, double out[2], 
 
 static void count(const pal_scene *scene, double limit_s, pal_foresight *out)
 {
-    pal_setting at = out->setting;
+    pal_configuration at = out->setting;
     double now = out->n_node, whole = out->rest_substeps, limit_times = scene->step_s / limit_s;
     for (int k = 0; k < 2; k++) {
         at.size = k ? 2 * out->setting.size : out->setting.size / 2;
-        double n = at.size > 0 ? pal_setting_nodes(scene, 0, &at) : 0;
+        double n = at.size > 0 ? pal_configuration_estimate_nodes(scene, 0, &at) : 0;
         out->nodes[k] = n > 0 ? n / now : k ? 8 : 0.125;
         /* the limit of explicit solvers goes with the edge of a voxel */
         out->substeps[k] = out->implicit ? 1 : fmax(ceil(limit_times * (k ? 2 : 0.5) - 1e-9), 1) / whole;
@@ -68,7 +68,7 @@ static void count(const pal_scene *scene, double limit_s, pal_foresight *out)
 static double grown(const pal_solve_report report[2], const double n_cg[2], double along, double nodes, double fine_ms)
 {
     double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
-    fill = fmin(fmax(fill, least_fill), most_fill);
+    fill = fmin(fmax(fill, min_fill), most_fill);
     double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
            then = pal_machine_read_ms(entry_byte * entries * times);
     double factor_ms = fmin(n_cg[1] * entry_reads * now, most_factor * fine_ms);
@@ -82,7 +82,7 @@ void pal_estimate_price(const pal_scene *scene, pal_world *live, pal_world *smal
 {
     pal_world *const world[2] = {small, live};
     double ms[2], n_cg[2] = {0, 0},
-                  along = log((double)pal_world_look(live, 0)->n_node / pal_world_look(small, 0)->n_node);
+                  along = log((double)pal_world_view_body(live, 0)->n_node / pal_world_view_body(small, 0)->n_node);
     pal_solve_report report[2] = {{.n_cg = 0}};
     rest(live);
     const double limit_s = pal_world_limit_s(live);

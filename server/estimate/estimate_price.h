@@ -5,9 +5,9 @@
  * nodes; that share is solves times entries, each read twice, at the rate at which this machine reads arrays of its
  * length, which falls where they no longer fit into caches, and its entries grow as between the two, as
  * do the iterations of all. Nodes are those
- * that pal_setting_nodes thinks of. */
-#ifndef PAL_SESSION_ESTIMATE_PRICE_H
-#define PAL_SESSION_ESTIMATE_PRICE_H
+ * that pal_configuration_estimate_nodes thinks of. */
+#ifndef PAL_ESTIMATE_ESTIMATE_PRICE_H
+#define PAL_ESTIMATE_ESTIMATE_PRICE_H
 #include "server/estimate/estimate_foresee.h"
 #include "server/sim/world/world.h"
 

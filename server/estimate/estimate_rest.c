@@ -6,9 +6,9 @@
 #include "server/estimate/estimate_rest.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/volume/coarser.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/mesh/volume/voxel_coarsening.h"
+#include "server/num/shape_functions.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -33,48 +33,49 @@ static const double nothing_left = 1e-11;
 
 /* ---- scene ---- */
 
-static pal_err put_text(pal_item *item, const char *key, const char *text, pal_note *note)
+static pal_err put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
 {
     for (int i = 0; i < item->n_value; i++)
         if (!strcmp(item->value[i].key, key)) {
             snprintf(item->value[i].text, sizeof item->value[i].text, "%s", text);
             return PAL_ERR_OK;
         }
-    return pal_item_put_text(item, key, text, note);
+    return pal_entry_put_text(item, key, text, diag);
 }
 
-static pal_err make_scene(const pal_scene *scene, const char *element, const char *law, pal_note *note, pal_rest *out)
+static pal_err make_scene(const pal_scene *scene, const char *element, const char *law, pal_diagnostic *diag,
+                          pal_rest *out)
 {
     out->scene = malloc(sizeof *out->scene);
     if (!out->scene) return PAL_ERR_MEMORY;
     *out->scene = *scene;
     pal_body_def *def = &out->scene->body[0];
-    if (strcmp(def->model.name, "fem") && (element || law)) pal_item_init(&def->model, "model", "fem");
-    if (element) PAL_TRY(put_text(&def->model, "element", element, note));
-    if (law) PAL_TRY(put_text(&def->model, "law", law, note));
-    pal_item_init(&def->solver, "solver", "static_newton");
-    PAL_TRY(pal_item_put_number(&def->solver, "tolerance", rest_tolerance, note));
-    return pal_item_put_number(&def->solver, "newton", NEWTON_A_STEP, note);
+    if (strcmp(def->model.name, "fem") && (element || law)) pal_entry_init(&def->model, "model", "fem");
+    if (element) PAL_TRY(put_text(&def->model, "element", element, diag));
+    if (law) PAL_TRY(put_text(&def->model, "law", law, diag));
+    pal_entry_init(&def->solver, "solver", "static_newton");
+    PAL_TRY(pal_entry_put_number(&def->solver, "tolerance", rest_tolerance, diag));
+    return pal_entry_put_number(&def->solver, "newton", NEWTON_A_STEP, diag);
 }
 
 /* a factor of many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
 static pal_err spare_memory(pal_scene *scene)
 {
-    pal_item *solver = &scene->body[0].solver;
-    PAL_TRY(pal_item_put_text(solver, "linear", "incomplete", NULL));
-    return pal_item_put_number(solver, "iterations", MOST_GRADIENTS, NULL);
+    pal_config_entry *solver = &scene->body[0].solver;
+    PAL_TRY(pal_entry_put_text(solver, "linear", "incomplete", NULL));
+    return pal_entry_put_number(solver, "iterations", MOST_GRADIENTS, NULL);
 }
 
 /* the lowest part as a box where `up` is an axis, so that it is the same part of every mesh */
 static void fix_lowest(pal_scene *scene, const pal_body *body)
 {
     pal_body_def *def = &scene->body[0];
-    double h = body->h_m;
+    double h = body->edge_m;
     int axis = 0;
     for (int c = 1; c < 3; c++)
         if (fabs(scene->up[c]) > fabs(scene->up[axis])) axis = c;
     for (int k = 0; k < def->n_support; k++) {
-        pal_support *s = &def->support[k];
+        pal_support_def *s = &def->support[k];
         if (s->lowest && fabs(scene->up[axis]) > 1 - 1e-9) {
             double low = INFINITY, high = -INFINITY, sign = scene->up[axis] > 0 ? 1 : -1;
             for (int i = 0; i < body->n_node; i++) {
@@ -82,7 +83,7 @@ static void fix_lowest(pal_scene *scene, const pal_body *body)
                 high = fmax(high, sign * body->node_rest[3 * i + axis]);
             }
             double top = sign * (low + s->fraction * (high - low));
-            *s = (pal_support){.lowest = false};
+            *s = (pal_support_def){.lowest = false};
             for (int c = 0; c < 3; c++) s->low_m[c] = -1e9, s->high_m[c] = 1e9;
             *(sign > 0 ? &s->high_m[axis] : &s->low_m[axis]) = top;
         }
@@ -95,7 +96,7 @@ static void fix_lowest(pal_scene *scene, const pal_body *body)
 /* nodes of a voxel mesh by their place on the lattice */
 typedef struct lattice {
     int n[3];
-    double low[3], h_m;
+    double low[3], edge_m;
     int32_t *node; /* -1: none */
 } lattice;
 
@@ -108,24 +109,24 @@ static pal_err make_lattice(const pal_tets *tets, lattice *l)
 {
     double high[3];
     size_t n = 1;
-    l->h_m = tets->h_m;
+    l->edge_m = tets->edge_m;
     for (int c = 0; c < 3; c++) l->low[c] = INFINITY, high[c] = -INFINITY;
     for (int i = 0; i < 3 * tets->n_node; i++)
         l->low[i % 3] = fmin(l->low[i % 3], tets->x[i]), high[i % 3] = fmax(high[i % 3], tets->x[i]);
-    for (int c = 0; c < 3; c++) n *= (size_t)(l->n[c] = (int)floor((high[c] - l->low[c]) / l->h_m + 1.5));
+    for (int c = 0; c < 3; c++) n *= (size_t)(l->n[c] = (int)floor((high[c] - l->low[c]) / l->edge_m + 1.5));
     l->node = malloc(n * sizeof *l->node);
     if (!l->node) return PAL_ERR_MEMORY;
     memset(l->node, 0xff, n * sizeof *l->node);
     for (int i = 0; i < tets->n_node; i++) {
         int at[3];
-        for (int c = 0; c < 3; c++) at[c] = (int)floor((tets->x[3 * i + c] - l->low[c]) / l->h_m + 0.5);
+        for (int c = 0; c < 3; c++) at[c] = (int)floor((tets->x[3 * i + c] - l->low[c]) / l->edge_m + 0.5);
         l->node[place(l, at)] = i;
     }
     return PAL_ERR_OK;
 }
 
 /* how wrong the planes of `shift` are about which nodes are held */
-static double misheld(const lattice *l, const uint8_t *held, int axis, int shift)
+static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shift)
 {
     double sum = 0;
     int at[3];
@@ -141,64 +142,64 @@ static double misheld(const lattice *l, const uint8_t *held, int axis, int shift
                     next[axis] += side;
                     if (next[axis] < 0 || next[axis] >= l->n[axis]) continue;
                     int32_t j = l->node[place(l, next)];
-                    if (j >= 0) beside += held[j] != 0, n++;
+                    if (j >= 0) beside += fixed[j] != 0, n++;
                 }
-                sum += fabs((held[i] != 0) - (n > 0 ? beside / n : 0));
+                sum += fabs((fixed[i] != 0) - (n > 0 ? beside / n : 0));
             }
     return sum;
 }
 
 /* held: of the fine nodes, by supports alone */
-static pal_err choose_shift(const pal_tets *tets, const uint8_t *held, int shift[3])
+static pal_err choose_shift(const pal_tets *tets, const uint8_t *fixed, int shift[3])
 {
     lattice l = {.node = NULL};
     PAL_TRY(make_lattice(tets, &l));
-    for (int c = 0; c < 3; c++) shift[c] = misheld(&l, held, c, 1) < misheld(&l, held, c, 0);
+    for (int c = 0; c < 3; c++) shift[c] = misheld(&l, fixed, c, 1) < misheld(&l, fixed, c, 0);
     free(l.node);
     return PAL_ERR_OK;
 }
 
 /* which nodes of a mesh the boxes hold */
-static void find_held(const pal_body_def *def, const pal_tets *tets, uint8_t *held)
+static void find_held(const pal_body_def *def, const pal_tets *tets, uint8_t *fixed)
 {
     for (int i = 0; i < tets->n_node; i++) {
-        held[i] = 0;
+        fixed[i] = 0;
         for (int k = 0; k < def->n_support; k++) {
             bool in = !def->support[k].lowest && !def->support[k].rim;
             for (int c = 0; c < 3; c++)
                 in = in && tets->x[3 * i + c] >= def->support[k].low_m[c] &&
                      tets->x[3 * i + c] <= def->support[k].high_m[c];
-            held[i] |= in;
+            fixed[i] |= in;
         }
     }
 }
 
 static pal_err merge_once(const pal_body_def *def, const pal_tets *tets, const pal_hexes *hexes, pal_prepared *out,
-                          pal_note *note)
+                          pal_diagnostic *diag)
 {
     int shift[3];
-    uint8_t *held = malloc((size_t)tets->n_node);
-    if (!held) return PAL_ERR_MEMORY;
-    find_held(def, tets, held);
-    pal_err err = choose_shift(tets, held, shift);
-    free(held);
-    if (!err) err = pal_coarser_voxels(tets, hexes, shift, drop_fill, out, note);
+    uint8_t *fixed = malloc((size_t)tets->n_node);
+    if (!fixed) return PAL_ERR_MEMORY;
+    find_held(def, tets, fixed);
+    pal_err err = choose_shift(tets, fixed, shift);
+    free(fixed);
+    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, drop_fill, out, diag);
     if (!err && out->hexes.n_hex < LEAST_HEXES) {
-        err = pal_note_set(note, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
         pal_prepared_free(out);
     }
     return err;
 }
 
-static pal_err merge(pal_rest *r, const pal_prepared *mesh, pal_note *note)
+static pal_err merge(pal_rest *r, const pal_prepared *mesh, pal_diagnostic *diag)
 {
     pal_hexes own = {0};
     const pal_hexes *hexes = &mesh->hexes;
     if (hexes->n_hex == 0) {
-        PAL_TRY(pal_hexes_find(&mesh->tets, &own, note));
+        PAL_TRY(pal_hexes_find(&mesh->tets, &own, diag));
         hexes = &own;
     }
-    pal_err err = merge_once(&r->scene->body[0], &mesh->tets, hexes, &r->mesh, note);
+    pal_err err = merge_once(&r->scene->body[0], &mesh->tets, hexes, &r->mesh, diag);
     pal_hexes_free(&own);
     return err;
 }
@@ -229,7 +230,7 @@ static void take_inside(const pal_body *b, double local[4])
 
 static pal_err find_near(pal_rest *r, const pal_body *body)
 {
-    const pal_body *own = pal_world_look(r->world, 0);
+    const pal_body *own = pal_world_view_body(r->world, 0);
     pal_locate *locate = NULL;
     int n = own->n_corner;
     r->n_near = n;
@@ -254,48 +255,48 @@ static pal_err find_near(pal_rest *r, const pal_body *body)
 
 /* ---- doors ---- */
 
-static pal_err open_world(pal_rest *r, pal_note *note)
+static pal_err open_world(pal_rest *r, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_world_create(r->scene, note, &r->world));
+    PAL_TRY(pal_world_create(r->scene, diag, &r->world));
     pal_world_body(r->world, 0)->load_cap_N = INFINITY;
     r->x = malloc(3 * sizeof *r->x * (size_t)r->n_node);
     return r->x ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
-                      pal_note *note, pal_rest *out)
+                      pal_diagnostic *diag, pal_rest *out)
 {
     *out = (pal_rest){.n_node = body->n_node};
-    pal_err err = make_scene(scene, element, law, note, out);
-    if (!err) err = open_world(out, note);
-    if (!err && pal_world_look(out->world, 0)->n_node != body->n_node)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "the nodes of the body at rest are others");
+    pal_err err = make_scene(scene, element, law, diag, out);
+    if (!err) err = open_world(out, diag);
+    if (!err && pal_world_view_body(out->world, 0)->n_node != body->n_node)
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the nodes of the body at rest are others");
     if (err) pal_rest_free(out);
     return err;
 }
 
 pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
-                         pal_note *note, pal_rest *out)
+                         pal_diagnostic *diag, pal_rest *out)
 {
     *out = (pal_rest){.n_node = body->n_node};
-    pal_err err = make_scene(scene, element, law, note, out);
+    pal_err err = make_scene(scene, element, law, diag, out);
     if (!err) fix_lowest(out->scene, body);
-    if (!err) err = merge(out, scene->body[0].mesh, note);
+    if (!err) err = merge(out, scene->body[0].mesh, diag);
     if (!err) out->scene->body[0].mesh = &out->mesh;
-    if (!err) err = open_world(out, note);
+    if (!err) err = open_world(out, diag);
     if (!err) err = find_near(out, body);
     if (err) pal_rest_free(out);
     return err;
 }
 
-pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_setting *setting, int size,
+pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting, int size,
                        const char *law, pal_rest *out)
 {
-    pal_set_scene *set = NULL;
-    pal_setting to = *setting;
+    pal_configured_scene *set = NULL;
+    pal_configuration to = *setting;
     *out = (pal_rest){.n_node = body->n_node, .sized = true};
     to.size = size;
-    PAL_TRY(pal_setting_make(scene, 0, &to, NULL, &set));
+    PAL_TRY(pal_configuration_make(scene, 0, &to, NULL, &set));
     pal_err err = make_scene(&set->scene, NULL, law, NULL, out);
     if (!err && set->mesh.tets.n_node == 0) err = PAL_ERR_REFUSED;
     if (!err && set->mesh.tets.n_node > MANY_NODES) err = spare_memory(out->scene);
@@ -305,7 +306,7 @@ pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_s
         out->scene->body[0].mesh = &out->mesh;
         err = open_world(out, NULL);
     }
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     if (!err) err = find_near(out, body);
     if (err) pal_rest_free(out);
     return err;
@@ -325,7 +326,7 @@ void pal_rest_free(pal_rest *r)
 /* of what the state bears the loads of tools, with what of them accelerates the body */
 static void touch_at(const pal_estimate_state *s, int i, double out[3])
 {
-    pal_sub3(out, s->borne + 3 * (size_t)i, s->outer + 3 * (size_t)i);
+    pal_sub3(out, s->borne + 3 * (size_t)i, s->external_force + 3 * (size_t)i);
 }
 
 /* what the state bears, with `part` times the loads of tools in it */
@@ -340,7 +341,7 @@ static void load_at(const pal_estimate_state *s, double part, int i, double out[
 static pal_err put_loads(pal_rest *r, const pal_estimate_state *state, double part)
 {
     double load[3];
-    const pal_body *own = pal_world_look(r->world, 0);
+    const pal_body *own = pal_world_view_body(r->world, 0);
     if (r->n_near == 0) {
         for (int i = 0; i < own->n_node; i++) {
             load_at(state, part, i, load);
@@ -368,7 +369,7 @@ static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const dou
     pal_body *own = pal_world_body(r->world, 0);
     pal_material now;
     PAL_TRY(pal_estimate_rows(state, r->world, r->scene, false));
-    pal_world_material_now(r->world, 0, &now);
+    pal_world_current_material(r->world, 0, &now);
     if (memcmp(&now, &state->material, sizeof now)) {
         PAL_TRY(pal_world_material(r->world, 0, &state->material, NULL));
         own->load_cap_N = INFINITY;
@@ -377,18 +378,18 @@ static pal_err put_state(pal_rest *r, const pal_estimate_state *state, const dou
     /* from scratch after a failure, else from where it was */
     if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
     for (int i = 0; i < own->n_node && r->n_near == 0; i++)
-        if (from || own->held[i]) pal_copy3(own->x + 3 * i, from && !own->held[i] ? from + 3 * i : state->x + 3 * i);
+        if (from || own->fixed[i]) pal_copy3(own->x + 3 * i, from && !own->fixed[i] ? from + 3 * i : state->x + 3 * i);
     memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
-    pal_world_moved(r->world, 0);
+    pal_world_invalidate_limits(r->world, 0);
     return put_loads(r, state, part);
 }
 
 static bool nothing_acts(const pal_rest *r, double young_Pa)
 {
-    const pal_body *own = pal_world_look(r->world, 0);
-    double sum = 0, most = nothing_left * young_Pa * own->h_m * own->h_m;
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    double sum = 0, most = nothing_left * young_Pa * own->edge_m * own->edge_m;
     for (int i = 0; i < own->n_dof; i++)
-        if (!own->held[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
+        if (!own->fixed[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
     return sum <= most * most * own->n_dof;
 }
 
@@ -397,7 +398,7 @@ static bool converge(pal_rest *r, double young_Pa, const _Atomic bool *stop)
     for (int k = 0; k < MOST_STEPS; k++) {
         pal_solve_report report;
         if (stop && atomic_load_explicit(stop, memory_order_acquire)) return false;
-        if (pal_world_step(r->world, r->scene->step_s) || pal_world_look(r->world, 0)->frozen) return false;
+        if (pal_world_step(r->world, r->scene->step_s) || pal_world_view_body(r->world, 0)->frozen) return false;
         pal_world_solve_report(r->world, 0, &report);
         if (report.converged || nothing_acts(r, young_Pa)) return true;
         if (report.n_newton == 0) return false;
@@ -407,7 +408,7 @@ static bool converge(pal_rest *r, double young_Pa, const _Atomic bool *stop)
 
 static void take_places(pal_rest *r, const pal_body *body)
 {
-    const pal_body *own = pal_world_look(r->world, 0);
+    const pal_body *own = pal_world_view_body(r->world, 0);
     if (r->n_near == 0) {
         memcpy(r->x, own->d, 3 * sizeof *r->x * (size_t)r->n_node);
         return;
@@ -440,7 +441,7 @@ static double pressed_J(const pal_estimate_state *s, const pal_body *body, const
         double u[3], touch[3];
         pal_sub3(u, x + 3 * (size_t)i, body->node_rest + 3 * (size_t)i);
         touch_at(s, i, touch);
-        if (!body->held[i]) sum += pal_dot3(touch, u);
+        if (!body->fixed[i]) sum += pal_dot3(touch, u);
     }
     return sum;
 }

@@ -1,8 +1,8 @@
 /* Bodies at rest beside a running one: the same body in another mesh, law or model, under the same nodal loads, solved
  * by static_newton, and its displacements where the running body has its nodes. Private to estimate_*.c. Heap memory,
  * slow. Thread: one at a time. */
-#ifndef PAL_SESSION_ESTIMATE_REST_H
-#define PAL_SESSION_ESTIMATE_REST_H
+#ifndef PAL_ESTIMATE_ESTIMATE_REST_H
+#define PAL_ESTIMATE_ESTIMATE_REST_H
 #include "server/estimate/estimate_work.h"
 
 typedef struct pal_rest {
@@ -24,14 +24,14 @@ typedef struct pal_rest {
 /* scene: of one body, without tools (estimate_open.c); element, law: NULL keeps those of its model, which becomes fem
  * where they are given. body: the running one, as made from `scene`. REFUSED, MEMORY */
 pal_err pal_rest_make(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
-                      pal_note *note, pal_rest *out);
+                      pal_diagnostic *diag, pal_rest *out);
 /* the same on voxels of twice the edge. REFUSED as well: no voxels, none left to merge */
 pal_err pal_rest_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
-                         pal_note *note, pal_rest *out);
-/* the same in so many voxels on the longest axis, as a switch to them makes it (setting.h); model fem alone. Of more
- * than 4,000 nodes it is solved by conjugate gradients with an incomplete factor: a tenth of the memory, and less time.
- * REFUSED as well: it has that mesh already */
-pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_setting *setting, int size,
+                         pal_diagnostic *diag, pal_rest *out);
+/* the same in so many voxels on the longest axis, as a switch to them makes it (configuration.h); model fem alone. Of
+ * more than 4,000 nodes it is solved by conjugate gradients with an incomplete factor: a tenth of the memory, and less
+ * time. REFUSED as well: it has that mesh already */
+pal_err pal_rest_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting, int size,
                        const char *law, pal_rest *out);
 void pal_rest_free(pal_rest *rest); /* a zeroed one is fine */
 /* shape functions of a body's elements at local coordinates (mesh/locate.h): shape [n_corner] */

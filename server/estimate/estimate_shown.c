@@ -3,31 +3,32 @@
 
 #include "server/base/vec3.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* where vertices lie in the elements of a rest; a little outside of them these go on */
-static pal_err find_rows(const pal_rest *rest, const pal_surface *surface, pal_point_rows *out)
+static pal_err find_rows(const pal_rest *rest, const pal_surface *surface, pal_interpolation *out)
 {
-    const pal_body *own = pal_world_look(rest->world, 0);
+    const pal_body *own = pal_world_view_body(rest->world, 0);
     const pal_prepared *mesh = rest->scene->body[0].mesh;
     const int n = own->n_corner;
     pal_locate *locate = NULL;
-    pal_row_build rows;
+    pal_interpolation_builder rows;
     PAL_TRY(pal_locate_create(&mesh->tets, n == PAL_HEX_CORNERS ? &mesh->hexes : NULL, &locate));
-    pal_row_build_begin(&rows, surface->n_vertex, own->n_node, INT32_MAX);
+    pal_interpolation_builder_begin(&rows, surface->n_vertex, own->n_node, INT32_MAX);
     for (int i = 0; i < surface->n_vertex && !rows.err; i++) {
-        double local[4], shape[PAL_CORNERS_MOST];
+        double local[4], shape[PAL_MAX_CORNERS];
         int e = pal_locate_point(locate, surface->x + 3 * (size_t)i, local, NULL);
         pal_rest_shape(own, local, shape);
-        for (int k = 0; k < n; k++) pal_row_add(&rows, own->element[(size_t)n * (size_t)e + (size_t)k], shape[k]);
-        pal_row_end(&rows);
+        for (int k = 0; k < n; k++)
+            pal_interpolation_builder_add(&rows, own->element[(size_t)n * (size_t)e + (size_t)k], shape[k]);
+        pal_interpolation_builder_end_row(&rows);
     }
     pal_locate_destroy(locate);
-    return pal_row_build_finish(&rows, out);
+    return pal_interpolation_builder_finish(&rows, out);
 }
 
 static pal_err make(pal_estimate_shown *s)
@@ -36,7 +37,7 @@ static pal_err make(pal_estimate_shown *s)
     for (int k = 0; k < PAL_SHOWN_RESTS; k++) {
         if (!s->rest[k]->world) continue;
         PAL_TRY(find_rows(s->rest[k], &s->mesh->surface, &s->by[k]));
-        most = (int)fmax(most, pal_world_look(s->rest[k]->world, 0)->n_node);
+        most = (int)fmax(most, pal_world_view_body(s->rest[k]->world, 0)->n_node);
     }
     size_t n = 3 * (size_t)s->n;
     s->frames = malloc(pal_skin_frames_bytes(&s->mesh->skin) + 64);
@@ -58,7 +59,7 @@ pal_err pal_estimate_shown_make(const pal_rest *fine, const pal_rest *coarse, co
                                 pal_estimate_shown *out)
 {
     const pal_prepared *mesh = fine->scene->body[0].mesh;
-    const pal_body *body = pal_world_look(fine->world, 0);
+    const pal_body *body = pal_world_view_body(fine->world, 0);
     *out = (pal_estimate_shown){.mesh = mesh, .rest = {fine, coarse, coarsest}};
     if (mesh->skin.n_vertex < 1 || mesh->skin.n_vertex != mesh->surface.n_vertex || mesh->skin.n_node > body->n_node)
         return PAL_ERR_OK;
@@ -73,7 +74,7 @@ pal_err pal_estimate_shown_make(const pal_rest *fine, const pal_rest *coarse, co
 
 void pal_estimate_shown_free(pal_estimate_shown *s)
 {
-    for (int k = 0; k < PAL_SHOWN_RESTS; k++) pal_point_rows_free(&s->by[k]);
+    for (int k = 0; k < PAL_SHOWN_RESTS; k++) pal_interpolation_free(&s->by[k]);
     free(s->frames), free(s->place), free(s->unmoved_m), free(s->u[0]), free(s->u[1]), free(s->node);
     *s = (pal_estimate_shown){.n = 0};
 }
@@ -81,9 +82,9 @@ void pal_estimate_shown_free(pal_estimate_shown *s)
 /* displacements of vertices by the elements of a rest */
 static void by_elements(pal_estimate_shown *s, int k, double *u)
 {
-    const pal_body *own = pal_world_look(s->rest[k]->world, 0);
+    const pal_body *own = pal_world_view_body(s->rest[k]->world, 0);
     for (int i = 0; i < 3 * own->n_node; i++) s->node[i] = own->d[i] - own->node_rest[i];
-    pal_point_rows_place(&s->by[k], s->node, u);
+    pal_interpolation_apply(&s->by[k], s->node, u);
 }
 
 static double farthest(const pal_estimate_shown *s)

@@ -3,10 +3,10 @@
  * those that both have, and a skin, which turns with its nodes and is not stretched with them, hangs off its own
  * elements by as much again (a press on a ball: 5 times what the nodes told). Private to estimate_*.c. Heap memory.
  * Thread: one at a time. */
-#ifndef PAL_SESSION_ESTIMATE_SHOWN_H
-#define PAL_SESSION_ESTIMATE_SHOWN_H
+#ifndef PAL_ESTIMATE_ESTIMATE_SHOWN_H
+#define PAL_ESTIMATE_ESTIMATE_SHOWN_H
 #include "server/estimate/estimate_rest.h"
-#include "server/num/point_rows.h"
+#include "server/num/interpolation.h"
 
 enum { PAL_SHOWN_FINE, PAL_SHOWN_COARSE, PAL_SHOWN_COARSEST, PAL_SHOWN_RESTS };
 
@@ -14,7 +14,7 @@ typedef struct pal_estimate_shown {
     int n; /* shown vertices; 0: nothing hangs on nodes, which are compared themselves then */
     const pal_prepared *mesh;
     const pal_rest *rest[PAL_SHOWN_RESTS];
-    pal_point_rows by[PAL_SHOWN_RESTS]; /* vertices by the nodes of each rest; n_row 0: there is no such rest */
+    pal_interpolation by[PAL_SHOWN_RESTS]; /* vertices by the nodes of each rest; n_row 0: there is no such rest */
     void *frames;
     float *place;     /* of vertices, m [n][3] */
     double *u[2];     /* displacements of vertices, m [n][3] */

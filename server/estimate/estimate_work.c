@@ -3,7 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/world/zz.h"
+#include "server/sim/world/zz_estimator.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -55,7 +55,7 @@ static pal_err set_state(const pal_estimate_work *w, pal_world *world)
     pal_body *body = pal_world_body(world, 0);
     pal_material now;
     PAL_TRY(pal_estimate_rows(s, world, world == w->exact ? w->exact_scene : w->scene, true));
-    pal_world_material_now(world, 0, &now);
+    pal_world_current_material(world, 0, &now);
     if (memcmp(&now, &s->material, sizeof now)) {
         PAL_TRY(pal_world_material(world, 0, &s->material, NULL));
         body->load_cap_N = INFINITY;
@@ -64,9 +64,9 @@ static pal_err set_state(const pal_estimate_work *w, pal_world *world)
     memcpy(body->x, s->x, 3 * sizeof(double) * (size_t)body->n_dof);
     memcpy(body->v, s->v, 3 * sizeof(double) * (size_t)body->n_dof);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
+        if (body->fixed[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
     body->frozen = false;
-    pal_world_moved(world, 0);
+    pal_world_invalidate_limits(world, 0);
     return PAL_ERR_OK;
 }
 
@@ -119,12 +119,12 @@ static void price_size(pal_estimate_work *w)
     scene->body[0].model = w->scene->body[0].model;
     scene->body[0].solver = w->scene->body[0].solver;
     if (!pal_world_create(scene, NULL, &small)) {
-        const pal_body *loaded = pal_world_look(w->coarse.world, 0);
+        const pal_body *loaded = pal_world_view_body(w->coarse.world, 0);
         pal_body *body = pal_world_body(small, 0);
         (void)pal_estimate_rows(&w->state, small, scene, true);
         body->load_cap_N = INFINITY;
-        for (int i = 0; loaded->outer && i < body->n_node && body->n_node == loaded->n_node; i++)
-            (void)pal_world_load(small, 0, i, loaded->outer + 3 * (size_t)i);
+        for (int i = 0; loaded->external_force && i < body->n_node && body->n_node == loaded->n_node; i++)
+            (void)pal_world_load(small, 0, i, loaded->external_force + 3 * (size_t)i);
         pal_estimate_price(w->scene, w->live, small, &w->foresight);
     }
     pal_world_destroy(small);
@@ -135,8 +135,8 @@ static void price_size(pal_estimate_work *w)
 
 static void tell(pal_estimate *out, const char *text)
 {
-    size_t n = strlen(out->note);
-    snprintf(out->note + n, sizeof out->note - n, "%s%s", n > 0 ? "; " : "", text);
+    size_t n = strlen(out->diag);
+    snprintf(out->diag + n, sizeof out->diag - n, "%s%s", n > 0 ? "; " : "", text);
 }
 
 /* The loads under which the body would rest where it is now: those that act less what is left over, which accelerates
@@ -147,10 +147,10 @@ static bool find_borne(pal_estimate_work *w)
     pal_body *body = pal_world_body(w->live, 0);
     if (set_state(w, w->live)) return false;
     memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    if (pal_world_pull(w->live, 0)) return false;
+    if (pal_world_assemble_forces(w->live, 0)) return false;
     memcpy(s->borne, s->load, 3 * sizeof(double) * (size_t)s->n_node);
     for (int i = 0; i < s->n_node; i++)
-        if (!body->held[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
+        if (!body->fixed[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
     return true;
 }
 
@@ -187,7 +187,7 @@ static double skin_off(pal_estimate_work *w)
 
 static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate *out)
 {
-    pal_zz zz;
+    pal_zz_error zz;
     bool fresh = false;
     if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->zz_percent = zz.percent;
     if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) {
@@ -249,7 +249,7 @@ static void compare_models(pal_estimate_work *w, const pal_body *body, pal_estim
 
 static bool has_moved(const pal_estimate_work *w, const pal_estimate *out)
 {
-    return out->most_m > unmoved * pal_world_look(w->live, 0)->size_m;
+    return out->max_m > unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
 }
 
 static void find_rests(pal_estimate_work *w, pal_estimate *out)
@@ -298,24 +298,24 @@ static void price_sleep(pal_estimate_work *w, pal_estimate *out)
 /* the steps ahead of a body that stands where it was made leave rounding alone */
 static void drop_rounding(const pal_estimate_work *w, pal_estimate *out)
 {
-    double least_m = unmoved * pal_world_look(w->live, 0)->size_m;
+    double min_m = unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
     if (has_moved(w, out)) return;
-    if (out->time_m < least_m) out->time_m = 0;
-    if (out->algebraic_m < least_m) out->algebraic_m = 0;
+    if (out->time_m < min_m) out->time_m = 0;
+    if (out->algebraic_m < min_m) out->algebraic_m = 0;
 }
 
 bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
 {
     *out = (pal_estimate){.tick = w->state.tick,
                           .time_s = w->state.time_s,
-                          .most_m = largest_move(w),
+                          .max_m = largest_move(w),
                           .discretisation_m = NAN,
                           .algebraic_m = NAN,
                           .time_m = NAN,
                           .model_m = NAN,
                           .zz_percent = NAN,
                           .ms = middle(&w->state, ms_of)};
-    memcpy(out->note, w->note, sizeof out->note);
+    memcpy(out->diag, w->diag, sizeof out->diag);
     price_sleep(w, out);
     look_ahead(w, out);
     drop_rounding(w, out);

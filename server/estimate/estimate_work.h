@@ -1,14 +1,14 @@
 /* What an estimator computes, without its thread: the parts of the error of one body in one state (estimate.h). Heap
  * memory; everything here is slow. Thread: one at a time. */
-#ifndef PAL_SESSION_ESTIMATE_WORK_H
-#define PAL_SESSION_ESTIMATE_WORK_H
+#ifndef PAL_ESTIMATE_ESTIMATE_WORK_H
+#define PAL_ESTIMATE_ESTIMATE_WORK_H
 #include "server/estimate/estimate.h"
 
 #include <stdatomic.h>
 
 /* said of a body that sleeps */
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
-enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ROW_ITEMS };
+enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_ROWS = 2 * PAL_ENTRIES_MAX };
 
 /* of a step that the body was awake in. Shares are of the time of all bodies' rows; what is left of 1 is the body's own
  * forces and solver, which go with its mesh */
@@ -23,10 +23,10 @@ typedef struct pal_estimate_state {
     uint64_t tick;
     double time_s;
     int n_dof, n_node;
-    double *x, *v; /* m, m/s [n_dof][3] */
-    double *load;  /* lasting and contact loads, N [n_node][3] */
-    double *outer; /* of load: what lasts, N [n_node][3] */
-    double *borne; /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
+    double *x, *v;          /* m, m/s [n_dof][3] */
+    double *load;           /* lasting and contact loads, N [n_node][3] */
+    double *external_force; /* of load: what lasts, N [n_node][3] */
+    double *borne;          /* loads under which it would rest at x, N [n_node][3]; the work finds them itself */
     bool asleep;
     bool touched;          /* a tool presses or pulls */
     int n_substep;         /* of the step */
@@ -43,7 +43,7 @@ typedef struct pal_estimate_state {
 typedef struct pal_estimate_work pal_estimate_work;
 /* meshes and worlds for one body of a scene, which is borrowed; ends early with STATE when *stop is set (NULL: never).
  * REFUSED: no such body, or one of which nothing can be estimated (one sentence); MEMORY */
-pal_err pal_estimate_work_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_note *note,
+pal_err pal_estimate_work_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_diagnostic *diag,
                                pal_estimate_work **out);
 void pal_estimate_work_close(pal_estimate_work *work); /* NULL is fine */
 pal_estimate_state *pal_estimate_work_state(pal_estimate_work *work);
@@ -53,7 +53,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
 /* of the world's last step, which took step_ms. No memory. [sim] */
 pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms);
 /* the rows of a world of the same body, made from `scene`, as those of the state; recipe: rows of the model too, which
- * is the state's. What pal_world_switch_row gives. Heap memory */
+ * is the state's. What pal_world_switch_component gives. Heap memory */
 pal_err pal_estimate_rows(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe);
 /* estimates the state; false: it was stopped */
 bool pal_estimate_work_run(pal_estimate_work *work, pal_estimate *out);

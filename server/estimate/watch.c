@@ -20,7 +20,7 @@ void pal_watch_ask(pal_watch *w, int body, bool wanted)
 }
 
 /* opens and leaves what shall be there or shall not; true: something is there or wanted */
-static bool come_and_go(pal_watch *w, int b, pal_note *note, bool *failed)
+static bool come_and_go(pal_watch *w, int b, pal_diagnostic *diag, bool *failed)
 {
     pal_estimator **e = &w->estimator[b];
     if (*e && w->leaving[b] && pal_estimator_gone(*e)) {
@@ -32,17 +32,17 @@ static bool come_and_go(pal_watch *w, int b, pal_note *note, bool *failed)
         pal_estimator_leave(*e);
         w->leaving[b] = true;
     }
-    if (!*e && w->n_look[b] > 0 && !w->refused[b] && pal_estimator_open(w->scene, b, note, e))
+    if (!*e && w->n_look[b] > 0 && !w->refused[b] && pal_estimator_open(w->scene, b, diag, e))
         w->refused[b] = *failed = true;
     return *e != NULL || w->n_look[b] > 0;
 }
 
-bool pal_watch_step(pal_watch *w, const pal_world *world, double step_ms, pal_note *note)
+bool pal_watch_step(pal_watch *w, const pal_world *world, double step_ms, pal_diagnostic *diag)
 {
     bool busy = false, failed = false;
     if (!w->busy || pthread_mutex_trylock(&w->lock)) return false;
     for (int b = 0; b < w->scene->n_body; b++) {
-        busy = come_and_go(w, b, note, &failed) || busy;
+        busy = come_and_go(w, b, diag, &failed) || busy;
         if (w->estimator[b] && !w->leaving[b]) pal_estimator_look(w->estimator[b], world, step_ms);
     }
     w->busy = busy;

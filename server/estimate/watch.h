@@ -1,7 +1,7 @@
 /* The estimators of a session: one per body that somebody looks at (estimate.h), opened with the first who looks and
  * gone with the last. The session owns it; a struct of counts while nobody looks. */
-#ifndef PAL_SESSION_WATCH_H
-#define PAL_SESSION_WATCH_H
+#ifndef PAL_ESTIMATE_WATCH_H
+#define PAL_ESTIMATE_WATCH_H
 #include "server/estimate/estimate.h"
 
 #include <pthread.h>
@@ -23,7 +23,7 @@ void pal_watch_init(pal_watch *watch, const pal_scene *scene); /* [load] */
 void pal_watch_ask(pal_watch *watch, int body, bool wanted);
 /* between steps, also while paused; nothing but a look at `busy` while nobody looks. step_ms: NaN: no step was made.
  * Never waits; true: an estimator could not be opened, note says why. [sim] */
-bool pal_watch_step(pal_watch *watch, const pal_world *world, double step_ms, pal_note *note);
+bool pal_watch_step(pal_watch *watch, const pal_world *world, double step_ms, pal_diagnostic *diag);
 /* newest estimate of a body; false: nobody looks, or there is none yet. Copies. [any] */
 bool pal_watch_read(pal_watch *watch, int body, pal_estimate *out);
 /* who looks at `from` looks at `to` from now on; both threads stand. The estimators of `from` end without being waited

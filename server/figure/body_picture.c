@@ -133,27 +133,29 @@ static void find_ranges(sheet *page)
 
 /* ---- what is drawn ---- */
 
-static pal_err check_picture(const pal_body_picture *p, int index, const char *path, pal_note *note)
+static pal_err check_picture(const pal_body_picture *p, int index, const char *path, pal_diagnostic *diag)
 {
     if (p->n_tri <= 0 || p->n_vertex <= 0 || !p->x || !p->tri)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: picture %d has nothing to draw", path, index + 1);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d has nothing to draw", path, index + 1);
     if (p->n_tri > CORNERS_MOST || p->n_vertex > CORNERS_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: picture %d has %d triangles of %d vertices, at most %d go",
-                            path, index + 1, p->n_tri, p->n_vertex, CORNERS_MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "%s: picture %d has %d triangles of %d vertices, at most %d go", path, index + 1,
+                                  p->n_tri, p->n_vertex, CORNERS_MOST);
     for (int i = 0; i < 3 * p->n_tri; i++)
         if (p->tri[i] < 0 || p->tri[i] >= p->n_vertex)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: picture %d, triangle %d: no vertex %d among %d", path,
-                                index + 1, i / 3, p->tri[i], p->n_vertex);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, triangle %d: no vertex %d among %d", path,
+                                      index + 1, i / 3, p->tri[i], p->n_vertex);
     for (int i = 0; i < p->n_vertex; i++)
         for (int k = 0; k < 3; k++) {
             double x = p->x[3 * i + k], rest = p->rest ? p->rest[3 * i + k] : 0;
             if (!(fabs(x) < 1e12 && fabs(rest) < 1e12))
-                return pal_note_set(note, PAL_ERR_REFUSED, "%s: picture %d, vertex %d is at %g m", path, index + 1, i,
-                                    fabs(x) < 1e12 ? rest : x);
+                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, vertex %d is at %g m", path,
+                                          index + 1, i, fabs(x) < 1e12 ? rest : x);
         }
     for (int i = 0; i < 3 * p->n_load; i++)
         if (!(fabs(p->load_at[i]) < 1e12) || !isfinite(p->load_N[i]))
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: picture %d, load %d is not finite", path, index + 1, i / 3);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, load %d is not finite", path, index + 1,
+                                      i / 3);
     return PAL_ERR_OK;
 }
 
@@ -339,8 +341,8 @@ static dot *make_dots(const sheet *page, const panel *g, int *n)
 {
     const pal_body_picture *p = g->p;
     dot *d = malloc(sizeof *d * (size_t)p->n_vertex);
-    for (int i = 0; i < p->n_vertex && p->held && d; i++) {
-        if (!p->held[i]) continue;
+    for (int i = 0; i < p->n_vertex && p->fixed && d; i++) {
+        if (!p->fixed[i]) continue;
         double at[3];
         pal_picture_project(&g->axes, p->x + 3 * i, at);
         d[*n].depth = at[2] + 0.04 * g->span_m;
@@ -483,11 +485,11 @@ static void draw_legend(const sheet *page, const panel *g, double y, FILE *to)
 {
     const pal_body_picture *p = g->p;
     const char *small = " font-size=\"11\" fill=\"#555\"";
-    bool held = false;
+    bool fixed = false;
     double x = g->left + PAD, most = 0;
-    for (int i = 0; p->held && i < p->n_vertex && !held; i++) held = p->held[i];
+    for (int i = 0; p->fixed && i < p->n_vertex && !fixed; i++) fixed = p->fixed[i];
     for (int i = 0; i < p->n_load; i += load_step(p)) most = fmax(most, pal_norm3(p->load_N + 3 * i));
-    if (held) {
+    if (fixed) {
         fprintf(to, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>\n", x + 3, y - 4, held_ink);
         pal_svg_text(to, x + 11, y, "start", small, "held", 0);
         x += 50;
@@ -539,7 +541,7 @@ static pal_err prepare(sheet *page)
         panel *g = &page->panel[i];
         const pal_body_picture *p = g->p;
         page->titled |= p->title && p->title[0];
-        page->legend |= p->held || p->n_load > 0 || p->rest;
+        page->legend |= p->fixed || p->n_load > 0 || p->rest;
         PAL_TRY(copy_mesh(g));
         PAL_TRY(pal_picture_mesh_settle(&g->mesh, &g->axes, PIECES_A_FILE / page->n));
         PAL_TRY(pal_picture_pieces(&g->mesh, &g->axes, PIECES_A_FILE / page->n, &g->piece, &g->n_piece, &g->ghost,
@@ -553,40 +555,40 @@ static pal_err prepare(sheet *page)
     return PAL_ERR_OK;
 }
 
-static pal_err draw(sheet *page, const char *path, pal_note *note)
+static pal_err draw(sheet *page, const char *path, pal_diagnostic *diag)
 {
     find_ranges(page);
     settle_frames(page);
     pal_err err = prepare(page);
-    if (err) return pal_note_set(note, err, "%s: no memory for a picture", path);
+    if (err) return pal_diagnostic_set(diag, err, "%s: no memory for a picture", path);
     pal_svg svg;
     PAL_TRY(
-        pal_svg_begin(&svg, MARGIN + page->n * (WIDE + MARGIN), page->panel[0].top + page->tall + FOOT + MARGIN, note));
+        pal_svg_begin(&svg, MARGIN + page->n * (WIDE + MARGIN), page->panel[0].top + page->tall + FOOT + MARGIN, diag));
     draw_styles(svg.to);
     for (int i = 0; i < page->n && !err; i++) err = draw_panel(page, &page->panel[i], svg.to);
     if (err) {
         fclose(svg.to);
         free(svg.text);
-        return pal_note_set(note, err, "%s: no memory for a picture", path);
+        return pal_diagnostic_set(diag, err, "%s: no memory for a picture", path);
     }
-    return pal_svg_end(&svg, path, note);
+    return pal_svg_end(&svg, path, diag);
 }
 
-pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, const char *path, pal_note *note)
+pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, const char *path, pal_diagnostic *diag)
 {
     if (n_picture < 1 || n_picture > PAL_BODY_PICTURES)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %d pictures, 1 to %d go side by side", path, n_picture,
-                            PAL_BODY_PICTURES);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d pictures, 1 to %d go side by side", path, n_picture,
+                                  PAL_BODY_PICTURES);
     sheet *page = calloc(1, sizeof *page);
-    if (!page) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a picture", path);
+    if (!page) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a picture", path);
     page->n = n_picture;
     pal_err err = PAL_ERR_OK;
     for (int i = 0; i < n_picture && !err; i++) {
         page->panel[i].p = &picture[i];
         pal_picture_axes_set(&page->panel[i].axes, picture[i].view, picture[i].up);
-        err = check_picture(&picture[i], i, path, note);
+        err = check_picture(&picture[i], i, path, diag);
     }
-    if (!err) err = draw(page, path, note);
+    if (!err) err = draw(page, path, diag);
     for (int i = 0; i < n_picture; i++) {
         pal_picture_mesh_free(&page->panel[i].mesh);
         free(page->panel[i].piece);

@@ -5,8 +5,8 @@
  *
  * Hidden parts go by painter's order (picture_faces.h). A file stays below 1.5 MB: surfaces with more to see than
  * 16,000 triangles in all are drawn coarser. Thread: [load]. */
-#ifndef PAL_LAB_BODY_PICTURE_H
-#define PAL_LAB_BODY_PICTURE_H
+#ifndef PAL_FIGURE_BODY_PICTURE_H
+#define PAL_FIGURE_BODY_PICTURE_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -28,7 +28,7 @@ typedef struct pal_body_picture {
     double low, high;        /* values of the first and the last colour; low >= high: from the values */
     double view[3];          /* from the body towards the eye; zero: from the front, right and above */
     double up[3];            /* up on the paper; zero: z                             */
-    const uint8_t *held;     /* vertices that are held get a dot; NULL: none         [n_vertex]    */
+    const uint8_t *fixed;    /* vertices that are held get a dot; NULL: none         [n_vertex]    */
     int n_load;              /* arrows; of more than 60 every so many are drawn      */
     const double *load_at;   /* m                                                    [n_load][3]   */
     const double *load_N;    /* the longest in a file has a fixed length             [n_load][3]   */
@@ -36,7 +36,7 @@ typedef struct pal_body_picture {
 
 /* writes PATH whole or not at all; REFUSED names picture, entry and number: nothing to draw, too many pictures, a
  * triangle of a vertex that is not there, a place that is not finite; MEMORY, IO */
-pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, const char *path, pal_note *note);
+pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, const char *path, pal_diagnostic *diag);
 
 /* the colour of t in 0..1 (clamped) in the viewer's map, red first; NaN: the grey of no value */
 void pal_body_picture_colour(double t, uint8_t rgb[3]);

@@ -317,38 +317,38 @@ static bool find_range(const pal_plot *plot, axis *x, axis *y)
     return any;
 }
 
-pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_note *note)
+pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_diagnostic *diag)
 {
     axis x = {.log = plot->log_x, .from = LEFT, .to = wide_of(plot) - RIGHT};
     axis y = {.log = plot->log_y, .from = high_of(plot) - BOTTOM, .to = TOP};
-    if (!find_range(plot, &x, &y)) return pal_note_set(note, PAL_ERR_REFUSED, "there is no point to draw");
+    if (!find_range(plot, &x, &y)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no point to draw");
     for (int k = 0; k < plot->n_guide; k++) reach(plot->guide[k].vertical ? &x : &y, plot->guide[k].at);
     settle(&x);
     settle(&y);
     boxes *taken = calloc(1, sizeof *taken);
-    if (!taken) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    if (!taken) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
     pal_svg svg;
-    pal_err err = pal_svg_begin(&svg, wide_of(plot), high_of(plot), note);
+    pal_err err = pal_svg_begin(&svg, wide_of(plot), high_of(plot), diag);
     if (!err) {
         FILE *to = svg.to;
         draw_axes(to, plot, &x, &y);
         draw_guides(to, plot, &x, &y, taken);
         for (int k = 0; k < plot->n_curve; k++) draw_curve(to, plot, k, &x, &y);
         draw_labels(to, plot, &x, &y, taken);
-        err = pal_svg_take(&svg, text, n_byte, note);
+        err = pal_svg_take(&svg, text, n_byte, diag);
     }
     free(taken);
     return err;
 }
 
-pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_note *note)
+pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_diagnostic *diag)
 {
     char *text = NULL;
     size_t n_byte = 0;
-    pal_note why = {""};
-    pal_err err = pal_plot_text(plot, &text, &n_byte, &why);
-    if (err) return pal_note_set(note, err, "%s: %s", path, why.text);
-    err = pal_file_write(path, text, n_byte, note);
+    pal_diagnostic reason = {""};
+    pal_err err = pal_plot_text(plot, &text, &n_byte, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
+    err = pal_file_write(path, text, n_byte, diag);
     free(text);
     return err;
 }

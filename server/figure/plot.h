@@ -1,8 +1,8 @@
 /* Plots as SVG: curves over one pair of axes, linear or logarithmic, with readable labels, for results that people
  * would rather look at than read. Colours are told apart by colour-blind readers too (Okabe and Ito), and each curve
  * has its own mark. Thread: [load]. */
-#ifndef PAL_LAB_PLOT_H
-#define PAL_LAB_PLOT_H
+#ifndef PAL_FIGURE_PLOT_H
+#define PAL_FIGURE_PLOT_H
 #include "server/figure/svg.h"
 
 #include <stdbool.h>
@@ -47,7 +47,7 @@ typedef struct pal_plot {
 } pal_plot;
 
 /* writes PATH whole or not at all; REFUSED: no curve has a point to draw; IO */
-pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_note *note);
+pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_diagnostic *diag);
 /* the drawing as text, which the caller frees; REFUSED, MEMORY */
-pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_note *note);
+pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_diagnostic *diag);
 #endif

@@ -8,11 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_note *note)
+pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_diagnostic *diag)
 {
     *svg = (pal_svg){0};
     svg->to = open_memstream(&svg->text, &svg->n_byte);
-    if (!svg->to) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    if (!svg->to) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
     fprintf(svg->to,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" width=\"%.0f\" height=\"%.0f\" "
             "font-family=\"sans-serif\" font-size=\"13\" fill=\"#222\">\n"
@@ -21,7 +21,7 @@ pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_note *note)
     return PAL_ERR_OK;
 }
 
-pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_note *note)
+pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag)
 {
     fputs("</svg>\n", svg->to);
     bool whole = !ferror(svg->to);
@@ -31,17 +31,17 @@ pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_note *note)
     else
         free(svg->text);
     *svg = (pal_svg){0};
-    return whole ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    return whole ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
 }
 
-pal_err pal_svg_end(pal_svg *svg, const char *path, pal_note *note)
+pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag)
 {
     char *text = NULL;
     size_t n_byte = 0;
-    pal_note why = {""};
-    pal_err err = pal_svg_take(svg, &text, &n_byte, &why);
-    if (err) return pal_note_set(note, err, "%s: %s", path, why.text);
-    err = pal_file_write(path, text, n_byte, note);
+    pal_diagnostic reason = {""};
+    pal_err err = pal_svg_take(svg, &text, &n_byte, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
+    err = pal_file_write(path, text, n_byte, diag);
     free(text);
     return err;
 }
@@ -63,7 +63,7 @@ void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *
     for (int k = 0; at < n_byte; k++) {
         uint32_t code = 0;
         int n = pal_utf8_next(text + at, n_byte - at, &code);
-        bool shown = n > 0 && pal_utf8_shown(code) && code != 0xfffe && code != 0xffff;
+        bool shown = n > 0 && pal_utf8_printable(code) && code != 0xfffe && code != 0xffff;
         if (most > 0 && k == most - 1 && at + (size_t)(n > 0 ? n : 1) < n_byte) {
             fputs("\u2026", to);
             break;

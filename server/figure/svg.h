@@ -1,6 +1,6 @@
 /* What all drawings share: text that cannot leave its element, round numbers for ticks, whole files. Thread: [load]. */
-#ifndef PAL_LAB_SVG_H
-#define PAL_LAB_SVG_H
+#ifndef PAL_FIGURE_SVG_H
+#define PAL_FIGURE_SVG_H
 #include "server/base/err.h"
 
 #include <stdio.h>
@@ -14,10 +14,10 @@ typedef struct pal_svg {
     char *text;
     size_t n_byte;
 } pal_svg;
-pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_note *note);
-pal_err pal_svg_end(pal_svg *svg, const char *path, pal_note *note);
+pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_diagnostic *diag);
+pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag);
 /* ends it as text, which the caller frees; MEMORY */
-pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_note *note);
+pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag);
 
 /* a text element; anchor: start, middle or end; more: further attributes, each after a blank; at most `most`
  * characters, then an ellipsis (0: all). NULL text is empty; bytes that are no shown UTF-8 become question marks */

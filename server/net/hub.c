@@ -173,7 +173,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
     if (!f && s->cycle) return NULL;
     uint64_t now = pal_loop_now_ns(hub->loop);
     pal_wire_status *w = &hub->control->status;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_STATUS;
     w->n_member = (uint32_t)c->room->members.n_member;
@@ -183,8 +183,8 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->bytes_s = (double)(c->n_byte - c->status_byte) / ((double)(now - c->status_ns) * 1e-9);
     c->status_ns = now;
     c->status_byte = c->n_byte;
-    pal_session_last_note(c->room->session, &note);
-    pal_plain_text(w->note, sizeof w->note, note.text);
+    pal_session_last_note(c->room->session, &diag);
+    pal_plain_text(w->diag, sizeof w->diag, diag.text);
     w->step_rate_hz = s->step_rate_hz;
     w->step_ms = s->step_ms;
     w->slowdown = 1;
@@ -201,7 +201,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
             if (s->part[p].places)
                 w->active[w->n_active++] =
                     (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
-                                      (uint32_t)f->part[p].n_all, (uint32_t)f->part[p].n_all_spring};
+                                      (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }
@@ -426,7 +426,7 @@ static void hub_tick(void *user)
 }
 
 pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
-                       pal_note *note, pal_hub **out)
+                       pal_diagnostic *diag, pal_hub **out)
 {
     pal_hub *hub = calloc(1, sizeof *hub);
     pal_err err = PAL_ERR_OK;
@@ -454,7 +454,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
             room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
             if (options->reference_m) room->reference_m = options->reference_m[i];
         }
-        err = pal_stream_open(session[i], options->error_m, note, &room->stream);
+        err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
         if (!err) hub->n_room++;
     }
     if (err) return pal_hub_destroy(hub), err;

@@ -9,7 +9,7 @@
 #include "server/net/site.h"
 #include "server/net/stream.h"
 #include "server/net/transport.h"
-#include "server/sim/core/setting.h"
+#include "server/sim/core/configuration.h"
 
 typedef struct pal_hub pal_hub;
 
@@ -18,7 +18,7 @@ typedef struct pal_hub_options {
     int most_clients;
     pal_site *site; /* borrowed; NULL: no files */
     /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
-    const pal_priced_setting *const *setting;
+    const pal_measured_configuration *const *setting;
     const int *n_setting, *setting_body;
     const double *reference_m; /* NULL: not known */
 } pal_hub_options;
@@ -27,7 +27,7 @@ typedef struct pal_hub_options {
  * sculpting has replaced is closed, and its place in the array is NULL: the hub closes the new one when it is
  * destroyed. [load] */
 pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
-                       pal_note *note, pal_hub **out);
+                       pal_diagnostic *diag, pal_hub **out);
 void pal_hub_destroy(pal_hub *hub);                      /* after its roads; NULL is fine. [load] */
 void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_ops.open */
 void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with 1001; no new ones */

@@ -39,7 +39,7 @@ void pal_hub_estimate_none(pal_client *c)
 /* ---- the study ---- */
 
 /* points of one method are one curve: "fem hex8_bbar", "tet_springs calibrated" */
-static void method_text(const pal_setting *s, char out[PAL_WIRE_METHOD_BYTES])
+static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYTES])
 {
     char text[3 * PAL_NAME];
     snprintf(text, sizeof text, "%s%s%s%s", s->model, s->element[0] ? " " : "", s->element,
@@ -61,14 +61,14 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     /* as many as fit, those of the front before others */
     int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
     for (int i = 0; i < n && study->n_point < PAL_WIRE_POINT_MAX; i++) {
-        const pal_priced_setting *p = &room->setting[i];
-        char text[PAL_SETTING_TEXT];
+        const pal_measured_configuration *p = &room->setting[i];
+        char text[PAL_CONFIGURATION_TEXT];
         if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
         room_left -= !p->front;
         pal_wire_point *to = &study->point[study->n_point++];
         *to = (pal_wire_point){.index = (uint32_t)i, .ms = p->ms, .error_m = p->error_m, .front = p->front};
         method_text(&p->setting, to->method);
-        pal_plain_text(to->label, sizeof to->label, pal_setting_text(&p->setting, text));
+        pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->setting, text));
     }
     pal_hub_say(hub, c, hub->control);
 }
@@ -77,7 +77,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
 
 /* does a setting of a study say what holds now? Words and numbers that it leaves open fit anything; better: how many
  * it does say. -1: it says something else */
-static int likeness(const pal_setting *of, const pal_setting *now)
+static int likeness(const pal_configuration *of, const pal_configuration *now)
 {
     const char *const word[][2] = {
         {of->model, now->model}, {of->element, now->element}, {of->law, now->law}, {of->solver, now->solver}};
@@ -101,7 +101,7 @@ static int likeness(const pal_setting *of, const pal_setting *now)
 }
 
 /* index in the study of what holds now, NaN: it is none of those */
-static double point_of(const pal_hub_room *room, int body, const pal_setting *now)
+static double point_of(const pal_hub_room *room, int body, const pal_configuration *now)
 {
     int best = -1, best_same = -1;
     for (int i = 0; i < room->n_setting && room->setting_body == body; i++) {
@@ -124,7 +124,7 @@ static bool near(double a, double b)
 }
 
 /* a neighbour's setting is the present one with another number: nothing in it is open */
-static bool is_neighbour(const pal_setting *of, const pal_setting *to)
+static bool is_neighbour(const pal_configuration *of, const pal_configuration *to)
 {
     return likeness(of, to) >= 0 && of->size == to->size && near(of->step_s, to->step_s) &&
            near(of->tolerance, to->tolerance);
@@ -136,13 +136,13 @@ static bool is_old(const pal_estimate *e)
     return e->age_s > PAL_HUB_ESTIMATE_OLD_S || (e->age_s > 0 && e->asleep);
 }
 
-void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
+void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_configuration *to, double *now_m,
                           double *then_m)
 {
     pal_estimate e;
-    pal_setting now;
+    pal_configuration now;
     bool looked = pal_session_estimate(room->session, body, &e);
-    pal_setting_of(pal_session_scene(room->session), body, &now);
+    pal_configuration_of(pal_session_scene(room->session), body, &now);
     *now_m = *then_m = NAN;
     if (looked && is_old(&e)) return;
     *now_m = looked && isfinite(e.error_m) ? e.error_m : error_of(room, point_of(room, body, &now));
@@ -166,11 +166,11 @@ static double price(const pal_hub_room *room, double ms, double step_s)
 }
 
 /* a neighbour's ms is what a step as it is now would take: one of half the length is in there twice already */
-static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *from, const pal_setting *now,
-                          pal_wire_neighbour *to)
+static void put_neighbour(const pal_hub_room *room, const pal_measured_configuration *from,
+                          const pal_configuration *now, pal_wire_neighbour *to)
 {
-    const pal_setting *s = &from->setting;
-    char text[PAL_SETTING_TEXT];
+    const pal_configuration *s = &from->setting;
+    char text[PAL_CONFIGURATION_TEXT];
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
     bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
@@ -184,21 +184,21 @@ static void put_neighbour(const pal_hub_room *room, const pal_priced_setting *fr
              : step      ? "step"
              : tolerance ? "tolerance"
                          : "solver");
-    pal_plain_text(to->label, sizeof to->label, pal_setting_text(s, text));
+    pal_plain_text(to->label, sizeof to->label, pal_configuration_text(s, text));
 }
 
-static void put_estimate(const pal_hub_room *room, const pal_estimate *from, const pal_setting *now,
+static void put_estimate(const pal_hub_room *room, const pal_estimate *from, const pal_configuration *now,
                          pal_wire_estimate *to)
 {
     to->tick = from->tick, to->age_s = from->age_s;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
     if (isfinite(from->ms) && from->ms > 0) to->ms = price(room, from->ms, now->step_s);
-    to->most_m = known(from->most_m), to->error_m = known(from->error_m);
+    to->max_m = known(from->max_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m), to->zz_percent = known(from->zz_percent);
     to->locking = from->locking;
-    pal_plain_text(to->note, sizeof to->note, from->note);
+    pal_plain_text(to->diag, sizeof to->diag, from->diag);
     for (int i = 0; i < from->n_neighbour && i < PAL_WIRE_NEIGHBOUR_MAX; i++)
         put_neighbour(room, &from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
 }
@@ -211,15 +211,15 @@ static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
     room->told_far = true;
     pal_log(PAL_LOG_WARN, "accuracy",
             "%s: the estimate is %.3g mm at %.3g mm moved, beyond the %.3g mm that the scene asks for", e->body,
-            1e3 * e->error_m, 1e3 * e->most_m, 1e3 * asked);
+            1e3 * e->error_m, 1e3 * e->max_m, 1e3 * asked);
 }
 
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
 {
     pal_wire_estimate *out = &hub->control->estimate;
     pal_estimate estimate;
-    pal_setting now;
-    char text[PAL_SETTING_TEXT];
+    pal_configuration now;
+    char text[PAL_CONFIGURATION_TEXT];
     int b = 0;
     while (b < c->room->stream->n_part && !c->estimate_due[b]) b++;
     if (b == c->room->stream->n_part) return NULL;
@@ -227,15 +227,15 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_ESTIMATE;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
-    pal_setting_of(pal_session_scene(c->room->session), b, &now);
-    pal_plain_text(out->setting, sizeof out->setting, pal_setting_text(&now, text));
+    pal_configuration_of(pal_session_scene(c->room->session), b, &now);
+    pal_plain_text(out->setting, sizeof out->setting, pal_configuration_text(&now, text));
     out->point = point_of(c->room, b, &now);
     /* until there is an estimate; asleep a step costs nothing that a setting could be judged by */
     const pal_frame *f = c->room->stream->frame;
     bool awake = !f || b >= f->n_part || !f->part[b].asleep;
     bool known_ms = awake && c->room->stream->step_ms > 0;
     out->ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
-    out->age_s = out->most_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
+    out->age_s = out->max_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
         out->zz_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     tell_far(c->room, out);

@@ -60,11 +60,12 @@ typedef struct pal_hub_room {
     pal_material material[PAL_BODY_MAX]; /* as last asked for */
     /* steps of which nothing was shown because nobody was here; tick and OUTPUT runs when they were counted last */
     uint64_t n_unwatched, seen_tick, seen_output;
-    bool left_alone;                   /* nobody was here then */
-    int n_estimate[PAL_BODY_MAX];      /* clients that look at an estimate */
-    bool told_estimate[PAL_BODY_MAX];  /* the session knows that some do */
-    double step_s;                     /* of the scene as it was opened: what all prices are for */
-    const pal_priced_setting *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
+    bool left_alone;                  /* nobody was here then */
+    int n_estimate[PAL_BODY_MAX];     /* clients that look at an estimate */
+    bool told_estimate[PAL_BODY_MAX]; /* the session knows that some do */
+    double step_s;                    /* of the scene as it was opened: what all prices are for */
+    const pal_measured_configuration
+        *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
     int n_setting, setting_body;
     double reference_m; /* the study's reference's own error; NaN: not known */
     bool told_far;      /* that an estimate is beyond what the scene asks for */
@@ -137,7 +138,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: no
 /* the errors that clients are shown of the setting that a body has (its estimate's, else its study's) and of the one
  * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown. Neither of a
  * body whose estimate is now older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since */
-void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_setting *to, double *now_m,
+void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_configuration *to, double *now_m,
                           double *then_m);
 /* hub_plan.c */
 void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out);

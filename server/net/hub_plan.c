@@ -20,15 +20,15 @@ static int body_of(const pal_session *session, const char *name)
 
 /* rows of the plan as the session was opened, as hello and topology name them */
 static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
-                          char (*why)[PAL_WIRE_WHY_BYTES], double *fixed)
+                          char (*reason)[PAL_WIRE_WHY_BYTES], double *fixed)
 {
     int n = pal_session_rows(session);
     uint32_t n_row = 0;
     for (int r = 0; r < n && r < PAL_WIRE_ROW_MAX; r++, n_row++) {
-        pal_row_info row;
+        pal_component_info row;
         pal_session_row(session, r, &row);
         pal_plain_text(name[r], PAL_WIRE_NAME_BYTES, row.name);
-        pal_plain_text(why[r], PAL_WIRE_WHY_BYTES, row.why);
+        pal_plain_text(reason[r], PAL_WIRE_WHY_BYTES, row.reason);
         part[r] = body_of(session, row.body);
         fixed[r] = row.fixed || part[r] < 0;
     }
@@ -54,11 +54,11 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
     int n = pal_session_rows(room->session), n_found = 0;
     bool same = n == f->n_row && !room->own;
     for (int r = 0, at = 0; r < n; r++) {
-        pal_row_info row;
+        pal_component_info row;
         int i = at;
         pal_session_row(room->session, r, &row);
         int body = body_of(room->session, row.body);
-        while (i < f->n_row && (strcmp(f->row_name[i], row.name) || f->row_body[i] != body)) i++;
+        while (i < f->n_row && (strcmp(f->component_name[i], row.name) || f->component_body[i] != body)) i++;
         if (i < f->n_row) {
             at = i + 1, n_found++;
         } else if (w->n_off < PAL_WIRE_ROW_MAX) {
@@ -69,8 +69,8 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
     /* as they are now, when that is not the plan of hello, or when hello spoke of a session that has been replaced */
     if (same && n_found == n) return;
     for (int r = 0; r < f->n_row; r++) {
-        pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->row_name[r]);
-        w->row_part[w->n_row_part++] = f->row_body[r];
+        pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
+        w->row_part[w->n_row_part++] = f->component_body[r];
     }
 }
 
@@ -85,7 +85,7 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
                                     .asleep = part->asleep,
                                     .n_rescue = part->n_rescue,
                                     .rescue_ms = (double)part->rescue_ns * 1e-6};
-        if (part->frozen) pal_plain_text(to->why, sizeof to->why, part->why);
+        if (part->frozen) pal_plain_text(to->reason, sizeof to->reason, part->reason);
         w->frozen |= part->frozen;
         w->n_state += part->frozen || part->asleep || part->n_rescue > 0;
     }
@@ -145,11 +145,11 @@ static void note_asked(pal_client *c)
 void pal_hub_row_answer(pal_hub *hub, pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (!c->row_until_ns || !f) return;
     bool refused = f->n_refused > c->row_refused;
-    if (refused) pal_session_last_note(c->room->session, &note);
-    if (note.text[0]) pal_hub_complain(hub, c, "refused", "row: %s", note.text);
+    if (refused) pal_session_last_note(c->room->session, &diag);
+    if (diag.text[0]) pal_hub_complain(hub, c, "refused", "row: %s", diag.text);
     if (refused || pal_clock_ns() > c->row_until_ns) c->row_until_ns = 0;
 }
 

@@ -300,7 +300,7 @@ static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_or
 static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pal_wire_order *order)
 {
     pal_hub_hand *h = &hub->works->hand[c->room - hub->room][tool], next = *h;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = body, .slot = tool};
     pal_brush *b = &command.brush;
     const char *verb = order->verb;
@@ -312,10 +312,10 @@ static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pa
     /* one hand is on one body */
     pal_command before = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = tool};
     if (h->brush.kind != PAL_BRUSH_NONE && h->body != body) (void)pal_session_command(c->room->session, &before);
-    pal_err err = b->kind == PAL_BRUSH_NONE ? PAL_ERR_OK : pal_brush_check(b, &note);
+    pal_err err = b->kind == PAL_BRUSH_NONE ? PAL_ERR_OK : pal_brush_check(b, &diag);
     if (!err) err = pal_session_command(c->room->session, &command);
     if (err) {
-        pal_hub_complain(hub, c, "refused", "%s: %s", verb, note.text[0] ? note.text : pal_err_text(err));
+        pal_hub_complain(hub, c, "refused", "%s: %s", verb, diag.text[0] ? diag.text : pal_err_text(err));
         return;
     }
     *h = next;
@@ -327,12 +327,12 @@ static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pa
 
 bool pal_hub_sculpt_read(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_work *to, int *body)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     *body = find_body(hub, c, order);
     if (*body < 0) return false;
     pal_hub_place *at = &hub->works->place[c->room - hub->room][*body];
-    if (!at->sculptor && pal_sculptor_create(pal_session_scene(c->room->session), *body, &note, &at->sculptor)) {
-        pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, note.text);
+    if (!at->sculptor && pal_sculptor_create(pal_session_scene(c->room->session), *body, &diag, &at->sculptor)) {
+        pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, diag.text);
         return false;
     }
     to->sculptor = at->sculptor;

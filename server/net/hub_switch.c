@@ -47,11 +47,11 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_orde
 }
 
 /* the present setting with other numbers; false: complained */
-static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_setting *to)
+static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_configuration *to)
 {
     const pal_wire_arg *size = pal_hub_arg(order, "size"), *step = pal_hub_arg(order, "step_ms"),
                        *tolerance = pal_hub_arg(order, "tolerance");
-    pal_setting_of(pal_session_scene(c->room->session), body, to);
+    pal_configuration_of(pal_session_scene(c->room->session), body, to);
     if (size && !(size->value >= -1 && size->value <= 10000 && size->value == floor(size->value))) {
         pal_hub_complain(hub, c, "args", "knob: size %g is no number of voxels or levels", size->value);
         return false;
@@ -92,9 +92,9 @@ bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_order *orde
 /* what jumped, against what was promised */
 static void put_jump(const pal_hub *hub, const pal_work *work, double change, pal_wire_answer *a)
 {
-    const pal_switch_report *r = &work->report;
-    double bound_m = work->now_m + work->then_m, frame_mm = 1e3 * r->frame_move_m, most_mm = 1e3 * r->most_move_m;
-    bool far = r->most_move_m > bound_m + hub->error_m;
+    const pal_refine_history *r = &work->report;
+    double bound_m = work->now_m + work->then_m, frame_mm = 1e3 * r->frame_move_m, most_mm = 1e3 * r->max_move_m;
+    bool far = r->max_move_m > bound_m + hub->error_m;
     size_t n = strlen(a->text), room = sizeof a->text - n;
     if (isnan(bound_m))
         snprintf(a->text + n, room, "moves %.3g mm, %.3g mm a frame (no bound: no error is shown of both settings)",
@@ -105,7 +105,7 @@ static void put_jump(const pal_hub *hub, const pal_work *work, double change, pa
     pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
     pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
     pal_hub_answer_arg(a, "energy_percent", change);
-    pal_hub_answer_arg(a, "most_move_m", r->most_move_m);
+    pal_hub_answer_arg(a, "most_move_m", r->max_move_m);
     pal_hub_answer_arg(a, "body_move_m", r->body_move_m);
     pal_hub_answer_arg(a, "frame_move_m", r->frame_move_m);
     if (isnan(bound_m)) return;
@@ -117,19 +117,19 @@ static void put_jump(const pal_hub *hub, const pal_work *work, double change, pa
 void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_work *work)
 {
     const char *verb = hub->works->now.order.verb;
-    const pal_switch_report *r = &work->report;
-    char text[PAL_SETTING_TEXT];
-    pal_setting now;
+    const pal_refine_history *r = &work->report;
+    char text[PAL_CONFIGURATION_TEXT];
+    pal_configuration now;
     /* a body at rest has no energy but rounding */
     bool any = r->energy_before_J > 1e-15;
     double change = any ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
     int n_rehearsed;
     double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns),
            stood_ms = 1e3 * pal_session_stood_s(c->room->session, &n_rehearsed);
-    pal_setting_of(pal_session_scene(c->room->session), work->body, &now);
+    pal_configuration_of(pal_session_scene(c->room->session), work->body, &now);
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
     snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms, stood still for %.0f ms; energy %+.2f %%%s, ", verb,
-             pal_setting_text(&now, text), made_ms, stood_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
+             pal_configuration_text(&now, text), made_ms, stood_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
     put_jump(hub, work, change, a);
     if (hub->works->n_brush_over > 0) {
         size_t n = strlen(a->text);

@@ -132,7 +132,7 @@ static bool take_over(pal_hub *hub, pal_hub_works *s, pal_work *work)
 {
     pal_hub_room *room = s->now.room;
     pal_waste waste = {.stream = room->stream, .session = room->session};
-    work->err = pal_session_go_on(work->next, room->session, &work->note);
+    work->err = pal_session_go_on(work->next, room->session, &work->diag);
     if (work->err) return false;
     pal_stream_follow(work->stream, room->stream);
     room->stream = work->stream, room->session = work->next;
@@ -171,9 +171,9 @@ static void finish(pal_hub *hub, pal_hub_works *s, pal_work *work)
         if (c && work->kind == PAL_WORK_SWITCH) pal_hub_switch_answer(hub, c, work);
         if (c && work->kind == PAL_WORK_SCULPT) pal_hub_sculpt_answer(hub, c, work);
     } else {
-        const char *verb = s->now.order.verb, *why = work->note.text[0] ? work->note.text : pal_err_text(work->err);
-        bool named = !strncmp(why, verb, strlen(verb)); /* edits of cells say it themselves */
-        if (c) pal_hub_complain(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : verb, why);
+        const char *verb = s->now.order.verb, *reason = work->diag.text[0] ? work->diag.text : pal_err_text(work->err);
+        bool named = !strncmp(reason, verb, strlen(verb)); /* edits of cells say it themselves */
+        if (c) pal_hub_complain(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : verb, reason);
     }
     pal_work_free(work);
 }

@@ -61,7 +61,7 @@ static void wake_due(lws_sorted_usec_list_t *timer)
     if (loop->events.wake) loop->events.wake(loop->events.user);
 }
 
-static pal_err open_context(pal_loop *loop, int most_socket, pal_note *note)
+static pal_err open_context(pal_loop *loop, int most_socket, pal_diagnostic *diag)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
@@ -74,22 +74,22 @@ static pal_err open_context(pal_loop *loop, int most_socket, pal_note *note)
     info.max_http_header_pool = (unsigned short)(most_socket < 4096 ? most_socket : 4096);
     info.timeout_secs = 5;
     loop->context = lws_create_context(&info);
-    if (!loop->context) return pal_note_set(note, PAL_ERR_IO, "the network context could not be made");
+    if (!loop->context) return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not be made");
     /* requests are matched to vhosts by port: this one must not look like a server */
     info.port = CONTEXT_PORT_NO_LISTEN;
     info.vhost_name = "wake";
     info.protocols = wake_protocols;
     if (!lws_create_vhost(loop->context, &info))
-        return pal_note_set(note, PAL_ERR_IO, "the network context has no wake");
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context has no wake");
     return PAL_ERR_OK;
 }
 
-pal_err pal_loop_create(bool sockets, int most_socket, pal_note *note, pal_loop **out)
+pal_err pal_loop_create(bool sockets, int most_socket, pal_diagnostic *diag, pal_loop **out)
 {
     pal_loop *loop = calloc(1, sizeof *loop);
     if (!loop) return PAL_ERR_MEMORY;
     if (sockets) {
-        pal_err err = open_context(loop, most_socket, note);
+        pal_err err = open_context(loop, most_socket, diag);
         if (err) return pal_loop_destroy(loop), err;
         lws_sul_schedule(loop->context, 0, &loop->tick_timer, tick_due, PAL_LOOP_TICK_NS / 1000);
     }

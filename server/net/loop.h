@@ -19,7 +19,7 @@ typedef struct pal_loop_events {
 } pal_loop_events;
 
 /* sockets: false makes a loop driven by pal_loop_turn; most_socket bounds the descriptors of the context. [load] */
-pal_err pal_loop_create(bool sockets, int most_socket, pal_note *note, pal_loop **out);
+pal_err pal_loop_create(bool sockets, int most_socket, pal_diagnostic *diag, pal_loop **out);
 /* closes every socket; roads then hear of their peers for the last time, and may be closed. [load] */
 void pal_loop_shut(pal_loop *loop);
 void pal_loop_destroy(pal_loop *loop);                               /* after its roads; NULL is fine. [load] */

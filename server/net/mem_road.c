@@ -8,7 +8,7 @@
 struct pal_mem_peer {
     pal_peer peer; /* first: the road's record is found from it */
     pal_transport *road;
-    pal_packet *held; /* what receive returned last */
+    pal_packet *fixed; /* what receive returned last */
     bool told, closed;
     pal_mem_peer *next;
 };
@@ -18,10 +18,10 @@ struct pal_transport {
     pal_mem_peer *first;
 };
 
-static pal_err mem_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_note *note,
+static pal_err mem_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
                         pal_transport **out)
 {
-    (void)loop, (void)url, (void)note;
+    (void)loop, (void)url, (void)diag;
     pal_transport *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
     t->events = *events;
@@ -80,7 +80,7 @@ void pal_mem_leave(pal_mem_peer *peer)
     while (*at != peer) at = &(*at)->next;
     *at = peer->next;
     tell_closed(peer);
-    pal_packet_drop(peer->held);
+    pal_packet_drop(peer->fixed);
     free(peer);
 }
 
@@ -97,9 +97,9 @@ void pal_mem_send(pal_mem_peer *peer, const void *bytes, size_t n_byte, bool tex
 const pal_packet *pal_mem_receive(pal_mem_peer *peer)
 {
     peer->told = false;
-    pal_packet_replace(&peer->held, NULL);
-    if (!peer->peer.drop_code) peer->held = peer->road->events.next(peer->road->events.user, &peer->peer);
-    return peer->held;
+    pal_packet_replace(&peer->fixed, NULL);
+    if (!peer->peer.drop_code) peer->fixed = peer->road->events.next(peer->road->events.user, &peer->peer);
+    return peer->fixed;
 }
 
 void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply)

@@ -25,12 +25,12 @@ static void valid(const pal_places *s, const int32_t from[3], uint32_t tri[3])
     for (int c = 0; c < 3; c++) tri[c] = good ? (uint32_t)from[c] : 0;
 }
 
-pal_err pal_places_make(int part, uint32_t epoch, const pal_shown *shown, pal_note *note, pal_places **out)
+pal_err pal_places_make(int part, uint32_t epoch, const pal_shown *shown, pal_diagnostic *diag, pal_places **out)
 {
     if ((uint32_t)shown->n_tri > PAL_PATCH_PLACE_MAX)
-        return pal_note_set(note, PAL_ERR_BUDGET,
-                            "part %s: %d triangles on its finest level, %u of a body that adapts can be streamed",
-                            shown->name, shown->n_tri, PAL_PATCH_PLACE_MAX);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                                  "part %s: %d triangles on its finest level, %u of a body that adapts can be streamed",
+                                  shown->name, shown->n_tri, PAL_PATCH_PLACE_MAX);
     pal_places *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     s->part = (uint16_t)part;

@@ -32,7 +32,7 @@ typedef struct pal_places {
 } pal_places;
 
 /* copies the table of the shown part, as in its asset. BUDGET: more places than can be streamed; MEMORY */
-pal_err pal_places_make(int part, uint32_t epoch, const pal_shown *shown, pal_note *note, pal_places **out);
+pal_err pal_places_make(int part, uint32_t epoch, const pal_shown *shown, pal_diagnostic *diag, pal_places **out);
 void pal_places_free(pal_places *places); /* NULL is fine */
 /* takes in a frame's table [n_place][3]; nothing is compared when the revision is the last one's. true: it changed.
  * Corners that are no vertex are taken as an empty place */

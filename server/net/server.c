@@ -77,51 +77,51 @@ static bool is_address(const char *listen)
     return inet_pton(AF_INET, listen, bytes) == 1 || inet_pton(AF_INET6, listen, bytes) == 1;
 }
 
-static pal_err make_url(const pal_server_options *options, char *url, size_t cap, pal_note *note)
+static pal_err make_url(const pal_server_options *options, char *url, size_t cap, pal_diagnostic *diag)
 {
     const char *listen = options->listen && options->listen[0] ? options->listen : "127.0.0.1";
     if (!strcmp(listen, "localhost")) listen = "127.0.0.1";
     if (!is_address(listen))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port",
-                            listen);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port", listen);
     if (!options->allow_remote && !is_loopback(listen))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "listening on %s lets other machines in, without password or encryption: add "
-                            "--allow-remote if that is meant",
-                            listen);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "listening on %s lets other machines in, without password or encryption: add "
+                                  "--allow-remote if that is meant",
+                                  listen);
     snprintf(url, cap, strchr(listen, ':') ? "ws://[%.80s]:%d%s" : "ws://%.80s:%d%s", listen, options->port,
              options->allow_remote ? "?hosts=any" : "");
     return PAL_ERR_OK;
 }
 
 static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_session **session, int n_session,
-                          pal_note *note)
+                          pal_diagnostic *diag)
 {
     char url[160];
     pal_hub_options hub = {.error_m = options->error_m,
                            .most_clients = options->most_clients > 0 ? options->most_clients : 200};
     pal_peer_events events;
-    PAL_TRY(make_url(options, url, sizeof url, note));
-    if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, note, &s->site));
+    PAL_TRY(make_url(options, url, sizeof url, diag));
+    if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
     hub.site = s->site;
     hub.setting = options->setting, hub.n_setting = options->n_setting, hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     /* besides the clients: page loads, and what lws needs itself */
-    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, note, &s->loop));
-    PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, note, &s->hub));
+    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, diag, &s->loop));
+    PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
-    return s->road->open(s->loop, url, &events, note, &s->transport);
+    return s->road->open(s->loop, url, &events, diag, &s->transport);
 }
 
-pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_note *note,
+pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out)
 {
-    if (n_session < 1) return pal_note_set(note, PAL_ERR_REFUSED, "a server needs a session");
+    if (n_session < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     s->road = options->road && !strcmp(options->road, pal_mem_road.scheme) ? &pal_mem_road : &pal_ws_road;
-    pal_err err = open_parts(s, options, session, n_session, note);
+    pal_err err = open_parts(s, options, session, n_session, diag);
     if (err) return pal_server_close(s), err;
     *out = s;
     return PAL_ERR_OK;

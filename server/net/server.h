@@ -3,7 +3,7 @@
 #ifndef PAL_NET_SERVER_H
 #define PAL_NET_SERVER_H
 #include "server/session/session.h"
-#include "server/sim/core/setting.h"
+#include "server/sim/core/configuration.h"
 
 typedef struct pal_server pal_server;
 
@@ -17,13 +17,13 @@ typedef struct pal_server_options {
     const char *road;          /* "ws" (default) or "mem" (tests)                                           */
     /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_setting 0: no study */
-    const pal_priced_setting *const *setting; /* [n_session][n_setting] */
-    const int *n_setting, *setting_body;      /* [n_session]            */
-    const double *reference_m;                /* error of each study's own reference [n_session]; NULL: not known */
+    const pal_measured_configuration *const *setting; /* [n_session][n_setting] */
+    const int *n_setting, *setting_body;              /* [n_session]            */
+    const double *reference_m; /* error of each study's own reference [n_session]; NULL: not known */
 } pal_server_options;
 
 /* REFUSED: address needs allow_remote, port in use (the sentence names it); borrows sessions until close. [load] */
-pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_note *note,
+pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out);
 /* the wake callback that sessions are opened with: user is a pal_server_gate, made before the sessions because they
  * start before the server exists; waking an unconnected gate does nothing. A server that closes disconnects its gate

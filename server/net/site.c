@@ -56,18 +56,18 @@ static bool good_path(const char *path)
     return true;
 }
 
-pal_err pal_site_open(const char *folder, pal_note *note, pal_site **out)
+pal_err pal_site_open(const char *folder, pal_diagnostic *diag, pal_site **out)
 {
     pal_site *site = calloc(1, sizeof *site);
     pal_site_file index;
     if (!site) return PAL_ERR_MEMORY;
     if (!realpath(folder, site->root)) {
         free(site);
-        return pal_note_set(note, PAL_ERR_IO, "the viewer's folder %s cannot be opened", folder);
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the viewer's folder %s cannot be opened", folder);
     }
     if (!pal_site_get(site, "/", &index)) {
         free(site);
-        return pal_note_set(note, PAL_ERR_IO, "the viewer's folder %s has no index.html", folder);
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the viewer's folder %s has no index.html", folder);
     }
     *out = site;
     return PAL_ERR_OK;

@@ -17,7 +17,7 @@ typedef struct pal_site_file {
 } pal_site_file;
 
 /* IO: not a folder, or no index.html in it; copies folder. [load] */
-pal_err pal_site_open(const char *folder, pal_note *note, pal_site **out);
+pal_err pal_site_open(const char *folder, pal_diagnostic *diag, pal_site **out);
 void pal_site_close(pal_site *site); /* NULL is fine */
 /* path as in the request, decoded, from the first slash; false: no such file */
 bool pal_site_get(pal_site *site, const char *path, pal_site_file *out);

@@ -28,14 +28,14 @@ struct pal_stream_coder {
     int n_row; /* of the last frame */
 };
 
-static pal_err refuse(pal_note *note, int refusal, const char *part, const char *what)
+static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const char *what)
 {
-    return pal_note_set(note, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED, "part %s: %s: %s", part,
-                        what, pal_refusal_text(refusal));
+    return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED, "part %s: %s: %s",
+                              part, what, pal_refusal_text(refusal));
 }
 
 /* asset and encoders of one part */
-static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_note *note)
+static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_diagnostic *diag)
 {
     pal_stream_part *part = &s->part[index];
     pal_frame_order *order = NULL;
@@ -51,12 +51,12 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
                                        (const uint32_t *)shown->parent, (const uint32_t *)shown->coarse_tri,
                                        (uint32_t)shown->n_coarse_tri, &order)
             : pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
-    if (refusal) return refuse(note, refusal, shown->name, "no vertex order");
+    if (refusal) return refuse(diag, refusal, shown->name, "no vertex order");
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
-    if (refusal) err = refuse(note, refusal, shown->name, "no asset");
+    if (refusal) err = refuse(diag, refusal, shown->name, "no asset");
     for (int t = 0; !err && t < PAL_STREAM_TIER; t++) {
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->coder->encoder[index][t]);
-        if (refusal) err = refuse(note, refusal, shown->name, "no encoder");
+        if (refusal) err = refuse(diag, refusal, shown->name, "no encoder");
     }
     if (!err && !(part->asset = pal_packet_create(bytes, n_byte, false))) err = PAL_ERR_MEMORY;
     if (!err) {
@@ -68,7 +68,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_n
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.adapts = shown->adapts;
         part->info.sculpts = shown->face != NULL;
-        if (shown->adapts) err = pal_places_make(index, part->info.epoch, shown, note, &part->places);
+        if (shown->adapts) err = pal_places_make(index, part->info.epoch, shown, diag, &part->places);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_gives(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
@@ -88,7 +88,7 @@ static void widen_box(pal_stream *s, const pal_shown *shown)
     }
 }
 
-static pal_err open_parts(pal_stream *s, double error_m, pal_note *note)
+static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
 {
     uint32_t most = 0;
     double side = 0;
@@ -97,9 +97,9 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_note *note)
         pal_shown shown;
         pal_session_shown(s->session, p, &shown);
         if (shown.n_vertex < 1 || (uint32_t)shown.n_vertex > PAL_WIRE_VERTEX_MAX)
-            return pal_note_set(note, PAL_ERR_BUDGET, "part %s: %d shown vertices, 1 to %u can be streamed", shown.name,
-                                shown.n_vertex, PAL_WIRE_VERTEX_MAX);
-        PAL_TRY(open_part(s, p, &shown, note));
+            return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "part %s: %d shown vertices, 1 to %u can be streamed",
+                                      shown.name, shown.n_vertex, PAL_WIRE_VERTEX_MAX);
+        PAL_TRY(open_part(s, p, &shown, diag));
         widen_box(s, &shown);
         if (s->part[p].info.n_vertex > most) most = s->part[p].info.n_vertex;
     }
@@ -113,7 +113,7 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_note *note)
     return s->coder->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pal_stream **out)
+pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *diag, pal_stream **out)
 {
     pal_stream *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
@@ -124,9 +124,9 @@ pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pa
     s->coder = calloc(1, sizeof *s->coder);
     pal_err err = s->part && s->coder ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err && (s->n_part < 1 || s->n_part > PAL_BODY_MAX))
-        err = pal_note_set(note, PAL_ERR_REFUSED, "session %s shows %d parts, 1 to %d can be streamed", s->scene->name,
-                           s->n_part, PAL_BODY_MAX);
-    if (!err) err = open_parts(s, error_m, note);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "session %s shows %d parts, 1 to %d can be streamed",
+                                 s->scene->name, s->n_part, PAL_BODY_MAX);
+    if (!err) err = open_parts(s, error_m, diag);
     if (err) return pal_stream_close(s), err;
     *out = s;
     return PAL_ERR_OK;
@@ -281,7 +281,7 @@ static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
     if (packet) pal_packet_replace(&s->tools, packet);
 }
 
-static void copy_patch(pal_wire_patch *to, const pal_patch *from, const double origin[3])
+static void copy_patch(pal_wire_patch *to, const pal_contact_patch *from, const double origin[3])
 {
     double p[3];
     for (int i = 0; i < 3; i++) p[i] = from->point_m[i] - origin[i];
@@ -316,8 +316,8 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
                              (s->frame->paused ? PAL_WIRE_HAPTIC_FREEZE : 0) | (frozen ? PAL_WIRE_HAPTIC_FORCE_OFF : 0),
                          .stamp_us = clock_ns / 1000,
                          .frame_us = (uint32_t)(1e6 / pal_stream_rate_hz(s)),
-                         .has_grip = f->has_grip,
-                         .grip_b_N_s_m = (float)f->grip_b_Ns_m};
+                         .has_grasp = f->has_grasp,
+                         .grip_b_N_s_m = (float)f->grasp_b_Ns_m};
     if (echoes(f, tool)) {
         w.echo_stamp_us = f->pose.stamp_us;
         w.echo_seq = f->pose.seq;
@@ -326,14 +326,14 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
     double x0[3];
     for (int c = 0; c < 3; c++) {
         w.origin_m[c] = f->pose.position_m[c];
-        x0[c] = f->has_grip ? f->grip_x0_m[c] - w.origin_m[c] : 0;
+        x0[c] = f->has_grasp ? f->grasp_x0_m[c] - w.origin_m[c] : 0;
     }
     copy_f3(w.f_ref_N, f->force_N);
-    copy_f3(w.grip_x0_m, x0);
-    copy_f3(w.grip_f0_N, f->grip_f0_N);
-    copy_f3(w.grip_k_N_m, f->grip_k_N_m);
-    copy_f3(w.grip_k_N_m + 3, f->grip_k_N_m + 3);
-    for (int k = 0; k < f->n_patch && k < PAL_PATCH_MAX; k++)
+    copy_f3(w.grasp_x0_m, x0);
+    copy_f3(w.grasp_f0_N, f->grasp_f0_N);
+    copy_f3(w.grasp_k_N_m, f->grasp_k_N_m);
+    copy_f3(w.grasp_k_N_m + 3, f->grasp_k_N_m + 3);
+    for (int k = 0; k < f->n_patch && k < PAL_CONTACT_PATCH_MAX; k++)
         copy_patch(&w.patch[w.n_patch++], &f->patch[k], w.origin_m);
     size_t n = pal_wire_put_haptic(s->coder->buffer, s->coder->cap, &w);
     pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->coder->buffer, n, false) : NULL);
@@ -360,7 +360,7 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
     if (frame->n_row != stream->coder->n_row) memset(stream->row_ms, 0, sizeof stream->row_ms);
     stream->coder->n_row = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) {
-        stream->row_ms[r] += 0.2 * (frame->row_ns[r] * 1e-6 - stream->row_ms[r]);
+        stream->row_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->row_ms[r]);
         /* less than the clock's tick is what is left of a mean of nothing */
         if (stream->row_ms[r] < 1e-6) stream->row_ms[r] = 0;
     }

@@ -51,14 +51,14 @@ typedef struct pal_stream {
     double box_min_m[3], box_max_m[3];
     double error_m;
     /* smoothed figures for status */
-    double row_ms[PAL_FRAME_ROWS], step_ms, step_rate_hz;
+    double row_ms[PAL_FRAME_COMPONENT_MAX], step_ms, step_rate_hz;
     pal_stream_count count;
     struct pal_stream_coder *coder; /* encoders and their buffer */
 } pal_stream;
 
 /* builds assets (about a second for 50,000 shown vertices) and encoders; borrows the session; error_m 0: 1/3000 of the
  * longest side of the box, at most 0.05 mm. [load] */
-pal_err pal_stream_open(pal_session *session, double error_m, pal_note *note, pal_stream **out);
+pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *diag, pal_stream **out);
 void pal_stream_close(pal_stream *stream); /* NULL is fine. [load] */
 
 /* a stream that has sent nothing yet goes on where another of the same session's bodies is: cycles and numbers count

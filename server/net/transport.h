@@ -47,7 +47,7 @@ typedef struct pal_peer_events {
 struct pal_transport_ops {
     const char *scheme; /* "ws" | "mem"; LCM peers come through clients/lcm_bridge, which speaks ws */
     /* url: "ws://127.0.0.1:8090" (port 0: any) | "mem://"; copies events. REFUSED names address and reason. [load] */
-    pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_note *note,
+    pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
                     pal_transport **out);
     int (*port)(const pal_transport *transport); /* 0: none */
     void (*ready)(pal_peer *peer);               /* next has something */

@@ -25,14 +25,14 @@ struct pal_workshop {
 static void make(pal_work *w)
 {
     if (w->kind == PAL_WORK_SWITCH)
-        w->err = pal_switch_prepare(w->scene, w->was, w->body, &w->setting, &w->note, &w->change);
+        w->err = pal_switch_prepare(w->scene, w->was, w->body, &w->setting, &w->diag, &w->change);
     else
-        w->err = pal_sculptor_prepare(w->sculptor, w->scene, &w->command, &w->note, &w->turn);
+        w->err = pal_sculptor_prepare(w->sculptor, w->scene, &w->command, &w->diag, &w->turn);
     if (!w->err) {
         const pal_scene *scene = w->change ? pal_switch_scene(w->change) : pal_sculpt_scene(w->turn);
-        w->err = pal_session_open_after(w->session, scene, &w->note, &w->next);
+        w->err = pal_session_open_after(w->session, scene, &w->diag, &w->next);
     }
-    if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->note, &w->stream);
+    if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->diag, &w->stream);
     if (!w->err && w->change) {
         pal_session_rehearse(w->next, w->session, pal_switch_look, pal_switch_rehearse, w->change);
         pal_session_carry_over(w->next, w->session, pal_switch_carry, w->change);

@@ -24,7 +24,7 @@ typedef struct pal_work {
     double *point_m; /* what the command points to, heap, or NULL */
     /* SWITCH */
     int body;
-    pal_setting setting;
+    pal_configuration setting;
     const pal_body_def *was; /* the body before its first switch               */
     pal_body_def *base;      /* the same where this is its first: heap, or NULL */
     double error_m;
@@ -32,12 +32,12 @@ typedef struct pal_work {
     uint64_t asked_ns, made_ns;
     /* made; when err is not 0 nothing is, and note says why */
     pal_err err;
-    pal_note note;
+    pal_diagnostic diag;
     pal_sculpt_turn *turn; /* SCULPT */
     pal_switch *change;    /* SWITCH */
     pal_session *next;
     pal_stream *stream;
-    pal_switch_report report; /* SWITCH */
+    pal_refine_history report; /* SWITCH */
 } pal_work;
 
 /* what has been replaced; each may be NULL */

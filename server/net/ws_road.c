@@ -370,24 +370,26 @@ static bool parse_url(const char *url, struct sockaddr_storage *address, socklen
     return inet_pton(AF_INET, host, &v4->sin_addr) == 1;
 }
 
-static pal_err open_socket(pal_transport *t, const char *url, pal_note *note)
+static pal_err open_socket(pal_transport *t, const char *url, pal_diagnostic *diag)
 {
     struct sockaddr_storage address;
     socklen_t n = 0;
     int on = 1;
     if (!parse_url(url, &address, &n, &t->any_host))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s is not an address to listen on", url);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s is not an address to listen on", url);
     t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
     t->listen_fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (t->listen_fd < 0) return pal_note_set(note, PAL_ERR_IO, "no socket: %s", strerror(errno));
+    if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
     (void)setsockopt(t->listen_fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     int n_text = (int)strcspn(url, "?");
     if (bind(t->listen_fd, (struct sockaddr *)&address, n) || listen(t->listen_fd, BACKLOG)) {
         if (errno == EADDRINUSE)
-            return pal_note_set(note, PAL_ERR_REFUSED,
-                                "%.*s is in use by another program; choose another port with --port (0: any free one)",
-                                n_text - 5, url + 5);
-        return pal_note_set(note, PAL_ERR_REFUSED, "cannot listen on %.*s: %s", n_text - 5, url + 5, strerror(errno));
+            return pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED,
+                "%.*s is in use by another program; choose another port with --port (0: any free one)", n_text - 5,
+                url + 5);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cannot listen on %.*s: %s", n_text - 5, url + 5,
+                                  strerror(errno));
     }
     n = sizeof address;
     if (getsockname(t->listen_fd, (struct sockaddr *)&address, &n)) return PAL_ERR_IO;
@@ -404,7 +406,7 @@ static void ws_close(pal_transport *transport)
     free(transport);
 }
 
-static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_note *note,
+static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
                        pal_transport **out)
 {
     struct lws_context_creation_info info;
@@ -413,7 +415,7 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
     t->loop = loop;
     t->events = *events;
     t->listen_fd = t->spare_fd = -1;
-    pal_err err = open_socket(t, url, note);
+    pal_err err = open_socket(t, url, diag);
     if (err) return ws_close(t), err;
     memset(&info, 0, sizeof info);
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
@@ -429,7 +431,7 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
     lws_sock_file_fd_type fd = {.filefd = t->listen_fd};
     if (!t->vhost || !lws_adopt_descriptor_vhost(t->vhost, LWS_ADOPT_RAW_FILE_DESC, fd, "palpate-listen", NULL)) {
         ws_close(t);
-        return pal_note_set(note, PAL_ERR_IO, "the network context could not listen");
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not listen");
     }
     t->adopted = true;
     *out = t;

@@ -15,7 +15,7 @@ enum { MOST_DRAW = 100 };
 typedef struct walk {
     const pal_anneal_options *o;
     pal_anneal_result *r;
-    pal_note *note;
+    pal_diagnostic *diag;
     int n, n_batch;
     double *best, *last;  /* points                               [n]           */
     double last_cost;     /* DBL_MAX: the walk has no point yet                 */
@@ -23,7 +23,7 @@ typedef struct walk {
     double *sensitivity;  /* s_i, 0: none                         [n]           */
     double *p, *cost;     /* points of a batch and their costs    [n_batch][n], [n_batch] */
     double t0, k_accept;  /* start temperature of acceptance, its count         */
-    double sum_temper[2]; /* |costs| of the first good samples: sum / n_temper, number */
+    double sum_temper[2]; /* |costs| of the first good samples: sum / n_temperature_sample, number */
     int64_t since_better, since_accepted, since_generated;
     bool ended;
 } walk;
@@ -31,14 +31,14 @@ typedef struct walk {
 void pal_anneal_default(pal_anneal_options *options)
 {
     *options = (pal_anneal_options){.n_start = 100,
-                                    .n_temper = 5,
+                                    .n_temperature_sample = 5,
                                     .n_batch = 8,
                                     .ratio_scale = 1e-5,
                                     .anneal_scale = 100,
                                     .cost_scale = 1,
                                     .reanneal_accepted = 100,
                                     .reanneal_generated = 10000,
-                                    .coldest = 1e-10,
+                                    .min_temperature_ratio = 1e-10,
                                     .difference = 1e-3,
                                     .enough = -DBL_MAX};
 }
@@ -48,20 +48,20 @@ static double rate(const pal_anneal_options *o)
     return -log(o->ratio_scale) * exp(-log(o->anneal_scale) / o->n_parameter);
 }
 
-static double cool(double c, int n, double k, double coldest)
+static double cool(double c, int n, double k, double min_temperature_ratio)
 {
-    return fmax(coldest, exp(-c * pow(k, 1.0 / n)));
+    return fmax(min_temperature_ratio, exp(-c * pow(k, 1.0 / n)));
 }
 
 /* the count at which T/T0 is the ratio */
-static double count_of(double c, int n, double ratio, double coldest)
+static double count_of(double c, int n, double ratio, double min_temperature_ratio)
 {
-    return pow(-log(fmin(1, fmax(coldest, ratio))) / c, n);
+    return pow(-log(fmin(1, fmax(min_temperature_ratio, ratio))) / c, n);
 }
 
-double pal_anneal_cooling(const pal_anneal_options *options, double k)
+double pal_anneal_temperature_ratio(const pal_anneal_options *options, double k)
 {
-    return cool(rate(options), options->n_parameter, k, options->coldest);
+    return cool(rate(options), options->n_parameter, k, options->min_temperature_ratio);
 }
 
 double pal_anneal_jump(double temperature, double u)
@@ -110,7 +110,7 @@ static void draw_candidate(const walk *w, int64_t number, int ahead, double *p)
     const double c = rate(o);
     uint64_t key = key_of(w, number), counter = 1;
     for (int i = 0; i < w->n; i++) {
-        double t = cool(c, w->n, count_at(w, i, ahead), o->coldest), range = o->high[i] - o->low[i];
+        double t = cool(c, w->n, count_at(w, i, ahead), o->min_temperature_ratio), range = o->high[i] - o->low[i];
         int draw = 0;
         do p[i] = w->last[i] + range * pal_anneal_jump(t, pal_random_unit(key, counter++));
         while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < MOST_DRAW);
@@ -132,7 +132,7 @@ static pal_err evaluate(walk *w, int m)
 /* how many of m evaluations the limit still allows */
 static int allowed(const walk *w, int64_t m)
 {
-    int64_t left = w->o->most_evaluation > 0 ? w->o->most_evaluation - w->r->n_evaluation : INT64_MAX;
+    int64_t left = w->o->max_evaluation > 0 ? w->o->max_evaluation - w->r->n_evaluation : INT64_MAX;
     if (m > w->n_batch) m = w->n_batch;
     return (int)(m < left ? m : left);
 }
@@ -156,7 +156,7 @@ static void enter(walk *w, int j, pal_anneal_step step)
     }
     step.best = r->best;
     if (o->step && !o->step(o->user, &step)) w->ended = true;
-    if (o->most_evaluation > 0 && r->n_evaluation >= o->most_evaluation) w->ended = true;
+    if (o->max_evaluation > 0 && r->n_evaluation >= o->max_evaluation) w->ended = true;
     if (o->enough > -DBL_MAX && r->best <= o->enough) w->ended = true;
     /* samples never stall the walk, unless none has a value */
     bool sampling = step.start && (r->best < DBL_MAX || r->n_evaluation - (o->first != NULL) < o->n_start);
@@ -167,8 +167,8 @@ static void enter(walk *w, int j, pal_anneal_step step)
 static void enter_start(walk *w, int j, bool sample)
 {
     double cost = w->cost[j];
-    if (sample && cost < DBL_MAX && w->sum_temper[1] < w->o->n_temper) {
-        w->sum_temper[0] += fabs(cost) / w->o->n_temper;
+    if (sample && cost < DBL_MAX && w->sum_temper[1] < w->o->n_temperature_sample) {
+        w->sum_temper[0] += fabs(cost) / w->o->n_temperature_sample;
         w->sum_temper[1]++;
     }
     if (cost < w->last_cost) {
@@ -198,7 +198,7 @@ static pal_err start(walk *w)
         }
     }
     w->since_better = 0;
-    w->t0 = w->sum_temper[1] > 0 ? w->sum_temper[0] * (o->n_temper / w->sum_temper[1]) : fabs(w->last_cost);
+    w->t0 = w->sum_temper[1] > 0 ? w->sum_temper[0] * (o->n_temperature_sample / w->sum_temper[1]) : fabs(w->last_cost);
     return PAL_ERR_OK;
 }
 
@@ -230,7 +230,7 @@ static pal_err probe(walk *w)
 
 static pal_err reanneal(walk *w)
 {
-    const double c = rate(w->o), coldest = w->o->coldest;
+    const double c = rate(w->o), min_temperature_ratio = w->o->min_temperature_ratio;
     double t = acceptance_temperature(w), most = 0;
     for (int i = 0; i < w->n; i++) w->k[i] = count_at(w, i, 0);
     w->since_accepted = w->since_generated = 0;
@@ -239,7 +239,8 @@ static pal_err reanneal(walk *w)
     for (int i = 0; i < w->n; i++) most = fmax(most, w->sensitivity[i]);
     for (int i = 0; i < w->n; i++)
         if (w->sensitivity[i] > 0)
-            w->k[i] = count_of(c, w->n, cool(c, w->n, w->k[i], coldest) * (most / w->sensitivity[i]), coldest);
+            w->k[i] = count_of(c, w->n, cool(c, w->n, w->k[i], min_temperature_ratio) * (most / w->sensitivity[i]),
+                               min_temperature_ratio);
     double last = w->last_cost, best = w->r->best, apart = fabs(last - best);
     w->t0 = fmin(w->t0, fmax(fmax(fabs(last), fabs(best)), apart));
     if (!(w->t0 > 0)) w->t0 = DBL_MIN;
@@ -281,44 +282,50 @@ static pal_err advance(walk *w)
     return due && !w->ended ? reanneal(w) : PAL_ERR_OK;
 }
 
-static pal_err check_box(const pal_anneal_options *o, pal_note *note)
+static pal_err check_box(const pal_anneal_options *o, pal_diagnostic *diag)
 {
     if (o->n_parameter < 1 || !o->low || !o->high)
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: %d parameters, wanted 1 at least", o->n_parameter);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: %d parameters, wanted 1 at least", o->n_parameter);
     for (int i = 0; i < o->n_parameter; i++) {
         double low = o->low[i], high = o->high[i];
         if (!(low < high) || !isfinite(high - low))
-            return pal_note_set(note, PAL_ERR_REFUSED,
-                                "annealing: parameter %d lies between %g and %g, which is no range", i, low, high);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "annealing: parameter %d lies between %g and %g, which is no range", i, low,
+                                      high);
         if (o->first && !(o->first[i] >= low && o->first[i] <= high))
-            return pal_note_set(note, PAL_ERR_REFUSED, "annealing: parameter %d begins at %g, outside of %g to %g", i,
-                                o->first[i], low, high);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "annealing: parameter %d begins at %g, outside of %g to %g", i, o->first[i], low,
+                                      high);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err check_numbers(const pal_anneal_options *o, pal_note *note)
+static pal_err check_numbers(const pal_anneal_options *o, pal_diagnostic *diag)
 {
-    if (o->n_start < 0 || o->n_temper < 1 || o->n_batch < 1 || o->n_batch > PAL_ANNEAL_MOST_BATCH)
-        return pal_note_set(
-            note, PAL_ERR_REFUSED,
+    if (o->n_start < 0 || o->n_temperature_sample < 1 || o->n_batch < 1 || o->n_batch > PAL_ANNEAL_MAX_BATCH)
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
             "annealing: n_start %d, n_temper %d, n_batch %d, wanted 0, 1 and 1 at least, n_batch at most %d",
-            o->n_start, o->n_temper, o->n_batch, (int)PAL_ANNEAL_MOST_BATCH);
+            o->n_start, o->n_temperature_sample, o->n_batch, (int)PAL_ANNEAL_MAX_BATCH);
     if (!(o->ratio_scale > 0 && o->ratio_scale < 1))
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: ratio_scale %g, wanted between 0 and 1", o->ratio_scale);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: ratio_scale %g, wanted between 0 and 1",
+                                  o->ratio_scale);
     if (!(o->anneal_scale > 0 && isfinite(o->anneal_scale) && rate(o) > 0 && isfinite(rate(o))))
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: anneal_scale %g, wanted above 0", o->anneal_scale);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: anneal_scale %g, wanted above 0", o->anneal_scale);
     if (!(o->cost_scale > 0 && o->cost_scale * rate(o) > 0 && isfinite(o->cost_scale * rate(o))))
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: cost_scale %g, wanted above 0", o->cost_scale);
-    if (!(o->coldest > 0 && o->coldest < 1))
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: coldest %g, wanted between 0 and 1", o->coldest);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: cost_scale %g, wanted above 0", o->cost_scale);
+    if (!(o->min_temperature_ratio > 0 && o->min_temperature_ratio < 1))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: coldest %g, wanted between 0 and 1",
+                                  o->min_temperature_ratio);
     if (!(o->difference > 0 && o->difference <= 0.5))
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: difference %g, wanted above 0 and at most 0.5",
-                            o->difference);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: difference %g, wanted above 0 and at most 0.5",
+                                  o->difference);
     if (isnan(o->enough) || !o->evaluate)
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: enough is no number, or there is nothing to evaluate");
-    if (o->most_evaluation <= 0 && o->stall <= 0 && !o->step)
-        return pal_note_set(note, PAL_ERR_REFUSED, "annealing: no limit of evaluations, no stall and no step: no end");
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "annealing: enough is no number, or there is nothing to evaluate");
+    if (o->max_evaluation <= 0 && o->stall <= 0 && !o->step)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "annealing: no limit of evaluations, no stall and no step: no end");
     return PAL_ERR_OK;
 }
 
@@ -326,26 +333,27 @@ static pal_err go(walk *w)
 {
     PAL_TRY(start(w));
     if (w->r->best == DBL_MAX)
-        return pal_note_set(w->note, PAL_ERR_NUMERIC, "annealing: none of %lld points had a value",
-                            (long long)w->r->n_evaluation);
+        return pal_diagnostic_set(w->diag, PAL_ERR_NUMERIC, "annealing: none of %lld points had a value",
+                                  (long long)w->r->n_evaluation);
     while (!w->ended) PAL_TRY(advance(w));
     return PAL_ERR_OK;
 }
 
-pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_note *note)
+pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_diagnostic *diag)
 {
     const pal_anneal_options *o = options;
     *result = (pal_anneal_result){.best = DBL_MAX};
-    PAL_TRY(check_box(o, note));
-    PAL_TRY(check_numbers(o, note));
-    walk w = {.o = o, .r = result, .note = note, .n = o->n_parameter, .n_batch = o->n_batch, .last_cost = DBL_MAX};
+    PAL_TRY(check_box(o, diag));
+    PAL_TRY(check_numbers(o, diag));
+    walk w = {.o = o, .r = result, .diag = diag, .n = o->n_parameter, .n_batch = o->n_batch, .last_cost = DBL_MAX};
     const size_t n = (size_t)w.n, batch = (size_t)w.n_batch;
     /* best, last, k, sensitivity and its centre; then the batch */
     double *memory = calloc(5 + batch, sizeof(double) * n);
     w.cost = calloc(batch, sizeof *w.cost);
     pal_err err = PAL_ERR_OK;
     if (!memory || !w.cost) {
-        err = pal_note_set(note, PAL_ERR_MEMORY, "annealing: no memory for %d points of %d parameters", w.n_batch, w.n);
+        err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "annealing: no memory for %d points of %d parameters", w.n_batch,
+                                 w.n);
     } else {
         w.best = memory;
         w.last = memory + n;

@@ -5,8 +5,8 @@
  * p_i + y (high_i - low_i) with y = sgn(u - 1/2) T_i ((1 + 1/T_i)^|2u - 1| - 1), drawn again until it lies in the box
  * (after 100 draws: anywhere in it); accepted when u < exp(-(E_new - E_last)/T_acc). Begins with n_start random
  * samples, of which the best is the first point, and goes on with samples until one has a value; T0_acc is the mean
- * |cost| of the first n_temper good samples, T_acc sinks by the same law with the count of accepted points. Costs that
- * are not finite or are DBL_MAX never enter a mean or a difference; they are never accepted.
+ * |cost| of the first n_temperature_sample good samples, T_acc sinks by the same law with the count of accepted points.
+ * Costs that are not finite or are DBL_MAX never enter a mean or a difference; they are never accepted.
  *
  * Re-annealing: s_i = |difference of the cost| for a step of parameter i, as a fraction of its range, from the best
  * point; T_i <- T_i s_max/s_i, at most T0_i, and k_i from it; a parameter whose s_i is 0 or has no value keeps its
@@ -31,7 +31,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { PAL_ANNEAL_MOST_BATCH = 4096 };
+enum { PAL_ANNEAL_MAX_BATCH = 4096 };
 
 /* one evaluation that the walk took, in its order; for trajectories (paper B Fig 8) */
 typedef struct pal_anneal_step {
@@ -49,18 +49,18 @@ typedef struct pal_anneal_options {
     const double *low, *high; /* [n_parameter], low < high, finite as their difference        */
     const double *first;      /* a point of the box, evaluated before the samples, or NULL    */
     uint64_t seed;
-    int n_start;             /* 100; may be 0                                                 */
-    int n_temper;            /* 5                                                             */
-    int n_batch;             /* candidates evaluated at once, to PAL_ANNEAL_MOST_BATCH: 8     */
-    int64_t most_evaluation; /* of the walk; <= 0: no limit                                   */
-    double ratio_scale;      /* 1e-5: Temperature_Ratio_Scale, in (0, 1)                      */
-    double anneal_scale;     /* 100: Temperature_Anneal_Scale, > 0                            */
-    double cost_scale;       /* 1: Cost_Parameter_Scale_Ratio, > 0                            */
-    int reanneal_accepted;   /* points accepted since the last re-annealing: 100; 0: never    */
-    int reanneal_generated;  /* candidates since then: 10000; 0: never                        */
-    double coldest;          /* 1e-10: least T/T0 of a parameter, in (0, 1)                   */
-    double difference;       /* 1e-3 of the range, in (0, 0.5]: step of the sensitivities     */
-    double enough;           /* ends when the best cost is at most this; -DBL_MAX: never      */
+    int n_start;                  /* 100; may be 0                                                 */
+    int n_temperature_sample;     /* 5                                                             */
+    int n_batch;                  /* candidates evaluated at once, to PAL_ANNEAL_MAX_BATCH: 8     */
+    int64_t max_evaluation;       /* of the walk; <= 0: no limit                                   */
+    double ratio_scale;           /* 1e-5: Temperature_Ratio_Scale, in (0, 1)                      */
+    double anneal_scale;          /* 100: Temperature_Anneal_Scale, > 0                            */
+    double cost_scale;            /* 1: Cost_Parameter_Scale_Ratio, > 0                            */
+    int reanneal_accepted;        /* points accepted since the last re-annealing: 100; 0: never    */
+    int reanneal_generated;       /* candidates since then: 10000; 0: never                        */
+    double min_temperature_ratio; /* 1e-10: least T/T0 of a parameter, in (0, 1)                   */
+    double difference;            /* 1e-3 of the range, in (0, 0.5]: step of the sensitivities     */
+    double enough;                /* ends when the best cost is at most this; -DBL_MAX: never      */
     int64_t stall; /* ends after so many evaluations without a better one, counted from the last sample, or from the
                       beginning while no point has a value; 0: never */
     /* cost[i] of point p + i n_parameter for n <= n_batch points at once; DBL_MAX, not finite or not written: no
@@ -83,7 +83,7 @@ typedef struct pal_anneal_result {
 
 void pal_anneal_default(pal_anneal_options *options); /* the numbers above; everything else zero */
 /* exp(-c k^(1/D)), not below coldest: T/T0 of a parameter after k candidates; thread: any */
-double pal_anneal_cooling(const pal_anneal_options *options, double k);
+double pal_anneal_temperature_ratio(const pal_anneal_options *options, double k);
 /* y of the schedule for a uniform u in (0, 1) at temperature T in (0, 1]; thread: any */
 double pal_anneal_jump(double temperature, double u);
 
@@ -91,5 +91,5 @@ double pal_anneal_jump(double temperature, double u);
  * middle of the box. REFUSED, nothing evaluated, best_p as it was: a box that is none, a first point outside of it,
  * numbers outside of the ranges above, or a walk that nothing could end; NUMERIC: the walk ended before any point had
  * a value; MEMORY; what evaluate gives */
-pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_note *note);
+pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_diagnostic *diag);
 #endif

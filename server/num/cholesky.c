@@ -119,7 +119,7 @@ static void finish_bench(bench *b)
 }
 
 /* the lower triangle's columns, a point each (expand 1) or its three unknowns (expand 3) */
-static int64_t lay_columns(const pal_blocks *a, const int32_t *number, int expand, int *start, int *row)
+static int64_t lay_columns(const pal_block_matrix *a, const int32_t *number, int expand, int *start, int *row)
 {
     int64_t n = 0;
     int column = 0;
@@ -156,7 +156,7 @@ static cholmod_sparse sparse_of(int n, int64_t n_entry, int *start, int *row, do
 }
 
 /* the order of points with the fewest entries of the factor, as an order of unknowns [3 n_free] */
-static pal_err find_order(const pal_blocks *a, const int32_t *number, int n_free, int *order)
+static pal_err find_order(const pal_block_matrix *a, const int32_t *number, int n_free, int *order)
 {
     cholmod_common common;
     cholmod_factor *found = NULL;
@@ -189,7 +189,7 @@ static pal_err find_order(const pal_blocks *a, const int32_t *number, int n_free
 }
 
 /* a supernodal factor's pattern for the order found, and where each point went */
-static pal_err analyse(pal_cholesky *c, const pal_blocks *a, int32_t *number)
+static pal_err analyse(pal_cholesky *c, const pal_block_matrix *a, int32_t *number)
 {
     cholmod_common *common = &c->own.common;
     int *order = malloc(sizeof *order * 3 * (size_t)c->n_free);
@@ -218,7 +218,7 @@ static pal_err analyse(pal_cholesky *c, const pal_blocks *a, int32_t *number)
     return pal_panels_make((int)l->nsuper, l->super, l->pi, l->s, &c->panels);
 }
 
-static pal_err make(pal_cholesky *c, const pal_blocks *a, const uint8_t *held)
+static pal_err make(pal_cholesky *c, const pal_block_matrix *a, const uint8_t *fixed)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
@@ -226,7 +226,7 @@ static pal_err make(pal_cholesky *c, const pal_blocks *a, const uint8_t *held)
     c->place = malloc(sizeof *c->place * ((size_t)c->n + 1));
     if (!c->place) return PAL_ERR_MEMORY;
     int32_t *number = c->place;
-    for (int i = 0; i < c->n; i++) number[i] = held && held[i] ? -1 : c->n_free++;
+    for (int i = 0; i < c->n; i++) number[i] = fixed && fixed[i] ? -1 : c->n_free++;
     if (c->n_free == 0) return PAL_ERR_OK;
     c->n_entry = lay_columns(a, number, 3, NULL, NULL);
     if (c->n_entry > INT32_MAX || c->n_free > INT32_MAX / 3) return PAL_ERR_MEMORY;
@@ -239,13 +239,13 @@ static pal_err make(pal_cholesky *c, const pal_blocks *a, const uint8_t *held)
     pal_err err = analyse(c, a, number);
     pthread_mutex_unlock(&one_at_a_time);
     if (err) return err;
-    size_t n_work = (size_t)c->panels.most_row + PAL_PANEL_SLACK;
+    size_t n_work = (size_t)c->panels.max_row + PAL_PANEL_PADDING;
     c->y = calloc(3 * (size_t)c->n_free, sizeof(double));
     c->vector = calloc(n_work, sizeof(double));
     return c->y && c->vector ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_cholesky_create(const pal_blocks *a, const uint8_t *held, pal_cholesky **out)
+pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal_cholesky **out)
 {
     pal_cholesky *c = calloc(1, sizeof *c);
     if (!c) return PAL_ERR_MEMORY;
@@ -253,7 +253,7 @@ pal_err pal_cholesky_create(const pal_blocks *a, const uint8_t *held, pal_choles
     pthread_mutex_init(&c->lock, NULL);
     pthread_cond_init(&c->changed, NULL);
     start_bench(&c->own);
-    pal_err err = make(c, a, held);
+    pal_err err = make(c, a, fixed);
     if (err)
         pal_cholesky_destroy(c);
     else
@@ -287,7 +287,7 @@ void pal_cholesky_destroy(pal_cholesky *c)
 }
 
 /* copies the scaled values of a's lower triangle without held points; finds out whether they are finite */
-static pal_err take_values(const pal_cholesky *c, const pal_blocks *a, bench *b)
+static pal_err take_values(const pal_cholesky *c, const pal_block_matrix *a, bench *b)
 {
     if (!b->value) b->value = malloc(sizeof *b->value * (size_t)c->n_entry);
     if (!b->value) return PAL_ERR_MEMORY;
@@ -373,7 +373,7 @@ static pal_err factor_values(const pal_cholesky *c, bench *b, bool single, facto
     return err;
 }
 
-pal_err pal_cholesky_factor(pal_cholesky *c, const pal_blocks *a, bool single)
+pal_err pal_cholesky_factor(pal_cholesky *c, const pal_block_matrix *a, bool single)
 {
     if (pal_cholesky_refreshing(c)) return PAL_ERR_STATE;
     if (c->n_free == 0) {
@@ -465,7 +465,7 @@ static pal_err start_spare(pal_cholesky *c)
     return c->threaded ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_blocks *a)
+pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a)
 {
     if (pal_cholesky_refreshing(c) || !c->now.good) return PAL_ERR_STATE;
     if (c->n_free > 0) {

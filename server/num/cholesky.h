@@ -1,13 +1,14 @@
-/* Sparse Cholesky factors of pal_blocks matrices by CHOLMOD: the pattern is analysed once, values are factored as often
- * as wanted, on the caller's thread or on a spare one. Solves are our own (supernodal, no BLAS, no heap, no threads),
- * in double precision or, for preconditioning, with a single precision copy of the factor at half the memory traffic.
+/* Sparse Cholesky factors of pal_block_matrix matrices by CHOLMOD: the pattern is analysed once, values are factored as
+ * often as wanted, on the caller's thread or on a spare one. Solves are our own (supernodal, no BLAS, no heap, no
+ * threads), in double precision or, for preconditioning, with a single precision copy of the factor at half the memory
+ * traffic.
  *
  * Held points (rows and columns) are left out of the factor; solves give 0 there. A matrix that is not positive
  * definite or does not fit into memory is an error code, never an abort; the factor of before stays in use.
  * Thread: one at a time, except the spare thread's own work. */
 #ifndef PAL_NUM_CHOLESKY_H
 #define PAL_NUM_CHOLESKY_H
-#include "server/num/blocks.h"
+#include "server/num/block_matrix.h"
 
 #include <stdbool.h>
 
@@ -15,16 +16,16 @@ typedef struct pal_cholesky pal_cholesky;
 
 /* analyses the pattern of a (nested dissection or minimum degree, whichever gives less); held [n] may be NULL; the
  * pattern and held are copied. MEMORY. [load] */
-pal_err pal_cholesky_create(const pal_blocks *a, const uint8_t *held, pal_cholesky **out);
+pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal_cholesky **out);
 void pal_cholesky_destroy(pal_cholesky *c); /* joins the spare thread; NULL is fine */
 
 /* factor of a (same pattern), single: keep the single precision copy and drop the double one. NUMERIC: not positive
  * definite or not finite; MEMORY. The spare thread must not be at work (STATE). */
-pal_err pal_cholesky_factor(pal_cholesky *c, const pal_blocks *a, bool single);
+pal_err pal_cholesky_factor(pal_cholesky *c, const pal_block_matrix *a, bool single);
 /* x = A^-1 b, b [n][3] may be x. No heap call. STATE: there is no factor; NUMERIC: b is not finite */
 pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x);
 /* a second factor on a spare thread: copies the values of a and returns at once. STATE: one is under way */
-pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_blocks *a);
+pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a);
 /* takes the spare thread's factor into use. STATE: none was begun, or it is not ready and wait is false; NUMERIC,
  * MEMORY: it failed and the old one stays */
 pal_err pal_cholesky_adopt(pal_cholesky *c, bool wait);

@@ -1,7 +1,7 @@
 /* Cholesky factors in envelope storage. */
 #include "server/num/envelope.h"
 
-#include "server/num/conjugate.h"
+#include "server/num/conjugate_gradient.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -71,7 +71,7 @@ static int64_t find_rows(const graph *g, const int32_t *order, const int32_t *pl
     return start[g->n];
 }
 
-pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int64_t most_entry, pal_arena *arena,
+pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int64_t max_entry, pal_arena *arena,
                           pal_envelope *out)
 {
     const graph g = {n, start, point};
@@ -82,7 +82,7 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
     if (!err) {
         find_order(&g, place, order);
         for (int32_t i = 0; i < n; i++) place[order[i]] = i;
-        if (find_rows(&g, order, place, first, row) > most_entry) err = PAL_ERR_BUDGET;
+        if (find_rows(&g, order, place, first, row) > max_entry) err = PAL_ERR_BUDGET;
     }
     if (!err) {
         *out = (pal_envelope){.n = n, .order = PAL_NEW(arena, int32_t, 3 * (size_t)n)};
@@ -127,10 +127,10 @@ pal_err pal_envelope_factor(pal_envelope *e, const int32_t *start, const int32_t
         for (int32_t j = first; j < i; j++) {
             const double *other = e->value + e->start[j];
             const int32_t from = first > e->first[j] ? first : e->first[j];
-            const double sum = pal_sum_products(j - from, row + from - first, other + from - e->first[j]);
+            const double sum = pal_dot_product(j - from, row + from - first, other + from - e->first[j]);
             row[j - first] = (row[j - first] - sum) * other[j - e->first[j]];
         }
-        double pivot = row[i - first], left = pivot - pal_sum_products(i - first, row, row);
+        double pivot = row[i - first], left = pivot - pal_dot_product(i - first, row, row);
         /* a pivot of which only rounding is left is none */
         if (!(left > 1e-14 * pivot) || !isfinite(left)) return PAL_ERR_NUMERIC;
         row[i - first] = 1 / sqrt(left);
@@ -145,7 +145,7 @@ void pal_envelope_solve(pal_envelope *e, const double *b, double *x)
     for (int32_t i = 0; i < n; i++) {
         const int32_t first = e->first[i], length = i - first;
         const double *row = e->value + e->start[i], *from = b + 3 * (size_t)e->order[i];
-        for (int c = 0; c < 3; c++) y[c][i] = (from[c] - pal_sum_products(length, row, y[c] + first)) * row[length];
+        for (int c = 0; c < 3; c++) y[c][i] = (from[c] - pal_dot_product(length, row, y[c] + first)) * row[length];
     }
     for (int32_t i = n; i-- > 0;) {
         const int32_t first = e->first[i], length = i - first;

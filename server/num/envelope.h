@@ -20,8 +20,8 @@ typedef struct pal_envelope {
 } pal_envelope;
 
 /* pattern: entries of row i at point[start[i]] .. point[start[i + 1] - 1], symmetric, with the diagonal. BUDGET: the
- * envelope has more than most_entry entries, nothing was taken; MEMORY. [load] */
-pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int64_t most_entry, pal_arena *arena,
+ * envelope has more than max_entry entries, nothing was taken; MEMORY. [load] */
+pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int64_t max_entry, pal_arena *arena,
                           pal_envelope *out);
 /* factor of the values [start[n]] in that pattern; points with skip [n] above 0 (NULL: none) are left out. NUMERIC: not
  * positive definite or not finite, there is no factor */

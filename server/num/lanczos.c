@@ -1,7 +1,7 @@
 /* Lanczos' iteration. */
 #include "server/num/lanczos.h"
 
-#include "server/num/conjugate.h"
+#include "server/num/conjugate_gradient.h"
 
 #include <math.h>
 #include <string.h>
@@ -50,21 +50,21 @@ static void combine(pal_lanczos *l, const double *s)
 
 double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most)
 {
-    double a[PAL_LANCZOS_MOST], b[PAL_LANCZOS_MOST], s[PAL_LANCZOS_MOST] = {1}, beta = 0;
+    double a[PAL_LANCZOS_MAX], b[PAL_LANCZOS_MAX], s[PAL_LANCZOS_MAX] = {1}, beta = 0;
     const size_t n = (size_t)l->n;
     l->done = 0, l->ritz = l->residual = 0;
     if (!l->solve(l->user, l->z, l->w)) return NAN;
-    beta = sqrt(pal_sum_products(l->n, l->w, l->z));
+    beta = sqrt(pal_dot_product(l->n, l->w, l->z));
     if (beta == 0) return 0;
     while (l->done < most) {
         double *q = l->basis + (size_t)l->done * n;
         const double *before = l->done > 0 ? q - n : NULL;
         for (size_t i = 0; i < n; i++) q[i] = l->z[i] / beta, l->w[i] /= beta;
         if (!l->multiply(l->user, l->w, l->u)) return NAN;
-        double alpha = pal_sum_products(l->n, l->u, l->w);
+        double alpha = pal_dot_product(l->n, l->u, l->w);
         for (size_t i = 0; i < n; i++) l->z[i] = l->u[i] - alpha * q[i] - (before ? beta * before[i] : 0);
         if (!l->solve(l->user, l->z, l->w)) return NAN;
-        double next2 = pal_sum_products(l->n, l->w, l->z);
+        double next2 = pal_dot_product(l->n, l->w, l->z);
         if (!isfinite(alpha) || !isfinite(next2)) return NAN;
         beta = sqrt(fmax(next2, 0));
         a[l->done] = alpha, b[l->done] = beta;

@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-enum { PAL_LANCZOS_MOST = 32 };
+enum { PAL_LANCZOS_MAX = 32 };
 
 typedef struct pal_lanczos {
     int n;                                                      /* unknowns */
@@ -21,7 +21,7 @@ typedef struct pal_lanczos {
     double ritz, residual; /* out: the largest Ritz value, and how far from it an eigenvalue is at most             */
 } pal_lanczos;
 
-/* at least `least` and at most `most` (<= PAL_LANCZOS_MOST) iterations, until residual <= tolerance * ritz. Returns
+/* at least `least` and at most `most` (<= PAL_LANCZOS_MAX) iterations, until residual <= tolerance * ritz. Returns
  * ritz + residual; NaN: given up or not finite */
 double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most);
 #endif

@@ -8,18 +8,18 @@
 
 typedef struct pal_mass_operator {
     int n_point, n_entry;
-    int32_t *start, *point;  /* [n_point+1], [n_entry], ascending in a row; symmetric, every row has its diagonal */
-    double *mass_kg;         /* [n_entry], symmetric to the bit */
-    double *damping_kg_s;    /* [n_entry]; NULL: damping is 0 everywhere, or damping_1_s is not NaN */
-    double damping_1_s;      /* damping / mass where it is the same everywhere; else NaN */
-    double damping_most_1_s; /* the largest damping / mass of all samples */
+    int32_t *start, *point; /* [n_point+1], [n_entry], ascending in a row; symmetric, every row has its diagonal */
+    double *mass_kg;        /* [n_entry], symmetric to the bit */
+    double *damping_kg_s;   /* [n_entry]; NULL: damping is 0 everywhere, or damping_1_s is not NaN */
+    double damping_1_s;     /* damping / mass where it is the same everywhere; else NaN */
+    double damping_max_1_s; /* the largest damping / mass of all samples */
     /* scratch of the model that fills the values: points of an element, at most n_most; where they stand among them,
      * else -1; their shape functions at the Gauss points; room for damping_kg_s */
     int n_most;
-    int32_t *of_element; /* [n_most]      */
-    int32_t *local;      /* [n_point]     */
-    double *shape;       /* [n_most][64]  */
-    double *room_kg_s;   /* [n_entry]     */
+    int32_t *of_element;  /* [n_most]      */
+    int32_t *local;       /* [n_point]     */
+    double *shape;        /* [n_most][64]  */
+    double *scratch_kg_s; /* [n_entry]     */
 } pal_mass_operator;
 
 /* out = M p, p and out [n_point][3], apart */

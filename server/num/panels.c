@@ -33,7 +33,7 @@ static pal_err fill_pattern(const int *super, const int *pi, const int *s, pal_p
         int n_col = p->first[i + 1] - p->first[i], n_row = (int)(p->start[i + 1] - p->start[i]);
         if (super[i] % 3 || pi[i] % 3 || n_col < 1 || !in_threes(s + pi[i], pi[i + 1] - pi[i])) return PAL_ERR_INTERNAL;
         for (int k = 0; k < n_row; k++) p->row[p->start[i] + k] = s[pi[i] + 3 * k] / 3;
-        if (3 * n_row > p->most_row) p->most_row = 3 * n_row;
+        if (3 * n_row > p->max_row) p->max_row = 3 * n_row;
         for (int c = 0, m; c < n_col; c += m) {
             m = next_width(n_col - c);
             p->width[p->n_panel++] = (uint8_t)m;

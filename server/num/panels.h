@@ -21,11 +21,11 @@ typedef struct pal_panels {
     int32_t *row;   /* point of each row triple, ascending                           [start[n_super]] */
     uint8_t *width; /* points in each panel, supernode by supernode                  [n_panel]        */
     int n_panel;
-    int most_row;       /* longest column of a supernode, numbers                                         */
+    int max_row;        /* longest column of a supernode, numbers                                         */
     int64_t n_value[2]; /* numbers a factor takes, padding too: double, single                            */
 } pal_panels;
 
-enum { PAL_PANEL_SLACK = 16 }; /* numbers behind the working vector of a solve that chunks may touch */
+enum { PAL_PANEL_PADDING = 16 }; /* numbers behind the working vector of a solve that chunks may touch */
 
 /* from supernodes of scalar columns: super [n_super + 1] first columns, pi [n_super + 1] first rows in s, whose entries
  * come in threes. INTERNAL: they do not; MEMORY */
@@ -35,7 +35,7 @@ void pal_panels_free(pal_panels *p);
 /* values from supernodes by columns, px [n_super] first value of each; into n_value[single] numbers */
 void pal_panels_fill_double(const pal_panels *p, const int *px, const double *x, double *value);
 void pal_panels_fill_single(const pal_panels *p, const int *px, const double *x, float *value);
-/* y = L^-T L^-1 y, y [3 n_point]; work: most_row + PAL_PANEL_SLACK finite numbers. value at a multiple of 32 bytes */
+/* y = L^-T L^-1 y, y [3 n_point]; work: max_row + PAL_PANEL_PADDING finite numbers. value at a multiple of 32 bytes */
 void pal_panels_solve_double(const pal_panels *p, const double *value, double *y, double *work);
 void pal_panels_solve_single(const pal_panels *p, const float *value, float *y, float *work);
 

@@ -1,7 +1,7 @@
 /* Rotations of 3x3 matrices: polar turn, singular values, eigenvalues.
  *
- * pal_polar_turn follows Mueller et al. 2016 (A robust method to extract the rotational part of deformations): turn R
- * by R <- R exp(w) so that R : F grows, warm started. Departure: Mueller's w = g / |tr S|, g the axial vector of the
+ * pal_polar_rotation follows Mueller et al. 2016 (A robust method to extract the rotational part of deformations): turn
+ * R by R <- R exp(w) so that R : F grows, warm started. Departure: Mueller's w = g / |tr S|, g the axial vector of the
  * skew part of S = R' F, converges linearly at a third a turn near a rotation. Here w = A^-1 g with A = tr(S) I -
  * sym(S), the Newton turn of R : F (as in Kugelstadt et al. 2018), whose error is squared by each turn. Where A is not
  * clearly positive definite (more than a quarter turn off, saddles half a turn off, det F <= 0 near a flat state) the
@@ -269,7 +269,7 @@ static void turn(double q[4], const double w[3])
     for (int i = 0; i < 4; i++) q[i] = n * p[i];
 }
 
-int pal_polar_turn(const double f[9], double q[4], int most)
+int pal_polar_rotation(const double f[9], double q[4], int most)
 {
     enum { PATIENCE = 10 };
     double h[9], w[3], square = 0;

@@ -72,7 +72,7 @@ void pal_cell_shape(int n_node, const double x[3], double *n, double (*g)[3])
     }
 }
 
-double pal_cell_point(int p, double x[3])
+double pal_cell_gauss_point(int p, double x[3])
 {
     int at[3] = {p >> 4, p >> 2 & 3, p & 3};
     double weight = 1;

@@ -7,7 +7,7 @@
 #ifndef PAL_NUM_SPLINE_H
 #define PAL_NUM_SPLINE_H
 
-enum { PAL_GAUSS4 = 4, PAL_CELL_POINTS = 64, PAL_CELL_NODES_MOST = 64 };
+enum { PAL_GAUSS4 = 4, PAL_CELL_GAUSS_POINTS = 64, PAL_CELL_MAX_NODES = 64 };
 extern const double pal_gauss4_at[4], pal_gauss4_weight[4]; /* on [0, 1], weights sum to 1 */
 
 /* the four cubic B-splines of a span and their derivatives (either may be NULL) */
@@ -16,5 +16,5 @@ void pal_spline(double u, double b[4], double slope[4]);
  */
 void pal_cell_shape(int n_node, const double x[3], double *n, double (*g)[3]);
 /* u, v, w and weight (sum 1) of Gauss point p of 64 */
-double pal_cell_point(int p, double x[3]);
+double pal_cell_gauss_point(int p, double x[3]);
 #endif

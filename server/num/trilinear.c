@@ -53,7 +53,7 @@ static int compare_node(const void *a, const void *b)
 }
 
 /* entries of every point into entry [8 n_point], weights into out; what is met is counted in start */
-static void list_entries(const pal_grid *grid, const double *x, int64_t *entry, pal_weights *out)
+static void list_entries(const pal_grid *grid, const double *x, int64_t *entry, pal_grid_weights *out)
 {
     int n = 0;
     for (int i = 0; i < out->n_point; i++) {
@@ -70,10 +70,10 @@ static void list_entries(const pal_grid *grid, const double *x, int64_t *entry, 
     out->start[out->n_point] = n;
 }
 
-pal_err pal_weights_make(const pal_grid *grid, const double *x, int n_point, pal_weights *out)
+pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point, pal_grid_weights *out)
 {
     size_t most = 8 * (size_t)n_point + 1;
-    *out = (pal_weights){.n_point = n_point};
+    *out = (pal_grid_weights){.n_point = n_point};
     if (most > INT32_MAX) return PAL_ERR_MEMORY;
     int64_t *entry = malloc(most * sizeof *entry);
     out->start = malloc(((size_t)n_point + 1) * sizeof *out->start);
@@ -82,7 +82,7 @@ pal_err pal_weights_make(const pal_grid *grid, const double *x, int n_point, pal
     out->used = malloc(most * sizeof *out->used);
     if (!entry || !out->start || !out->node || !out->weight || !out->used) {
         free(entry);
-        pal_weights_free(out);
+        pal_grid_weights_free(out);
         return PAL_ERR_MEMORY;
     }
     list_entries(grid, x, entry, out);
@@ -100,16 +100,16 @@ pal_err pal_weights_make(const pal_grid *grid, const double *x, int n_point, pal
     return PAL_ERR_OK;
 }
 
-void pal_weights_free(pal_weights *w)
+void pal_grid_weights_free(pal_grid_weights *w)
 {
     free(w->start);
     free(w->node);
     free(w->weight);
     free(w->used);
-    *w = (pal_weights){0};
+    *w = (pal_grid_weights){0};
 }
 
-void pal_weights_apply(const pal_weights *w, const double *value, double *to)
+void pal_grid_weights_apply(const pal_grid_weights *w, const double *value, double *to)
 {
     for (int i = 0; i < w->n_point; i++) {
         double sum = 0;
@@ -118,7 +118,7 @@ void pal_weights_apply(const pal_weights *w, const double *value, double *to)
     }
 }
 
-void pal_weights_transpose(const pal_weights *w, const double *value, double *to)
+void pal_grid_weights_apply_transpose(const pal_grid_weights *w, const double *value, double *to)
 {
     for (int i = 0; i < w->n_point; i++)
         for (int k = w->start[i]; k < w->start[i + 1]; k++) to[w->node[k]] += w->weight[k] * value[i];

@@ -19,19 +19,19 @@ void pal_trilinear(const pal_grid *grid, const double x[3], int64_t node[8], dou
 double pal_trilinear_at(const pal_grid *grid, const double *value, const double x[3]);
 
 /* the matrix W: value at point i = sum over its entries of weight * value of a used node */
-typedef struct pal_weights {
+typedef struct pal_grid_weights {
     int n_point, n_used;
     int32_t *start; /* first entry of each point            [n_point + 1]  */
     int32_t *node;  /* used node of each entry              [start[n_point]] */
     double *weight; /*                                      [start[n_point]] */
     int64_t *used;  /* grid node of each used node, ascending [n_used]     */
-} pal_weights;
+} pal_grid_weights;
 
 /* x [n_point][3]; weights of exactly 0 are left out; MEMORY. Heap */
-pal_err pal_weights_make(const pal_grid *grid, const double *x, int n_point, pal_weights *out);
-void pal_weights_free(pal_weights *w);
+pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point, pal_grid_weights *out);
+void pal_grid_weights_free(pal_grid_weights *w);
 /* to [n_point] = W value [n_used] */
-void pal_weights_apply(const pal_weights *w, const double *value, double *to);
+void pal_grid_weights_apply(const pal_grid_weights *w, const double *value, double *to);
 /* to [n_used] += W' value [n_point] */
-void pal_weights_transpose(const pal_weights *w, const double *value, double *to);
+void pal_grid_weights_apply_transpose(const pal_grid_weights *w, const double *value, double *to);
 #endif

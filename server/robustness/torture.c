@@ -7,7 +7,7 @@
 #include "server/num/random.h"
 #include "server/robustness/torture_parts.h"
 #include "server/sim/elements/elastic_hex.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -92,8 +92,8 @@ void pal_torture_default(pal_torture_options *options)
 
 void pal_rig_say(pal_rig *rig, const char *format, ...)
 {
-    char *text = rig->out->note;
-    size_t used = strlen(text), room = sizeof rig->out->note;
+    char *text = rig->out->diag;
+    size_t used = strlen(text), room = sizeof rig->out->diag;
     va_list list;
     va_start(list, format);
     if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
@@ -105,7 +105,7 @@ void pal_rig_skip(pal_rig *rig, const char *format, ...)
 {
     va_list list;
     va_start(list, format);
-    vsnprintf(rig->out->note, sizeof rig->out->note, format, list);
+    vsnprintf(rig->out->diag, sizeof rig->out->diag, format, list);
     va_end(list);
     rig->out->verdict = PAL_VERDICT_SKIPPED;
 }
@@ -142,13 +142,13 @@ double pal_rig_random(pal_rig *rig)
 /* points that are there in every state of a body: of one that adapts those of its coarsest level */
 static int common_points(const pal_body *body)
 {
-    return body->shell ? body->shell->levels.n_vertex[0] : body->n_dof;
+    return body->adaptive ? body->adaptive->levels.n_vertex[0] : body->n_dof;
 }
 
 static bool is_free(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i]) return false;
+        if (body->fixed[i]) return false;
     return true;
 }
 
@@ -173,7 +173,7 @@ static double free_rms(const pal_body *body, const double *rest)
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
                 f[3 * a + b] += (body->x[3 * (size_t)i + (size_t)a] - c[a]) * (rest[3 * (size_t)i + (size_t)b] - o[b]);
-    pal_polar_turn(f, q, 100);
+    pal_polar_rotation(f, q, 100);
     pal_quat_matrix(q, r);
     for (int i = 0; i < n; i++) {
         double from[3], to[3];
@@ -194,7 +194,7 @@ static bool excused(const pal_rig *rig, int b)
 static double body_left(const pal_rig *rig, int b)
 {
     const pal_body *body = pal_world_body(rig->world, b);
-    return (is_free(body) ? free_rms(body, rig->rest[b]) : held_rms(body, rig->rest[b])) / body->size_m;
+    return (is_free(body) ? free_rms(body, rig->rest[b]) : held_rms(body, rig->rest[b])) / body->length_scale_m;
 }
 
 double pal_rig_left(const pal_rig *rig)
@@ -222,12 +222,12 @@ static double asked_left(const pal_rig *rig)
 static double work_J(const pal_body *body)
 {
     double sum = 0;
-    for (int k = 0; k < pal_body_nodes(body) && body->outer; k++) {
+    for (int k = 0; k < pal_body_nodes(body) && body->external_force; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        double size = pal_norm3(body->outer + i), way[3];
+        double size = pal_norm3(body->external_force + i), way[3];
         if (!(size > 0)) continue;
         pal_sub3(way, body->d + i, body->node_rest + i);
-        sum += fmin(1, pal_body_bears_N(body, (int)(i / 3)) / size) * pal_dot3(body->outer + i, way);
+        sum += fmin(1, pal_body_node_load_cap_N(body, (int)(i / 3)) / size) * pal_dot3(body->external_force + i, way);
     }
     return sum;
 }
@@ -243,13 +243,13 @@ double pal_rig_energy(const pal_rig *rig)
 static double shape_energy(const pal_rig *rig)
 {
     double now = pal_rig_energy(rig);
-    for (int i = 0; i < pal_world_rows(rig->world); i++) {
-        const pal_row *row = pal_world_effect(rig->world, i);
-        pal_hex_row *hex = strcmp(row->effect->name, "hex_elastic") ? NULL : row->self;
+    for (int i = 0; i < pal_world_component_count(rig->world); i++) {
+        const pal_component *row = pal_world_component(rig->world, i);
+        pal_elastic_hexes *hex = strcmp(row->effect->name, "hex_elastic") ? NULL : row->self;
         if (!hex || !hex->split) continue;
-        hex->tangled = !hex->tangled;
+        hex->has_inversion = !hex->has_inversion;
         now = fmax(now, pal_rig_energy(rig));
-        hex->tangled = !hex->tangled;
+        hex->has_inversion = !hex->has_inversion;
     }
     return now;
 }
@@ -260,7 +260,7 @@ static uint64_t count_splits(const pal_rig *rig)
     for (int b = 0; b < rig->scene->n_body; b++) {
         const pal_body *body = pal_world_body(rig->world, b);
         /* patches of springs begin and end with no more than there was */
-        if (!body->tangle) n += body->rescue.n_split;
+        if (!body->recovery) n += body->safeguards.n_split;
     }
     return n;
 }
@@ -275,7 +275,7 @@ void pal_rig_rebase(pal_rig *rig)
 
 void pal_rig_moved(pal_rig *rig)
 {
-    for (int b = 0; b < rig->scene->n_body; b++) pal_world_moved(rig->world, b);
+    for (int b = 0; b < rig->scene->n_body; b++) pal_world_invalidate_limits(rig->world, b);
     pal_rig_rebase(rig);
 }
 
@@ -305,7 +305,7 @@ int pal_rig_far_node(const pal_rig *rig, int b)
     double from[3] = {0, 0, 0}, most = -1;
     int n = 0, far = pal_body_point(body, 0);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
+        if (body->fixed[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
     for (int k = 0; k < pal_body_nodes(body) && n == 0; k++)
         pal_axpy3(from, 1.0 / pal_body_nodes(body), body->node_rest + 3 * (size_t)pal_body_point(body, k));
     if (n > 0) pal_scale3(from, 1.0 / n, from);
@@ -352,7 +352,7 @@ static void look(pal_rig *rig)
     for (int b = 0; b < rig->scene->n_body; b++) {
         const pal_body *body = pal_world_body(rig->world, b);
         out->finite &= pal_body_finite(body);
-        if (body->frozen && !out->frozen) pal_rig_say(rig, "%s stopped: %s", body->name, body->why);
+        if (body->frozen && !out->frozen) pal_rig_say(rig, "%s stopped: %s", body->name, body->reason);
         out->frozen |= body->frozen, rig->stopped[b] |= body->frozen;
     }
     double energy = pal_world_energy_J(rig->world);
@@ -379,7 +379,7 @@ static bool halted(const pal_rig *rig)
 bool pal_rig_step(pal_rig *rig, double dt_s)
 {
     pal_err err = pal_world_step(rig->world, dt_s);
-    pal_world_tidy(rig->world);
+    pal_world_remove_idle(rig->world);
     rig->err = err;
     if (err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED) return false;
     rig->out->simulated_s += dt_s;
@@ -400,7 +400,7 @@ bool pal_rig_run(pal_rig *rig, double seconds)
 void pal_rig_relax(pal_rig *rig, double seconds)
 {
     pal_torture_result *out = rig->out;
-    double begin = out->simulated_s, hold_s = 0.25, still_s = 0;
+    double begin = out->simulated_s, hold_s = 0.25, rest_time_s = 0;
     int n = (int)ceil((seconds < 10 ? seconds : fmax(seconds, rig->patience_s)) / rig->scene->step_s);
     out->back_s = INFINITY;
     rig->needs_rest = true, rig->asked_back = false;
@@ -413,8 +413,8 @@ void pal_rig_relax(pal_rig *rig, double seconds)
             out->back_s = now;
         if (now - out->back_s >= hold_s) break;
         /* what does not move any more will not come back either */
-        still_s = pal_rig_speed_S_s(rig) <= still_S_s ? still_s + rig->scene->step_s : 0;
-        if (still_s > 2 * hold_s) break;
+        rest_time_s = pal_rig_speed_S_s(rig) <= still_S_s ? rest_time_s + rig->scene->step_s : 0;
+        if (rest_time_s > 2 * hold_s) break;
     }
     out->left_S = pal_rig_left(rig);
     rig->asked_back = out->back_s < INFINITY || asked_left(rig) <= back_S;
@@ -424,20 +424,20 @@ void pal_rig_relax(pal_rig *rig, double seconds)
 
 static void sum_rescues(pal_rig *rig)
 {
-    pal_rescues *to = &rig->out->rescue;
+    pal_safeguards *to = &rig->out->safeguards;
     for (int b = 0; b < rig->scene->n_body; b++) {
-        const pal_rescues *from = &pal_world_body(rig->world, b)->rescue;
-        to->n_capped += from->n_capped, to->n_clamped += from->n_clamped, to->n_heavy += from->n_heavy;
-        to->n_tangled += from->n_tangled, to->n_split += from->n_split, to->n_search += from->n_search;
-        to->n_slipped += from->n_slipped, to->n_stopped += from->n_stopped, to->ns += from->ns;
+        const pal_safeguards *from = &pal_world_body(rig->world, b)->safeguards;
+        to->n_capped += from->n_capped, to->n_clamped += from->n_clamped, to->n_mass_scaled += from->n_mass_scaled;
+        to->n_inversion += from->n_inversion, to->n_split += from->n_split, to->n_search += from->n_search;
+        to->n_tool_reset += from->n_tool_reset, to->n_stopped += from->n_stopped, to->ns += from->ns;
     }
 }
 
 static double energy_limit(const pal_rig *rig)
 {
     double limit = slack;
-    for (int i = 0; i < pal_world_rows(rig->world); i++) {
-        const char *name = pal_world_effect(rig->world, i)->effect->name;
+    for (int i = 0; i < pal_world_component_count(rig->world); i++) {
+        const char *name = pal_world_component(rig->world, i)->effect->name;
         if (!strcmp(name, "verlet")) limit = fmax(limit, verlet_slack);
         if (!strcmp(name, "central_cg")) limit = central_slack;
     }
@@ -447,7 +447,7 @@ static double energy_limit(const pal_rig *rig)
 /* what was put in less than this is rounding, and a share of it says nothing */
 static double nothing_J(const pal_rig *rig, int b)
 {
-    return nothing_share * pal_rig_cap_N(rig, b) * pal_world_body(rig->world, b)->size_m;
+    return nothing_share * pal_rig_cap_N(rig, b) * pal_world_body(rig->world, b)->length_scale_m;
 }
 
 static void judge(pal_rig *rig)
@@ -491,7 +491,7 @@ static void check_reset(pal_rig *rig, double seconds)
     pal_rig_relax(rig, most_s);
     const double left = out->left_S;
     const bool stopped = out->frozen || !out->finite, back = rig->asked_back;
-    memcpy(was.note, out->note, sizeof was.note);
+    memcpy(was.diag, out->diag, sizeof was.diag);
     *out = was;
     if (stopped)
         pal_rig_fail(rig, "a reset did not bring it back");
@@ -506,7 +506,7 @@ static bool is_folded(const pal_rig *rig)
 {
     bool away = rig->out->verdict == PAL_VERDICT_FAILED && rig->needs_rest && !rig->asked_back && !rig->late;
     for (int b = 0; b < rig->scene->n_body && away; b++)
-        if (pal_world_body(rig->world, b)->embed && !(body_left(rig, b) <= back_S)) return true;
+        if (pal_world_body(rig->world, b)->interpolation && !(body_left(rig, b) <= back_S)) return true;
     return false;
 }
 
@@ -567,17 +567,17 @@ static void run_one(pal_rig *rig, const pal_insult *insult, double seconds)
 static void look_at_rows(pal_rig *rig)
 {
     bool first = true;
-    for (int i = 0; i < pal_world_rows(rig->world); i++) {
-        const char *name = pal_world_effect(rig->world, i)->effect->name;
+    for (int i = 0; i < pal_world_component_count(rig->world); i++) {
+        const char *name = pal_world_component(rig->world, i)->effect->name;
         rig->anew |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
         if (strcmp(name, "tool_push")) continue;
-        pal_row_info info;
-        pal_world_row(rig->world, i, &info);
+        pal_component_info info;
+        pal_world_component_info(rig->world, i, &info);
         for (int b = 0; b < rig->scene->n_body && first; b++)
             if (info.body == pal_world_body(rig->world, b)->name) rig->body = b, first = false;
         rig->touches = true;
     }
-    for (int b = 0; b < rig->scene->n_body; b++) rig->anew |= pal_world_body(rig->world, b)->shell != NULL;
+    for (int b = 0; b < rig->scene->n_body; b++) rig->anew |= pal_world_body(rig->world, b)->adaptive != NULL;
 }
 
 static pal_err open_rig(pal_rig *rig, const pal_scene *scene)
@@ -590,7 +590,7 @@ static pal_err open_rig(pal_rig *rig, const pal_scene *scene)
         pal_tools_default(rig->scene, 2);
         if (scene->n_tool == 1) rig->scene->tool[0] = own;
     }
-    PAL_TRY(pal_world_create(rig->scene, rig->note, &rig->world));
+    PAL_TRY(pal_world_create(rig->scene, rig->diag, &rig->world));
     for (int b = 0; b < scene->n_body; b++) {
         size_t n3 = 3 * (size_t)pal_world_body(rig->world, b)->n_dof;
         rig->rest[b] = calloc(n3 + 1, sizeof(double));
@@ -625,7 +625,7 @@ static double enough_s(pal_rig *rig)
     enum { PROBE = 10 };
     double before = 1e-9 * (double)pal_clock_thread_ns();
     for (int i = 0; i < PROBE; i++) {
-        for (int b = 0; b < rig->scene->n_body; b++) (void)pal_world_moved(rig->world, b);
+        for (int b = 0; b < rig->scene->n_body; b++) (void)pal_world_invalidate_limits(rig->world, b);
         (void)pal_world_step(rig->world, rig->scene->step_s);
     }
     double step_s = (1e-9 * (double)pal_clock_thread_ns() - before) / PROBE;
@@ -646,7 +646,7 @@ static pal_err run_all(pal_rig *rig, pal_torture_report *out)
     for (int k = 0; k < N_INSULT; k++) {
         if (o->only && strcmp(o->only, insults[k].name)) continue;
         if (o->progress && !o->progress(insults[k].name, (double)k / N_INSULT, o->user))
-            return pal_note_set(rig->note, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
+            return pal_diagnostic_set(rig->diag, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
         double left = begin + most_s - 1e-9 * (double)pal_clock_thread_ns();
         /* what is short leaves its time to the others; none takes more than a third of what is left */
         int n_left = o->only ? 1 : N_INSULT - k;
@@ -658,12 +658,13 @@ static pal_err run_all(pal_rig *rig, pal_torture_report *out)
     return PAL_ERR_OK;
 }
 
-pal_err pal_torture(const pal_scene *scene, const pal_torture_options *options, pal_torture_report *out, pal_note *note)
+pal_err pal_torture(const pal_scene *scene, const pal_torture_options *options, pal_torture_report *out,
+                    pal_diagnostic *diag)
 {
     bool known = !options->only;
     for (int k = 0; k < N_INSULT && !known; k++) known = !strcmp(options->only, insults[k].name);
-    if (!known) return pal_note_set(note, PAL_ERR_REFUSED, "there is no insult \"%.60s\"", options->only);
-    pal_rig rig = {.options = options, .note = note};
+    if (!known) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no insult \"%.60s\"", options->only);
+    pal_rig rig = {.options = options, .diag = diag};
     pal_torture_report *report = calloc(1, sizeof *report);
     pal_err err = report ? open_rig(&rig, scene) : PAL_ERR_MEMORY;
     if (!err) err = run_all(&rig, report);

@@ -20,8 +20,8 @@
  *
  * Time is simulated; what comes out depends on the scene, the seed and the processor time that is allowed: an insult
  * that runs out of it before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
-#ifndef PAL_LAB_TORTURE_H
-#define PAL_LAB_TORTURE_H
+#ifndef PAL_ROBUSTNESS_TORTURE_H
+#define PAL_ROBUSTNESS_TORTURE_H
 #include "server/sim/world/world.h"
 
 enum { PAL_INSULT_MOST = 20, PAL_TORTURE_SAMPLES = 256 };
@@ -48,7 +48,7 @@ void pal_torture_default(pal_torture_options *options);
 typedef struct pal_torture_result {
     const char *name, *what, *criterion; /* constants                                                             */
     pal_verdict verdict;
-    char note[240];        /* what happened, or why it does not apply                                            */
+    char diag[240];        /* what happened, or why it does not apply                                            */
     bool finite, frozen;   /* all numbers of all bodies, always; a body was stopped                              */
     double energy, limit;  /* most energy beyond what was there and put in, as a share of that, and what is allowed;
                               NaN: not judged                                                                    */
@@ -57,8 +57,8 @@ typedef struct pal_torture_result {
     double left_S, back_s; /* RMS from rest at the end over S; simulated time after release until within 0.1 % for
                               good, INFINITY: was not; NaN: not judged                                            */
     double simulated_s, took_s;
-    pal_rescues rescue; /* of all bodies                                                                      */
-    int n_sample;       /* energy over that at rest, after each of equally many steps, from the begin on       */
+    pal_safeguards safeguards; /* of all bodies                                                                      */
+    int n_sample;              /* energy over that at rest, after each of equally many steps, from the begin on       */
     double time_s[PAL_TORTURE_SAMPLES], energy_J[PAL_TORTURE_SAMPLES];
 } pal_torture_result;
 
@@ -78,5 +78,5 @@ const char *pal_insult_what(int insult); /* one sentence [any]   */
 
 /* REFUSED: no such insult, what pal_world_create gives; STATE: progress said stop; MEMORY */
 pal_err pal_torture(const pal_scene *scene, const pal_torture_options *options, pal_torture_report *out,
-                    pal_note *note);
+                    pal_diagnostic *diag);
 #endif

@@ -1,13 +1,13 @@
 /* What torture.c and the files of its insults share. Private to these. */
-#ifndef PAL_LAB_TORTURE_PARTS_H
-#define PAL_LAB_TORTURE_PARTS_H
+#ifndef PAL_ROBUSTNESS_TORTURE_PARTS_H
+#define PAL_ROBUSTNESS_TORTURE_PARTS_H
 #include "server/robustness/torture.h"
 
 typedef struct pal_rig {
     pal_scene *scene;        /* the user's, with two tools at least where tools can touch; heap */
     pal_world *world, *twin; /* twin: an untouched run of a scene that is led; else NULL */
     const pal_torture_options *options;
-    pal_note *note;              /* of the whole run */
+    pal_diagnostic *diag;        /* of the whole run */
     double *rest[PAL_BODY_MAX];  /* where the bodies rest          [n_dof][3] */
     double *start[PAL_BODY_MAX]; /* room for where they are        [n_dof][3] */
     double rest_J;

@@ -24,7 +24,7 @@ double pal_rig_speed_S_s(const pal_rig *rig)
             const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
             sum += pal_dot3(v, v);
         }
-        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->size_m;
+        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->length_scale_m;
         if (!(speed <= most)) most = speed;
     }
     return most;
@@ -48,13 +48,13 @@ double pal_rig_patience(const pal_rig *rig)
 bool pal_rig_settle(pal_rig *rig, double *took_s)
 {
     const double step = rig->scene->step_s;
-    double still_s = 0, t = 0;
-    for (; t < settle_most_s && still_s < 0.25; t += step) {
+    double rest_time_s = 0, t = 0;
+    for (; t < settle_most_s && rest_time_s < 0.25; t += step) {
         if (pal_world_step(rig->world, step) || 1e-9 * (double)pal_clock_thread_ns() > rig->deadline_s) return false;
-        still_s = pal_rig_speed_S_s(rig) <= still_S_s ? still_s + step : 0;
+        rest_time_s = pal_rig_speed_S_s(rig) <= still_S_s ? rest_time_s + step : 0;
     }
     *took_s = t;
-    return still_s >= 0.25;
+    return rest_time_s >= 0.25;
 }
 
 void pal_rig_keep(pal_rig *rig, double **to)
@@ -98,8 +98,8 @@ static bool begin_twin(pal_rig *rig)
 bool pal_rig_lead(pal_rig *rig)
 {
     bool led = false;
-    for (int i = 0; i < pal_world_rows(rig->world); i++)
-        led |= !strcmp(pal_world_effect(rig->world, i)->effect->name, "moving_support");
+    for (int i = 0; i < pal_world_component_count(rig->world); i++)
+        led |= !strcmp(pal_world_component(rig->world, i)->effect->name, "moving_support");
     return led && !pal_world_create(rig->scene, NULL, &rig->twin);
 }
 
@@ -120,7 +120,7 @@ bool pal_rig_back_to_rest(pal_rig *rig)
     for (int b = 0; b < rig->scene->n_body; b++) {
         pal_body *body = pal_world_body(rig->world, b);
         memcpy(body->x, rig->rest[b], 3 * sizeof(double) * (size_t)body->n_dof);
-        pal_world_moved(rig->world, b);
+        pal_world_invalidate_limits(rig->world, b);
     }
     return true;
 }

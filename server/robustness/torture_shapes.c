@@ -46,7 +46,7 @@ static void spoil(pal_rig *rig, int b, shape how)
     int flat = thinnest(low, high);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (!body->held[i]) insult_point(rig, how, low, high, flat, body->x + 3 * (size_t)i);
+        if (!body->fixed[i]) insult_point(rig, how, low, high, flat, body->x + 3 * (size_t)i);
     }
 }
 
@@ -56,7 +56,7 @@ static int turned_over(const pal_rig *rig)
     int n = 0;
     for (int b = 0; b < rig->scene->n_body; b++) {
         const pal_body *body = pal_world_body(rig->world, b);
-        for (int t = 0; body->tets && !body->embed && t < body->tets->n_tet; t++) {
+        for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++) {
             const int32_t *c = body->tets->tet + 4 * (size_t)t;
             double e[3][3], g[3];
             for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x + 3 * (size_t)c[k + 1], body->x + 3 * (size_t)c[0]);
@@ -73,16 +73,16 @@ static double extent(const pal_rig *rig)
     for (int b = 0; b < rig->scene->n_body; b++) {
         double low[3], high[3];
         pal_rig_box(rig, b, low, high);
-        most = fmax(most, pal_dist3(low, high) / pal_world_body(rig->world, b)->size_m);
+        most = fmax(most, pal_dist3(low, high) / pal_world_body(rig->world, b)->length_scale_m);
     }
     return most;
 }
 
 static bool guarded(const pal_rig *rig, int b)
 {
-    for (int i = 0; i < pal_world_rows(rig->world); i++) {
-        pal_row_info info;
-        pal_world_row(rig->world, i, &info);
+    for (int i = 0; i < pal_world_component_count(rig->world); i++) {
+        pal_component_info info;
+        pal_world_component_info(rig->world, i, &info);
         if (info.body == pal_world_body(rig->world, b)->name && !strcmp(info.name, "finite_guard")) return true;
     }
     return false;
@@ -94,7 +94,8 @@ static void shaped(pal_rig *rig, shape how)
     for (int b = 0; b < rig->scene->n_body; b++) {
         spoil(rig, b, how);
         /* what untangles and has a guard is judged as all others when it is beyond the guard's reach */
-        const bool untangles = pal_world_body(rig->world, b)->tangle != NULL, far = how == BLOWN_UP && guarded(rig, b);
+        const bool untangles = pal_world_body(rig->world, b)->recovery != NULL,
+                   far = how == BLOWN_UP && guarded(rig, b);
         rig->may_stay[b] = pal_rig_springs(rig, b) && !(untangles && far);
         rig->may_stop[b] = rig->may_stay[b] || far;
         springs = springs && rig->may_stay[b] && !untangles;
@@ -149,8 +150,8 @@ void pal_insult_poisoned(pal_rig *rig)
     out->energy = NAN;
     (void)pal_world_step(rig->world, rig->scene->step_s);
     if (!body->frozen) pal_rig_fail(rig, "the body was not stopped");
-    if (body->frozen) pal_rig_say(rig, "%s stopped: %s", body->name, body->why);
-    if (body->frozen && !body->why[0]) pal_rig_fail(rig, "no reason is given");
+    if (body->frozen) pal_rig_say(rig, "%s stopped: %s", body->name, body->reason);
+    if (body->frozen && !body->reason[0]) pal_rig_fail(rig, "no reason is given");
     for (int b = 1; b < rig->scene->n_body; b++) {
         const pal_body *other = pal_world_body(rig->world, b);
         if (other->frozen || !pal_body_finite(other)) pal_rig_fail(rig, "%s was stopped with it", other->name);
@@ -182,7 +183,7 @@ static void unload_all(pal_rig *rig)
 {
     for (int b = 0; b < rig->scene->n_body; b++) {
         pal_body *body = pal_world_body(rig->world, b);
-        if (body->outer) memset(body->outer, 0, 3 * sizeof(double) * (size_t)body->n_node);
+        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
     }
     pal_world_wake(rig->world);
     pal_rig_rebase(rig);
@@ -211,16 +212,16 @@ static void long_steps(pal_rig *rig, double times, int n)
         pal_rig_box(rig, b, low, high);
         for (int k = 0; k < body->n_active; k++) {
             size_t i = (size_t)pal_body_point(body, k);
-            if (body->held[i]) continue;
+            if (body->fixed[i]) continue;
             /* a blow that grows with the height */
             double height = 0, all = 1e-300;
             for (int c = 0; c < 3; c++) {
                 height += up[c] * (body->x[3 * i + (size_t)c] + body->offset_m[c] - low[c]);
                 all += fabs(up[c]) * (high[c] - low[c]);
             }
-            body->v[3 * i + (fabs(up[0]) < 0.7 ? 0 : 1)] += 0.5 * body->size_m * fabs(height) / all;
+            body->v[3 * i + (fabs(up[0]) < 0.7 ? 0 : 1)] += 0.5 * body->length_scale_m * fabs(height) / all;
         }
-        pal_body_place(body);
+        pal_body_update_nodes(body);
     }
     pal_rig_rebase(rig);
     uint64_t hash = pal_world_hash(rig->world);
@@ -228,7 +229,7 @@ static void long_steps(pal_rig *rig, double times, int n)
         bool good = pal_rig_step(rig, times * rig->scene->step_s);
         if (rig->err == PAL_ERR_BUDGET) {
             if (hash != pal_world_hash(rig->world)) pal_rig_fail(rig, "refused, but something moved");
-            pal_rig_say(rig, "refused: more sub-steps than the budget of %d", rig->scene->most_substep);
+            pal_rig_say(rig, "refused: more sub-steps than the budget of %d", rig->scene->max_substep);
             break;
         }
         if (!good) return;
@@ -251,7 +252,7 @@ void pal_insult_longer_step(pal_rig *rig)
 
 void pal_insult_stiffer(pal_rig *rig)
 {
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     rig->out->energy = NAN; /* changing stiffness is work */
     load_all(rig, 0.3, true);
     bool good = pal_rig_run(rig, 0.25);
@@ -259,14 +260,14 @@ void pal_insult_stiffer(pal_rig *rig)
         pal_material to = rig->scene->body[b].material;
         to.young_Pa *= 1000;
         uint64_t hash = pal_world_hash(rig->world);
-        pal_err err = pal_world_material(rig->world, b, &to, &why);
+        pal_err err = pal_world_material(rig->world, b, &to, &reason);
         if (err && hash != pal_world_hash(rig->world)) pal_rig_fail(rig, "refused, but something moved");
-        if (err) pal_rig_say(rig, "refused (%.90s)", why.text);
+        if (err) pal_rig_say(rig, "refused (%.90s)", reason.text);
     }
     good = good && pal_rig_run(rig, 0.25);
     for (int b = 0; b < rig->scene->n_body; b++)
-        if (pal_world_material(rig->world, b, &rig->scene->body[b].material, &why))
-            pal_rig_fail(rig, "the old material was refused (%.90s)", why.text);
+        if (pal_world_material(rig->world, b, &rig->scene->body[b].material, &reason))
+            pal_rig_fail(rig, "the old material was refused (%.90s)", reason.text);
     unload_all(rig);
     if (good) pal_rig_relax(rig, back_s);
     if (rig->out->back_s < INFINITY) pal_rig_say(rig, "back after %.2g s", rig->out->back_s);
@@ -279,7 +280,8 @@ static double drift_S(const pal_rig *rig)
     double most = 0;
     for (int b = 0; b < rig->scene->n_body; b++) {
         const pal_body *body = pal_world_body(rig->world, b);
-        for (int i = 0; i < 3 * body->n_dof; i++) most = fmax(most, fabs(body->x[i] - rig->start[b][i]) / body->size_m);
+        for (int i = 0; i < 3 * body->n_dof; i++)
+            most = fmax(most, fabs(body->x[i] - rig->start[b][i]) / body->length_scale_m);
     }
     return most;
 }
@@ -345,7 +347,7 @@ static bool doze(pal_rig *rig, double until_s)
     const double step = rig->scene->step_s, end = fmin(rig->out->simulated_s + 10, until_s - 2 * step);
     while (all_asleep(rig) && rig->out->simulated_s < end) {
         if (pal_world_step(rig->world, step)) return false;
-        pal_world_tidy(rig->world);
+        pal_world_remove_idle(rig->world);
         rig->out->simulated_s += step;
     }
     return true;

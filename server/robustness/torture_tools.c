@@ -22,9 +22,9 @@ static bool has_tools(pal_rig *rig)
     return rig->touches;
 }
 
-static void move(pal_rig *rig, int tool, const double at_m[3], bool grab)
+static void move(pal_rig *rig, int tool, const double at_m[3], bool grasp)
 {
-    pal_pose pose = {.quat = {1, 0, 0, 0}, .buttons = grab};
+    pal_pose pose = {.quat = {1, 0, 0, 0}, .buttons = grasp};
     pal_copy3(pose.position_m, at_m);
     (void)pal_world_pose(rig->world, tool, &pose);
 }
@@ -33,7 +33,7 @@ static void move(pal_rig *rig, int tool, const double at_m[3], bool grab)
  * jump is no way: there is only the correction of one step. What was put in may not grow afterwards */
 static bool tool_step(pal_rig *rig, int n, double way_m)
 {
-    double size = pal_world_body(rig->world, rig->body)->size_m, before = pal_rig_energy(rig), cap = 0;
+    double size = pal_world_body(rig->world, rig->body)->length_scale_m, before = pal_rig_energy(rig), cap = 0;
     for (int t = 0; t < n; t++) cap += rig->scene->tool[t].force_cap_N;
     rig->allowed_J = cap * (clamp_S * size + way_m);
     bool good = pal_rig_step(rig, rig->scene->step_s);
@@ -96,7 +96,7 @@ void pal_insult_teleport(pal_rig *rig)
         double side = i < 12 || i >= 30 ? 1 : 0;
         pal_copy3(at, centre);
         /* beside, then by S into and beyond, then back */
-        at[axis] += side > 0 ? half[axis] + 2 * radius : half[axis] + 2 * radius - body->size_m;
+        at[axis] += side > 0 ? half[axis] + 2 * radius : half[axis] + 2 * radius - body->length_scale_m;
         move(rig, 0, at, false);
         good = tool_step(rig, 1, 0);
         most = fmax(most, force_N(rig, 0));
@@ -213,13 +213,13 @@ static void support_top(const pal_rig *rig, pal_scene *scene)
             double at = pal_dot3(scene->up, body->x_rest + 3 * (size_t)i);
             least = fmin(least, at), most = fmax(most, at);
         }
-        pal_support s = {.low_m = {INFINITY, INFINITY, INFINITY}, .high_m = {-INFINITY, -INFINITY, -INFINITY}};
+        pal_support_def s = {.low_m = {INFINITY, INFINITY, INFINITY}, .high_m = {-INFINITY, -INFINITY, -INFINITY}};
         for (int i = 0; i < body->n_dof; i++) {
             const double *x = body->x_rest + 3 * (size_t)i;
             if (pal_dot3(scene->up, x) < least + 0.8 * (most - least)) continue;
             for (int c = 0; c < 3; c++) {
-                s.low_m[c] = fmin(s.low_m[c], x[c] - 1e-9 * body->size_m);
-                s.high_m[c] = fmax(s.high_m[c], x[c] + 1e-9 * body->size_m);
+                s.low_m[c] = fmin(s.low_m[c], x[c] - 1e-9 * body->length_scale_m);
+                s.high_m[c] = fmax(s.high_m[c], x[c] + 1e-9 * body->length_scale_m);
             }
         }
         scene->body[b].n_support = 1;
@@ -233,12 +233,12 @@ static double followed_J(pal_world *next, const pal_world *before)
 {
     double energy = 0;
     for (int turn = 0; turn < 2; turn++) {
-        for (int i = 0; i < pal_world_rows(next) && i < pal_world_rows(before); i++) {
-            const pal_row *row = pal_world_effect(next, i), *was = pal_world_effect(before, i);
+        for (int i = 0; i < pal_world_component_count(next) && i < pal_world_component_count(before); i++) {
+            const pal_component *row = pal_world_component(next, i), *was = pal_world_component(before, i);
             if (row->effect != was->effect || strcmp(row->effect->name, "hex_elastic")) continue;
-            pal_hex_row *to = row->self;
-            const pal_hex_row *from = was->self;
-            to->tangled = turn == 0 && from->tangled && to->split;
+            pal_elastic_hexes *to = row->self;
+            const pal_elastic_hexes *from = was->self;
+            to->has_inversion = turn == 0 && from->has_inversion && to->split;
         }
         if (turn == 0) energy = pal_world_energy_J(next);
     }
@@ -249,13 +249,13 @@ static double followed_J(pal_world *next, const pal_world *before)
 static bool go_over(pal_rig *rig, const pal_scene *scene, double *jump)
 {
     pal_world *next = NULL;
-    pal_note why = {""};
-    if (pal_world_create(scene, &why, &next)) {
-        pal_rig_skip(rig, "the scene with other supports is refused: %.150s", why.text);
+    pal_diagnostic reason = {""};
+    if (pal_world_create(scene, &reason, &next)) {
+        pal_rig_skip(rig, "the scene with other supports is refused: %.150s", reason.text);
         return false;
     }
     double before = pal_world_energy_J(rig->world);
-    pal_world_follow(next, rig->world, -1, NULL, NULL);
+    pal_world_transfer(next, rig->world, -1, NULL, NULL);
     *jump = fmax(*jump, followed_J(next, rig->world) - before);
     pal_world_destroy(rig->world);
     rig->world = next;
@@ -270,7 +270,7 @@ static double speed_S_s(const pal_rig *rig)
         const pal_body *body = pal_world_body(rig->world, b);
         double mass = 0;
         for (int i = 0; i < body->n_dof; i++) mass += body->mass_kg[i];
-        most = fmax(most, sqrt(2 * pal_body_kinetic_J(body) / mass) / body->size_m);
+        most = fmax(most, sqrt(2 * pal_body_kinetic_J(body) / mass) / body->length_scale_m);
     }
     return most;
 }
@@ -282,7 +282,7 @@ void pal_insult_supports(pal_rig *rig)
         return;
     }
     for (int b = 0; b < rig->scene->n_body; b++)
-        if (pal_world_body(rig->world, b)->shell) {
+        if (pal_world_body(rig->world, b)->adaptive) {
             pal_rig_skip(rig, "a surface that adapts begins at rest when its scene changes");
             return;
         }
@@ -341,7 +341,7 @@ static void random_brush(pal_rig *rig, int b)
     const pal_body *body = pal_world_body(rig->world, b);
     int node = pal_body_point(body, (int)draw(rig, 0, pal_body_nodes(body)));
     pal_brush brush = {.kind = pal_rig_random(rig) < 0.5 ? PAL_BRUSH_INFLATE : PAL_BRUSH_NONE,
-                       .radius_m = draw(rig, 0, 0.2) * body->size_m,
+                       .radius_m = draw(rig, 0, 0.2) * body->length_scale_m,
                        .soft = draw(rig, -0.1, 1.1),
                        .pressure_Pa = draw(rig, -1, 1) * rig->scene->body[b].material.young_Pa};
     pal_copy3(brush.at_m, body->node_rest + 3 * (size_t)node);
@@ -380,7 +380,7 @@ static void calm(pal_rig *rig)
         pal_body *body = pal_world_body(rig->world, b);
         for (int t = 0; t < PAL_TOOL_MAX; t++) (void)pal_world_brush(rig->world, b, t, NULL, NULL);
         (void)pal_world_material(rig->world, b, &rig->scene->body[b].material, NULL);
-        if (body->outer) memset(body->outer, 0, 3 * sizeof(double) * (size_t)body->n_node);
+        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
     }
 }
 
@@ -389,7 +389,7 @@ void pal_insult_random(pal_rig *rig)
     enum { STEPS = 300 };
     double centre[3], half[3];
     (void)middle(rig, centre, half);
-    double size = pal_world_body(rig->world, rig->body)->size_m;
+    double size = pal_world_body(rig->world, rig->body)->length_scale_m;
     bool good = true;
     rig->out->energy = NAN; /* orders are work */
     for (int i = 0; i < STEPS && good; i++) {

@@ -25,8 +25,8 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
         uint32_t code;
         int n = pal_utf8_next(text + k, n_byte - k, &code);
         if (n == 0 || code == 0)
-            return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: line %d: byte %zu is not UTF-8 text", json->file,
-                                line_of(text, k), k);
+            return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: byte %zu is not UTF-8 text",
+                                      json->file, line_of(text, k), k);
         if (quoted && code == '\\')
             k++;
         else if (code == '"')
@@ -36,8 +36,8 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
         else if (!quoted && (code == ']' || code == '}'))
             depth--;
         if (depth > PAL_JSON_DEPTH)
-            return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: line %d: nested deeper than %d", json->file,
-                                line_of(text, k), PAL_JSON_DEPTH);
+            return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: nested deeper than %d", json->file,
+                                      line_of(text, k), PAL_JSON_DEPTH);
         k += (size_t)n;
     }
     return PAL_ERR_OK;
@@ -46,21 +46,21 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
 pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out)
 {
     if (n_byte > PAL_JSON_MOST)
-        return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", json->file, n_byte,
-                            PAL_JSON_MOST);
+        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", json->file, n_byte,
+                                  PAL_JSON_MOST);
     PAL_TRY(check_text(json, text, n_byte));
     const char *end = text;
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(text, n_byte, &end, false) : NULL;
     size_t at = end && end >= text ? (size_t)(end - text) : 0;
     if (!root)
-        return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: line %d: not JSON", json->file,
-                            line_of(text, at < n_byte ? at : n_byte));
+        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: not JSON", json->file,
+                                  line_of(text, at < n_byte ? at : n_byte));
     while (at < n_byte && strchr(" \t\r\n", text[at])) at++;
     if (at < n_byte || !cJSON_IsObject(root)) {
         cJSON_Delete(root);
-        return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: line %d: %s", json->file,
-                            at < n_byte ? line_of(text, at) : 1,
-                            at < n_byte ? "more text behind the end" : "not a JSON object");
+        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: %s", json->file,
+                                  at < n_byte ? line_of(text, at) : 1,
+                                  at < n_byte ? "more text behind the end" : "not a JSON object");
     }
     *out = root;
     return PAL_ERR_OK;
@@ -73,7 +73,7 @@ pal_err pal_json_bad(const pal_json *json, const char *path, const char *format,
     va_start(args, format);
     vsnprintf(sentence, sizeof sentence, format, args);
     va_end(args);
-    return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: %s%s%s", json->file, path, *path ? ": " : "", sentence);
+    return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %s%s%s", json->file, path, *path ? ": " : "", sentence);
 }
 
 const char *pal_json_key(char out[PAL_JSON_PATH], const char *path, const char *key)
@@ -190,7 +190,7 @@ pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *pat
     if (n == 0 && !may_be_empty) return pal_json_bad(json, at, "is empty");
     for (size_t k = 0; k < n;) {
         int size = pal_utf8_next(item->valuestring + k, n - k, &code);
-        if (size == 0 || !pal_utf8_shown(code)) return pal_json_bad(json, at, "has a control character");
+        if (size == 0 || !pal_utf8_printable(code)) return pal_json_bad(json, at, "has a control character");
         k += (size_t)size;
     }
     memcpy(out, item->valuestring, n + 1);

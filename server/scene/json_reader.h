@@ -10,8 +10,8 @@
 enum { PAL_JSON_MOST = 1 << 20, PAL_JSON_DEPTH = 16, PAL_JSON_PATH = 96, PAL_JSON_KEYS = 64 };
 
 typedef struct pal_json {
-    const char *file; /* for messages */
-    pal_note *note;   /* may be NULL  */
+    const char *file;     /* for messages */
+    pal_diagnostic *diag; /* may be NULL  */
 } pal_json;
 
 /* text -> tree, whose root is an object; size, depth, UTF-8 and what stands behind the root are checked before and

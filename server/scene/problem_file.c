@@ -444,9 +444,9 @@ static pal_err read_problem(const reader *r, const cJSON *root)
 /* ---- doors ---- */
 
 pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, const char *folder, pal_problem **out,
-                          pal_note *note)
+                          pal_diagnostic *diag)
 {
-    reader r = {.json = {name, note}, .folder = folder};
+    reader r = {.json = {name, diag}, .folder = folder};
     cJSON *root;
     PAL_TRY(pal_json_parse(&r.json, text, n_byte, &root));
     r.out = calloc(1, sizeof *r.out);
@@ -456,7 +456,7 @@ pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, con
         snprintf(r.out->name, sizeof r.out->name, "%s", slash ? slash + 1 : name);
     }
     pal_err err =
-        r.out ? read_problem(&r, root) : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a problem", name);
+        r.out ? read_problem(&r, root) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a problem", name);
     cJSON_Delete(root);
     if (err) {
         free(r.out);
@@ -466,7 +466,7 @@ pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, con
     return PAL_ERR_OK;
 }
 
-pal_err pal_problem_read(const char *path, pal_problem **out, pal_note *note)
+pal_err pal_problem_read(const char *path, pal_problem **out, pal_diagnostic *diag)
 {
     char folder[512];
     const char *slash = strrchr(path, '/');
@@ -474,11 +474,11 @@ pal_err pal_problem_read(const char *path, pal_problem **out, pal_note *note)
             : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
                           : snprintf(folder, sizeof folder, ".");
     if (n < 0 || (size_t)n >= sizeof folder)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, note));
-    pal_err err = pal_problem_parse(path, (const char *)bytes, n_byte, folder, out, note);
+    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    pal_err err = pal_problem_parse(path, (const char *)bytes, n_byte, folder, out, diag);
     free(bytes);
     return err;
 }

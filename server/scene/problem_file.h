@@ -47,10 +47,10 @@
 #include "server/sim/core/problem.h"
 
 /* at most 1 MiB of JSON. *out: heap, free(). IO, REFUSED, MEMORY */
-pal_err pal_problem_read(const char *path, pal_problem **out, pal_note *note);
+pal_err pal_problem_read(const char *path, pal_problem **out, pal_diagnostic *diag);
 /* folder: where relative file names are; name: in messages. No file is opened */
 pal_err pal_problem_parse(const char *name, const char *json, size_t n_byte, const char *folder, pal_problem **out,
-                          pal_note *note);
+                          pal_diagnostic *diag);
 /* the case or reference of a name; NULL: none. `--case ID` takes either: a reference names its load case */
 const pal_problem_case *pal_problem_case_find(const pal_problem *problem, const char *id);
 const pal_problem_reference *pal_problem_reference_find(const pal_problem *problem, const char *id);

@@ -88,7 +88,7 @@ static pal_err read_nodes(const pal_json *json, const cJSON *grid, const char *p
                             PAL_GRID_MOST);
     PAL_TRY(read_box(json, grid, path, flat, low_m, high_m));
     *own = malloc(3 * (size_t)(out_n[0] * out_n[1] * out_n[2]) * sizeof **own);
-    if (!*own) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for its grid", path);
+    if (!*own) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for its grid", path);
     return PAL_ERR_OK;
 }
 
@@ -165,7 +165,7 @@ static pal_err sample(const pal_json *json, const char *path, const pal_label_vo
         if (out->n[c] > 32767) return pal_json_bad(json, path, "%d voxels on an axis, more than 32767", out->n[c]);
     if (count > voxels_most) return pal_json_bad(json, path, "%g voxels, more than %g", count, voxels_most);
     *own = calloc((size_t)count, 1);
-    if (!*own) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
+    if (!*own) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
     for (int k = 0; k < out->n[2]; k++)
         for (int j = 0; j < out->n[1]; j++)
             for (int i = 0; i < out->n[0]; i++) {
@@ -200,7 +200,7 @@ static pal_err read_label(const pal_json *json, const cJSON *region, const char 
     int is = 0;
     const cJSON *label = cJSON_GetObjectItemCaseSensitive(region, "label");
     pal_label_volume volume = {0};
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_json_key(path, above, "label");
     PAL_TRY(pal_json_object(json, label, path, known));
     PAL_TRY(pal_json_text(json, label, path, "volume", false, name, sizeof name));
@@ -210,9 +210,9 @@ static pal_err read_label(const pal_json *json, const cJSON *region, const char 
     int n =
         name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
     if (n < 0 || (size_t)n >= sizeof file) return pal_json_bad(json, path, "the path is too long");
-    pal_err err = pal_label_volume_read(file, &volume, &why);
+    pal_err err = pal_label_volume_read(file, &volume, &reason);
     if (err)
-        pal_note_set(json->note, err, "%s: %s: %s", json->file, pal_json_key(at, path, "volume"), why.text);
+        pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, pal_json_key(at, path, "volume"), reason.text);
     else
         err = sample(json, path, &volume, is, origin, out, own);
     pal_label_volume_free(&volume);
@@ -295,7 +295,7 @@ pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const cha
     for (int k = 0; k < 3; k++) {
         PAL_TRY(read_values(json, grid, path, spring_key[k], spring_low, spring_high, count,
                             scene->spring_grid[index] + k * count, &out->k_J[k]));
-        if (out->k_J[k] && pal_item_has(&def->model, spring_key[k]))
+        if (out->k_J[k] && pal_entry_has(&def->model, spring_key[k]))
             return pal_json_bad(json, pal_json_key(at, above, spring_key[k]),
                                 "stands beside a grid that gives the same");
     }
@@ -384,13 +384,13 @@ static void put_float(uint8_t *to, double value)
     for (int k = 0; k < 4; k++) to[k] = (uint8_t)(bits >> (8 * k));
 }
 
-pal_err pal_region_write(const pal_body_def *body, int region, const char *path, pal_note *note)
+pal_err pal_region_write(const pal_body_def *body, int region, const char *path, pal_diagnostic *diag)
 {
     enum { HEADER = 352 };
     const pal_region *r = &body->region[region];
     size_t count = (size_t)r->n[0] * (size_t)r->n[1] * (size_t)r->n[2];
     uint8_t *file = calloc(HEADER + count, 1);
-    if (!file) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
+    if (!file) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
     put_short(file, 348);    /* sizeof_hdr                                */
     put_short(file + 40, 3); /* dim                                       */
     put_short(file + 70, 2); /* datatype: one byte                        */
@@ -409,7 +409,7 @@ pal_err pal_region_write(const pal_body_def *body, int region, const char *path,
     }
     memcpy(file + 344, "n+1", 4);
     for (size_t k = 0; k < count; k++) file[HEADER + k] = r->label[k] == r->is;
-    pal_err err = pal_file_write(path, file, HEADER + count, note);
+    pal_err err = pal_file_write(path, file, HEADER + count, diag);
     free(file);
     return err;
 }

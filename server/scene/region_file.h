@@ -16,7 +16,7 @@ void pal_region_free(pal_loaded_scene *scene, int index);
 void pal_region_add(cJSON *object, const pal_body_def *body, const char *stem);
 /* "STEM_region2.nii", and the file itself: NIfTI-1, one byte a voxel, in the frame of the mesh's file; IO */
 void pal_region_volume(const char *stem, int region, char *out, size_t n_byte);
-pal_err pal_region_write(const pal_body_def *body, int region, const char *path, pal_note *note);
+pal_err pal_region_write(const pal_body_def *body, int region, const char *path, pal_diagnostic *diag);
 
 /* the key "grid" of a body's model, whose name is read already; nothing when it is absent. Freed with
  * pal_spring_grid_free */

@@ -16,44 +16,46 @@
 enum { FOLDER = 1024 };
 
 /* other: a key that somebody else reads, may be NULL */
-static pal_err read_item(const pal_json *json, const cJSON *object, const char *path, const char *other, pal_item *out)
+static pal_err read_item(const pal_json *json, const cJSON *object, const char *path, const char *other,
+                         pal_config_entry *out)
 {
-    char at[PAL_JSON_PATH], name[PAL_ITEM_TEXT] = "";
-    pal_note why = {""};
+    char at[PAL_JSON_PATH], name[PAL_ENTRY_TEXT] = "";
+    pal_diagnostic reason = {""};
     PAL_TRY(pal_json_object(json, object, path, NULL));
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
     if (!*name) return pal_json_bad(json, path, "has no name");
-    pal_item_init(out, path, name);
+    pal_entry_init(out, path, name);
     for (const cJSON *child = object->child; child; child = child->next) {
-        double number[PAL_ITEM_NUMBERS];
-        char text[PAL_ITEM_TEXT];
+        double number[PAL_ENTRY_NUMBERS];
+        char text[PAL_ENTRY_TEXT];
         pal_err err = PAL_ERR_OK;
         if (!strcmp(child->string, "name") || (other && !strcmp(child->string, other))) continue;
         pal_json_key(at, path, child->string);
         if (cJSON_IsNumber(child)) {
-            err = pal_item_put_number(out, child->string, child->valuedouble, &why);
+            err = pal_entry_put_number(out, child->string, child->valuedouble, &reason);
         } else if (cJSON_IsBool(child)) {
-            err = pal_item_put_bool(out, child->string, cJSON_IsTrue(child), &why);
+            err = pal_entry_put_bool(out, child->string, cJSON_IsTrue(child), &reason);
         } else if (cJSON_IsString(child)) {
             PAL_TRY(pal_json_text(json, object, path, child->string, true, text, sizeof text));
-            err = pal_item_put_text(out, child->string, text, &why);
+            err = pal_entry_put_text(out, child->string, text, &reason);
         } else if (cJSON_IsArray(child)) {
             int n = 0;
             for (const cJSON *entry = child->child; entry; entry = entry->next) {
-                if (n == PAL_ITEM_NUMBERS) return pal_json_bad(json, at, "more than %d numbers", PAL_ITEM_NUMBERS);
+                if (n == PAL_ENTRY_NUMBERS) return pal_json_bad(json, at, "more than %d numbers", PAL_ENTRY_NUMBERS);
                 if (!cJSON_IsNumber(entry)) return pal_json_bad(json, at, "is not a list of numbers");
                 number[n++] = entry->valuedouble;
             }
-            err = pal_item_put_numbers(out, child->string, number, n, &why);
+            err = pal_entry_put_numbers(out, child->string, number, n, &reason);
         } else {
             return pal_json_bad(json, at, "is not a number, text, true, false or list of numbers");
         }
-        if (err) return pal_note_set(json->note, err, "%s: %s", json->file, why.text);
+        if (err) return pal_diagnostic_set(json->diag, err, "%s: %s", json->file, reason.text);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err read_item_at(const pal_json *json, const cJSON *object, const char *path, const char *key, pal_item *out)
+static pal_err read_item_at(const pal_json *json, const cJSON *object, const char *path, const char *key,
+                            pal_config_entry *out)
 {
     char at[PAL_JSON_PATH];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
@@ -84,11 +86,11 @@ static pal_err read_material(const pal_json *json, const cJSON *body, const char
     return pal_json_number(json, object, at, "damping_1_s", 0, 1e6, &m->damping_1_s);
 }
 
-static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support *out)
+static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support_def *out)
 {
     static const char *const known[] = {"lowest", "box", "rim", NULL}, *const corners[] = {"low_m", "high_m", NULL};
     char at[PAL_JSON_PATH];
-    *out = (pal_support){.fraction = 0.05};
+    *out = (pal_support_def){.fraction = 0.05};
     PAL_TRY(pal_json_object(json, object, path, known));
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
     out->lowest = cJSON_GetObjectItemCaseSensitive(object, "lowest") != NULL;
@@ -121,7 +123,7 @@ static pal_err place_of(const pal_json *json, const char *path, const char *fold
 }
 
 static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder,
-                         const pal_item *model, pal_prepared *out)
+                         const pal_config_entry *model, pal_prepared *out)
 {
     char name[FOLDER / 2] = "", units[16] = "", at[PAL_JSON_PATH], file[FOLDER + FOLDER / 2];
     bool has_mesh = cJSON_GetObjectItemCaseSensitive(body, "mesh") != NULL;
@@ -131,14 +133,16 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
     PAL_TRY(pal_json_text(json, body, path, key, false, name, sizeof name));
     pal_json_key(at, path, key);
     PAL_TRY(place_of(json, at, folder, name, file, sizeof file));
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_err err;
     if (has_mesh) {
         static const char *const only_surface[] = {"units", "resolution", "label", "triangles", "largest"};
-        for (int k = 0; k < 5; k++)
+        /* components of a mesh of tetrahedra are looked for whatever it was made from, pieces of a surface are not */
+        const int n = !strcmp(model->name, "adaptive_springs") ? 5 : 4;
+        for (int k = 0; k < n; k++)
             if (cJSON_GetObjectItemCaseSensitive(body, only_surface[k]))
                 return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
-        err = pal_prepared_load(file, out, &why);
+        err = pal_prepared_load(file, out, &reason);
     } else {
         pal_surface_scene options = {
             .label = -1, .fem = !strcmp(model->name, "fem"), .adaptive = !strcmp(model->name, "adaptive_springs")};
@@ -153,9 +157,9 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0)
             return pal_json_bad(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
-        err = pal_scene_prepare_file(file, &options, out, NULL, &why);
+        err = pal_scene_prepare_file(file, &options, out, NULL, &reason);
     }
-    return err ? pal_note_set(json->note, err, "%s: %s: %s", json->file, at, why.text) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, at, reason.text) : PAL_ERR_OK;
 }
 
 static pal_err read_lists(const pal_json *json, const cJSON *object, const char *path, pal_body_def *body)
@@ -167,7 +171,7 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, body->n_support++)
         PAL_TRY(read_support(json, child, pal_json_entry(entry, pal_json_key(at, path, "supports"), body->n_support),
                              &body->support[body->n_support]));
-    PAL_TRY(pal_json_list(json, object, path, "effects", PAL_ROW_ITEMS, &list));
+    PAL_TRY(pal_json_list(json, object, path, "effects", PAL_ENTRIES_MAX, &list));
     if (list) body->n_effect = 0;
     pal_json_key(at, path, "effects");
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, body->n_effect++)
@@ -191,7 +195,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     snprintf(name, sizeof name, "body %d", index + 1);
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
     pal_body_def *body = &scene->scene.body[index];
-    bool solid = cJSON_GetObjectItemCaseSensitive(object, "cells") != NULL;
+    bool solid = cJSON_GetObjectItemCaseSensitive(object, "cells") != NULL, largest_only = false;
     if (solid)
         pal_body_default_cells(body, name, &scene->mesh[index], NULL);
     else
@@ -210,6 +214,10 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     else
         PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
+    PAL_TRY(pal_json_bool(json, object, path, "largest", &largest_only));
+    pal_diagnostic reason = {""};
+    pal_err err = pal_scene_drop_loose(scene, index, largest_only, &reason);
+    if (err) return pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, path, reason.text);
     return pal_region_read(json, object, path, folder, scene, index);
 }
 
@@ -279,8 +287,8 @@ static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *sce
 
 static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
 {
-    static const char *const known[] = {"name", "title",        "source",       "accuracy", "budget", "step_s",
-                                        "up",   "gravity_m_s2", "most_substep", "bodies",   "tools",  NULL};
+    static const char *const known[] = {"name", "title",        "source",      "accuracy", "budget", "step_s",
+                                        "up",   "gravity_m_s2", "max_substep", "bodies",   "tools",  NULL};
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
     const cJSON *list;
@@ -294,28 +302,28 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     PAL_TRY(read_wish(json, root, scene));
     PAL_TRY(pal_json_number(json, root, "", "step_s", 1e-4, 0.1, &scene->step_s));
     PAL_TRY(pal_json_number(json, root, "", "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
-    PAL_TRY(pal_json_count(json, root, "", "most_substep", 1, 1000000, &scene->most_substep));
+    PAL_TRY(pal_json_count(json, root, "", "max_substep", 1, 1000000, &scene->max_substep));
     PAL_TRY(pal_json_vector(json, root, "", "up", scene->up));
     PAL_TRY(read_tools(json, root, scene));
     PAL_TRY(pal_json_list(json, root, "", "bodies", PAL_BODY_MAX, &list));
     if (!list || !list->child) return pal_json_bad(json, "bodies", "a scene needs at least one body");
     for (const cJSON *child = list->child; child; child = child->next, scene->n_body++)
         PAL_TRY(read_body(json, child, scene->n_body, folder, loaded));
-    pal_note why = {""};
-    pal_err err = pal_scene_check(scene, &why);
-    return err ? pal_note_set(json->note, err, "%s: %s", json->file, why.text) : PAL_ERR_OK;
+    pal_diagnostic reason = {""};
+    pal_err err = pal_scene_check(scene, &reason);
+    return err ? pal_diagnostic_set(json->diag, err, "%s: %s", json->file, reason.text) : PAL_ERR_OK;
 }
 
 pal_err pal_scene_parse(const char *name, const char *text, size_t n_byte, const char *folder, pal_loaded_scene **out,
-                        pal_note *note)
+                        pal_diagnostic *diag)
 {
-    pal_json json = {name, note};
+    pal_json json = {name, diag};
     cJSON *root;
     PAL_TRY(pal_json_parse(&json, text, n_byte, &root));
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     pal_err err = loaded ? read_scene(&json, root, folder, loaded) : PAL_ERR_MEMORY;
     cJSON_Delete(root);
-    if (!loaded) return pal_note_set(note, err, "%s: no memory for a scene", name);
+    if (!loaded) return pal_diagnostic_set(diag, err, "%s: no memory for a scene", name);
     if (err) {
         pal_scene_free(loaded);
         return err;
@@ -324,7 +332,7 @@ pal_err pal_scene_parse(const char *name, const char *text, size_t n_byte, const
     return PAL_ERR_OK;
 }
 
-pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note)
+pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_diagnostic *diag)
 {
     char folder[FOLDER];
     const char *slash = strrchr(path, '/');
@@ -332,11 +340,11 @@ pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_note *note)
             : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
                           : snprintf(folder, sizeof folder, ".");
     if (n < 0 || (size_t)n >= sizeof folder)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, note));
-    pal_err err = pal_scene_parse(path, (const char *)bytes, n_byte, folder, out, note);
+    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    pal_err err = pal_scene_parse(path, (const char *)bytes, n_byte, folder, out, diag);
     free(bytes);
     return err;
 }

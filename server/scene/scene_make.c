@@ -74,7 +74,7 @@ static void shown_text(const char *from, char *out, size_t n_byte)
     for (size_t at = 0; at < n_from;) {
         uint32_t code;
         int size = pal_utf8_next(from + at, n_from - at, &code);
-        if (size && pal_utf8_shown(code)) {
+        if (size && pal_utf8_printable(code)) {
             if (n + (size_t)size >= n_byte) break;
             memcpy(out + n, from + at, (size_t)size);
             n += (size_t)size;
@@ -111,7 +111,7 @@ static pal_voxel_options voxel_options(const pal_surface_scene *options)
     return (pal_voxel_options){.resolution = options->resolution,
                                .border = true,
                                .largest_only = options->largest_only,
-                               .least_fill = options->fem ? fem_least_fill : 0};
+                               .min_fill = options->fem ? fem_least_fill : 0};
 }
 
 /* corners of kept voxels, or 0 when there is no memory to tell */
@@ -131,7 +131,8 @@ static double count_nodes(const pal_voxels *v)
 }
 
 /* the resolution that comes nearest to 2,600 kept voxels, or for model fem to 2,500 nodes */
-static pal_err choose_resolution(const pal_surface *surface, const pal_surface_scene *wish, int *out, pal_note *note)
+static pal_err choose_resolution(const pal_surface *surface, const pal_surface_scene *wish, int *out,
+                                 pal_diagnostic *diag)
 {
     int n = clamp(first_resolution(surface), 4, 400), best = 0;
     double best_miss = INFINITY;
@@ -140,7 +141,7 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
         options.resolution = n;
         pal_voxels voxels;
         pal_voxel_report report;
-        pal_err err = pal_voxels_fill(surface, &options, &voxels, &report, note);
+        pal_err err = pal_voxels_fill(surface, &options, &voxels, &report, diag);
         /* nothing inside at a coarse grid: try a finer one before believing it */
         if (err == PAL_ERR_REFUSED && round < 3 && best == 0 && n < 100) {
             n *= 2;
@@ -165,26 +166,26 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
 
 /* the label asked for, or the most frequent one */
 static pal_err read_volume(const char *path, const pal_surface_scene *options, pal_surface *out,
-                           pal_surface_scene_report *report, pal_note *note)
+                           pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_label_volume volume;
     pal_label_count count[LABELS];
-    PAL_TRY(pal_label_volume_read(path, &volume, note));
+    PAL_TRY(pal_label_volume_read(path, &volume, diag));
     say(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
-    pal_err err = n == 0 ? pal_note_set(note, PAL_ERR_REFUSED, "%s: %s: the volume holds no label but 0", path,
-                                        report->surface.place)
+    pal_err err = n == 0 ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s: the volume holds no label but 0", path,
+                                              report->surface.place)
                          : PAL_ERR_OK;
     if (!err) {
         int wanted = options->adaptive ? COARSE_TRI : WANTED_TRI;
         pal_label_surface_options surface = {
             .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : wanted};
-        pal_note why = {""};
+        pal_diagnostic reason = {""};
         report->n_label = n;
         report->label = options->label >= 0 ? options->label : count[0].label;
-        err = pal_label_volume_surface(&volume, report->label, &surface, out, &why);
-        if (err) pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
+        err = pal_label_volume_surface(&volume, report->label, &surface, out, &reason);
+        if (err) pal_diagnostic_set(diag, err, "%s: %s: %s", path, report->surface.place, reason.text);
     }
     if (!err) {
         snprintf(report->surface.format, sizeof report->surface.format, "%s", volume.format);
@@ -196,29 +197,29 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
 }
 
 static pal_err read_any(const char *path, const pal_surface_scene *options, pal_surface *out,
-                        pal_surface_scene_report *report, pal_note *note)
+                        pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     double start = pal_clock_s();
     struct stat facts;
     say(options, "read", 0);
     report->label = -1;
     /* a pipe or device would be waited for */
-    if (stat(path, &facts)) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    if (!S_ISREG(facts.st_mode)) return pal_note_set(note, PAL_ERR_REFUSED, "%s: not a file", path);
+    if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    if (!S_ISREG(facts.st_mode)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a file", path);
     pal_err err;
     if (pal_label_volume_is(path)) {
         if (options->unit_m > 0 && options->unit_m != 1e-3)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: a scan is in mm, no other unit can be given", path);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: a scan is in mm, no other unit can be given", path);
         report->unit_m = 1e-3;
         report->unit_name = "mm";
-        err = read_volume(path, options, out, report, note);
+        err = read_volume(path, options, out, report, diag);
     } else if (options->label > 0) {
-        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
-                           options->label);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
+                                 options->label);
     } else {
         pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD};
         report->unit_guessed = options->unit_m == 0;
-        err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, note);
+        err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, diag);
     }
     report->read_s = pal_clock_s() - start;
     return err;
@@ -226,32 +227,32 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
 
 /* surface -> prepared mesh at the resolution asked for or chosen */
 static pal_err make(const char *name, const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,
-                    pal_surface_scene_report *report, pal_note *note)
+                    pal_surface_scene_report *report, pal_diagnostic *diag)
 {
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     pal_voxel_options voxel = voxel_options(options);
     pal_err err = PAL_ERR_OK;
     if (options->adaptive) {
-        err = pal_scene_shell_prepare(surface, options, out, &why);
+        err = pal_scene_shell_prepare(surface, options, out, &reason);
     } else {
         say(options, "fill", 0);
-        if (!options->resolution) err = choose_resolution(surface, options, &voxel.resolution, &why);
+        if (!options->resolution) err = choose_resolution(surface, options, &voxel.resolution, &reason);
         say(options, "split and skin", 0);
-        if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &why);
+        if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &reason);
         report->resolution = voxel.resolution;
     }
     const char *place = report->surface.place;
-    return err ? pal_note_set(note, err, "%s: %s%s%s", name, place, *place ? ": " : "", why.text) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(diag, err, "%s: %s%s%s", name, place, *place ? ": " : "", reason.text) : PAL_ERR_OK;
 }
 
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
-                               pal_surface_scene_report *report, pal_note *note)
+                               pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_surface_scene_report own = {0};
     pal_surface surface = {0};
     if (!report) report = &own;
-    PAL_TRY(read_any(path, options, &surface, report, note));
-    pal_err err = make(path, &surface, options, out, report, note);
+    PAL_TRY(read_any(path, options, &surface, report, diag));
+    pal_err err = make(path, &surface, options, out, report, diag);
     pal_surface_free(&surface);
     return err;
 }
@@ -275,28 +276,28 @@ static void leave_gravity_out(pal_body_def *body)
 /* a body that nobody touches costs nothing once it rests */
 static void let_sleep(pal_body_def *body)
 {
-    pal_item_init(&body->effect[body->n_effect++], "", "sleep");
+    pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
 }
 
 /* model and solver as asked for */
 static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options,
-                            const pal_surface_scene_report *report, pal_note *note)
+                            const pal_surface_scene_report *report, pal_diagnostic *diag)
 {
-    if (options->adaptive) return pal_scene_shell_dress(body, options, report, note);
+    if (options->adaptive) return pal_scene_shell_dress(body, options, report, diag);
     /* edges and volumes alone have the same moduli and cost half (README, tables) */
     if (!options->fem)
-        return options->area_springs ? PAL_ERR_OK : pal_item_put_number(&body->model, "k_area_J", 0, note);
-    pal_item_init(&body->model, "bodies[0].model", "fem");
-    PAL_TRY(pal_item_put_text(&body->model, "element", options->element ? options->element : "hex8_bbar", note));
-    PAL_TRY(pal_item_put_text(&body->model, "law", options->law ? options->law : "corotational", note));
-    PAL_TRY(pal_item_put_bool(&body->model, "fill", true, note));
-    pal_item_init(&body->solver, "bodies[0].solver", options->solver ? options->solver : "implicit_euler");
+        return options->area_springs ? PAL_ERR_OK : pal_entry_put_number(&body->model, "k_area_J", 0, diag);
+    pal_entry_init(&body->model, "bodies[0].model", "fem");
+    PAL_TRY(pal_entry_put_text(&body->model, "element", options->element ? options->element : "hex8_bbar", diag));
+    PAL_TRY(pal_entry_put_text(&body->model, "law", options->law ? options->law : "corotational", diag));
+    PAL_TRY(pal_entry_put_bool(&body->model, "fill", true, diag));
+    pal_entry_init(&body->solver, "bodies[0].solver", options->solver ? options->solver : "implicit_euler");
     return PAL_ERR_OK;
 }
 
 /* one body with defaults around the prepared mesh in mesh[0] */
 static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
-                     const pal_surface_scene_report *report, pal_note *note)
+                     const pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
@@ -307,10 +308,10 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(&scene->body[0]);
-    PAL_TRY(choose_model(&scene->body[0], options, report, note));
+    PAL_TRY(choose_model(&scene->body[0], options, report, diag));
     let_sleep(&scene->body[0]);
     for (int k = 0; k < scene->body[0].n_effect; k++)
-        snprintf(scene->body[0].effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
+        snprintf(scene->body[0].effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) scene->body[0].material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
@@ -319,31 +320,32 @@ static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surfa
     double low[3], high[3];
     pal_surface_box(&loaded->mesh[0].surface, low, high);
     for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
-    return pal_scene_check(scene, note);
+    return pal_scene_check(scene, diag);
 }
 
-static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_note *note)
+static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_diagnostic *diag)
 {
     char shown[256];
     if (strlen(text) >= n_byte)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %zu bytes, more than %zu", what, strlen(text), n_byte - 1);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %zu", what, strlen(text),
+                                  n_byte - 1);
     shown_text(text, shown, sizeof shown);
     if (strcmp(text, shown))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: has characters that cannot be shown", what);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has characters that cannot be shown", what);
     return PAL_ERR_OK;
 }
 
 pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char *title, const char *source,
-                         pal_note *note)
+                         pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
     pal_scene_plain_name(name ? name : scene->name, plain);
     if (name && strcmp(plain, name))
-        return pal_note_set(note, PAL_ERR_REFUSED, "name: wanted at most %d of the characters a-z 0-9 _ -",
-                            PAL_NAME - 1);
-    if (title) PAL_TRY(check_shown("title", title, sizeof scene->title, note));
-    if (source) PAL_TRY(check_shown("source", source, sizeof scene->source, note));
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "name: wanted at most %d of the characters a-z 0-9 _ -",
+                                  PAL_NAME - 1);
+    if (title) PAL_TRY(check_shown("title", title, sizeof scene->title, diag));
+    if (source) PAL_TRY(check_shown("source", source, sizeof scene->source, diag));
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     if (name && scene->n_body == 1) snprintf(scene->body[0].name, sizeof scene->body[0].name, "%s", name);
     if (title) snprintf(scene->title, sizeof scene->title, "%s", title);
@@ -351,31 +353,52 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
     return PAL_ERR_OK;
 }
 
+/* leaves out what nothing holds, and puts right what the report says of the mesh */
+static pal_err drop_loose(pal_loaded_scene *loaded, const pal_surface_scene *options, pal_surface_scene_report *report,
+                          pal_diagnostic *diag)
+{
+    pal_prepare_report *told = &report->prepare;
+    const pal_prepared *mesh = &loaded->mesh[0];
+    pal_diagnostic reason = {""};
+    if (told->voxel.n_component == 1) return PAL_ERR_OK;
+    pal_err err = pal_scene_drop_loose(loaded, 0, options->largest_only, &reason);
+    if (err == PAL_ERR_REFUSED)
+        return pal_diagnostic_set(diag, err, "%s; finer voxels may join them (--resolution, now %d)", reason.text,
+                                  report->resolution);
+    if (err) return pal_diagnostic_set(diag, err, "%s", reason.text);
+    if (loaded->loose[0].n_dropped == 0) return PAL_ERR_OK;
+    told->voxel.n_component -= loaded->loose[0].n_dropped;
+    told->n_voxel = mesh->hexes.n_hex;
+    told->volume_m3 = pal_tets_volume(&mesh->tets);
+    return PAL_ERR_OK;
+}
+
 /* an empty scene and report; NULL: out of memory */
-static pal_loaded_scene *begin(pal_surface_scene_report *report, const char *name, pal_note *note)
+static pal_loaded_scene *begin(pal_surface_scene_report *report, const char *name, pal_diagnostic *diag)
 {
     *report = (pal_surface_scene_report){.unit_name = "", .label = -1};
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
-    if (!loaded) pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a scene", name);
+    if (!loaded) pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a scene", name);
     return loaded;
 }
 
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
-                               pal_surface_scene_report *report, pal_note *note)
+                               pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_surface_scene_report own;
     if (!report) report = &own;
-    pal_loaded_scene *loaded = begin(report, path, note);
+    pal_loaded_scene *loaded = begin(report, path, diag);
     if (!loaded) return PAL_ERR_MEMORY;
     char stem[256], shown[100];
     const char *slash = strrchr(path, '/');
     pal_scene_stem(path, stem, sizeof stem);
-    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, note);
-    pal_note why = {""};
+    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, diag);
+    pal_diagnostic reason = {""};
     say(options, "levels", 0);
-    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &why);
-    if (!err) err = dress(loaded, stem, options, report, &why);
-    if (err && why.text[0]) pal_note_set(note, err, "%s: %s: %s", path, report->surface.place, why.text);
+    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &reason);
+    if (!err) err = dress(loaded, stem, options, report, &reason);
+    if (!err) err = drop_loose(loaded, options, report, &reason);
+    if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s: %s", path, report->surface.place, reason.text);
     if (err) {
         pal_scene_free(loaded);
         return err;
@@ -419,7 +442,8 @@ static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double
 }
 
 /* name, body and tools of control cells in cells[0] with their boundary in mesh[0] */
-static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options, pal_note *note)
+static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
+                           pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     pal_body_def *body = &scene->body[0];
@@ -431,11 +455,11 @@ static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal
     scene->step_s = LIVE_STEP_S;
     snprintf(scene->name, sizeof scene->name, "%s", plain);
     pal_body_default_cells(body, plain, &loaded->mesh[0], &loaded->cells[0]);
-    PAL_TRY(pal_item_put_number(&body->model, "levels",
-                                options->n_level ? options->n_level : choose_levels(&loaded->cells[0]), note));
+    PAL_TRY(pal_entry_put_number(&body->model, "levels",
+                                 options->n_level ? options->n_level : choose_levels(&loaded->cells[0]), diag));
     if (!options->gravity) leave_gravity_out(body);
     let_sleep(body);
-    for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ITEM_TEXT, "bodies[0].effects[%d]", k);
+    for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
     if (options->material.young_Pa > 0) body->material = options->material;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
     if (options->hold > 0)
@@ -446,20 +470,23 @@ static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal
     pal_tools_default(scene, 3);
     pal_surface_box(&loaded->mesh[0].surface, low, high);
     for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
-    return pal_scene_check(scene, note);
+    return pal_scene_check(scene, diag);
 }
 
-pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out, pal_note *note)
+pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
+                             pal_diagnostic *diag)
 {
     pal_surface_scene_report unused;
     char stem[256], shown[100];
     const char *slash = strrchr(path, '/');
-    pal_note why = {""};
-    pal_loaded_scene *loaded = begin(&unused, path, note);
+    pal_diagnostic reason = {""};
+    pal_loaded_scene *loaded = begin(&unused, path, diag);
     if (!loaded) return PAL_ERR_MEMORY;
     pal_scene_stem(path, stem, sizeof stem);
-    pal_err err = pal_solid_load(path, options->unit_m > 0 ? options->unit_m : 1, NULL, loaded, 0, note);
-    if (!err && (err = dress_cells(loaded, stem, options, &why))) pal_note_set(note, err, "%s: %s", path, why.text);
+    pal_err err = pal_solid_load(path, options->unit_m > 0 ? options->unit_m : 1, NULL, loaded, 0, diag);
+    if (!err) err = dress_cells(loaded, stem, options, &reason);
+    if (!err) err = pal_scene_drop_loose(loaded, 0, options->largest_only, &reason);
+    if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
     if (err) {
         pal_scene_free(loaded);
         return err;
@@ -473,7 +500,7 @@ pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options,
 
 /* the shape's own supports and anchors in place of the defaults; what is asked for still wins */
 static pal_err dress_shape(pal_scene *scene, const pal_scene_shape *shape, const pal_surface_scene *options,
-                           pal_note *note)
+                           pal_diagnostic *diag)
 {
     pal_body_def *body = &scene->body[0];
     snprintf(scene->title, sizeof scene->title, "%s", shape->title);
@@ -481,30 +508,30 @@ static pal_err dress_shape(pal_scene *scene, const pal_scene_shape *shape, const
     if (!options->adaptive || options->hold > 0) return PAL_ERR_OK;
     body->n_support = shape->n_support;
     for (int k = 0; k < shape->n_support; k++) body->support[k] = shape->support[k];
-    return shape->in_space ? pal_item_put_text(&body->model, "frame", "world", note) : PAL_ERR_OK;
+    return shape->in_space ? pal_entry_put_text(&body->model, "frame", "world", diag) : PAL_ERR_OK;
 }
 
 /* the surface of a procedural scene: our organ, or a shape */
-static pal_err make_procedural(const pal_surface_scene *options, pal_scene_shape *out, pal_note *note)
+static pal_err make_procedural(const pal_surface_scene *options, pal_scene_shape *out, pal_diagnostic *diag)
 {
-    if (options->shape && strcmp(options->shape, "organ") != 0) return pal_scene_shape_make(options->shape, out, note);
+    if (options->shape && strcmp(options->shape, "organ") != 0) return pal_scene_shape_make(options->shape, out, diag);
     *out = (pal_scene_shape){.name = "organ", .title = "Procedural organ"};
     pal_err err = pal_organ_make(options->target_tri ? options->target_tri : WANTED_TRI, &out->surface);
-    if (err) pal_note_set(note, err, "the procedural organ: %s", pal_err_text(err));
+    if (err) pal_diagnostic_set(diag, err, "the procedural organ: %s", pal_err_text(err));
     return err;
 }
 
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
-                             pal_note *note)
+                             pal_diagnostic *diag)
 {
     pal_surface_scene_report own;
     if (!report) report = &own;
-    pal_loaded_scene *loaded = begin(report, "procedural organ", note);
+    pal_loaded_scene *loaded = begin(report, "procedural organ", diag);
     if (!loaded) return PAL_ERR_MEMORY;
     pal_scene_shape shape = {0};
     double start = pal_clock_s();
     say(options, "organ", 0);
-    pal_err err = make_procedural(options, &shape, note);
+    pal_err err = make_procedural(options, &shape, diag);
     report->read_s = pal_clock_s() - start;
     report->unit_m = 1;
     report->unit_name = "m";
@@ -513,13 +540,14 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     report->surface.n_tri_read = shape.surface.n_tri;
     char name[PAL_NAME];
     snprintf(name, sizeof name, "procedural %.30s", shape.name);
-    if (!err) err = make(name, &shape.surface, options, &loaded->mesh[0], report, note);
-    pal_note why = {""};
-    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &why);
-    if (err && why.text[0]) pal_note_set(note, err, "%s: %s", name, why.text);
+    if (!err) err = make(name, &shape.surface, options, &loaded->mesh[0], report, diag);
+    pal_diagnostic reason = {""};
+    if (!err && options->adaptive) err = pal_scene_shell_inspect(&loaded->mesh[0].surface, options, report, &reason);
+    if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     pal_surface_free(&shape.surface);
-    if (!err) err = dress(loaded, shape.name, options, report, note);
-    if (!err) err = dress_shape(&loaded->scene, &shape, options, note);
+    if (!err) err = dress(loaded, shape.name, options, report, diag);
+    if (!err) err = dress_shape(&loaded->scene, &shape, options, diag);
+    if (!err) err = drop_loose(loaded, options, report, diag);
     if (err) {
         pal_scene_free(loaded);
         return err;

@@ -47,13 +47,13 @@ static void add_number(cJSON *object, const char *key, double number)
     cJSON_AddItemToObject(object, key, pal_json_exact(number));
 }
 
-static cJSON *add_item(cJSON *parent, const char *key, const pal_item *item)
+static cJSON *add_item(cJSON *parent, const char *key, const pal_config_entry *item)
 {
     cJSON *object = key ? cJSON_AddObjectToObject(parent, key) : cJSON_CreateObject();
     if (!key) cJSON_AddItemToArray(parent, object);
     cJSON_AddStringToObject(object, "name", item->name);
     for (int k = 0; k < item->n_value; k++) {
-        const pal_value *v = &item->value[k];
+        const pal_config_value *v = &item->value[k];
         switch (v->kind) {
         case PAL_VALUE_NUMBER:
             add_number(object, v->key, v->number[0]);
@@ -76,7 +76,7 @@ static void add_supports(cJSON *object, const pal_body_def *body)
 {
     cJSON *list = cJSON_AddArrayToObject(object, "supports");
     for (int k = 0; k < body->n_support; k++) {
-        const pal_support *s = &body->support[k];
+        const pal_support_def *s = &body->support[k];
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddItemToArray(list, entry);
         if (s->rim) {
@@ -152,7 +152,7 @@ static char *scene_text(const pal_scene *scene)
     add_number(root, "step_s", scene->step_s);
     cJSON_AddItemToObject(root, "up", pal_json_exact_list(scene->up, 3));
     add_number(root, "gravity_m_s2", scene->gravity_m_s2);
-    add_number(root, "most_substep", scene->most_substep);
+    add_number(root, "max_substep", scene->max_substep);
     cJSON *bodies = cJSON_AddArrayToObject(root, "bodies");
     for (int k = 0; k < scene->n_body; k++) add_body(bodies, scene, k);
     cJSON *tools = cJSON_AddArrayToObject(root, "tools");
@@ -168,49 +168,49 @@ static char *scene_text(const pal_scene *scene)
     return text;
 }
 
-pal_err pal_scene_make_folder(const char *folder, pal_note *note)
+pal_err pal_scene_make_folder(const char *folder, pal_diagnostic *diag)
 {
     char path[PATH];
     int n = snprintf(path, sizeof path, "%s", folder);
     if (n < 1 || (size_t)n >= sizeof path)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s: not a folder's name", folder);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s: not a folder's name", folder);
     for (char *at = path + 1;; at++) {
         char end = *at;
         if (end != '/' && end != 0) continue;
         *at = 0;
         if (mkdir(path, 0777) && errno != EEXIST)
-            return pal_note_set(note, PAL_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+            return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
         if (end == 0) break;
         *at = end;
     }
     struct stat facts;
     if (stat(path, &facts) || !S_ISDIR(facts.st_mode))
-        return pal_note_set(note, PAL_ERR_IO, "%s: is there and not a folder", path);
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: is there and not a folder", path);
     return PAL_ERR_OK;
 }
 
 /* mesh and label volumes of a body; what was written is counted in *n_file */
-static pal_err save_body(const pal_scene *scene, int index, const char *folder, int *n_file, pal_note *note)
+static pal_err save_body(const pal_scene *scene, int index, const char *folder, int *n_file, pal_diagnostic *diag)
 {
     const pal_body_def *body = &scene->body[index];
     const int *n = body->spring_grid.n;
     char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
     if ((double)n[0] * n[1] * n[2] > PAL_GRID_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, more than %d", body->name,
-                            (double)n[0] * n[1] * n[2], PAL_GRID_MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, more than %d", body->name,
+                                  (double)n[0] * n[1] * n[2], PAL_GRID_MOST);
     mesh_name(scene, index, name);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     if (body->cells)
-        PAL_TRY(pal_cell_file_save(body->cells, path, note));
+        PAL_TRY(pal_cell_file_save(body->cells, path, diag));
     else
-        PAL_TRY(pal_prepared_save(body->mesh, path, note));
+        PAL_TRY(pal_prepared_save(body->mesh, path, diag));
     ++*n_file;
     stem_of(scene, index, name);
     for (int k = 0; k < body->n_region; k++) {
         if (body->region[k].kind != PAL_REGION_LABEL) continue;
         pal_region_volume(name, k, volume, sizeof volume);
         snprintf(path, sizeof path, "%s/%s", folder, volume);
-        PAL_TRY(pal_region_write(body, k, path, note));
+        PAL_TRY(pal_region_write(body, k, path, diag));
         ++*n_file;
     }
     return PAL_ERR_OK;
@@ -238,31 +238,31 @@ static void remove_files(const pal_scene *scene, const char *folder, int n_file)
 }
 
 /* meshes into the folder, then the scene's text to path, which lies in it */
-static pal_err save_to(const pal_scene *scene, const char *folder, const char *path, pal_note *note)
+static pal_err save_to(const pal_scene *scene, const char *folder, const char *path, pal_diagnostic *diag)
 {
     int n_file = 0;
     pal_err err = PAL_ERR_OK;
-    for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, note);
+    for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, diag);
     char *text = err ? NULL : scene_text(scene);
-    if (!err && !text) err = pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for its text", path);
+    if (!err && !text) err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     if (!err && strlen(text) > PAL_JSON_MOST)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
-                           PAL_JSON_MOST);
-    if (!err) err = pal_file_write(path, text, strlen(text), note);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
+                                 PAL_JSON_MOST);
+    if (!err) err = pal_file_write(path, text, strlen(text), diag);
     cJSON_free(text);
     if (err) remove_files(scene, folder, n_file);
     return err;
 }
 
-pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_note *note)
+pal_err pal_scene_save(const pal_loaded_scene *loaded, const char *folder, pal_diagnostic *diag)
 {
     char path[PATH];
-    PAL_TRY(pal_scene_make_folder(folder, note));
+    PAL_TRY(pal_scene_make_folder(folder, diag));
     snprintf(path, sizeof path, "%s/scene.json", folder);
-    return save_to(&loaded->scene, folder, path, note);
+    return save_to(&loaded->scene, folder, path, diag);
 }
 
-pal_err pal_scene_save_file(const pal_loaded_scene *loaded, const char *path, pal_note *note)
+pal_err pal_scene_save_file(const pal_loaded_scene *loaded, const char *path, pal_diagnostic *diag)
 {
     char folder[PATH];
     const char *slash = strrchr(path, '/');
@@ -270,6 +270,6 @@ pal_err pal_scene_save_file(const pal_loaded_scene *loaded, const char *path, pa
             : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
                           : snprintf(folder, sizeof folder, ".");
     if (n < 0 || (size_t)n >= sizeof folder || strlen(path) >= PATH || !path[0] || (slash && !slash[1]))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s: not the name of a file", path);
-    return save_to(&loaded->scene, folder, path, note);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s: not the name of a file", path);
+    return save_to(&loaded->scene, folder, path, diag);
 }

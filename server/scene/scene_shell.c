@@ -19,7 +19,7 @@ static const double opening_m = 0.003; /* around an opening's vertices, so that 
 /* ---- surfaces ---- */
 
 /* drops the triangles of all pieces but the one of the largest area, and vertices of none */
-static pal_err keep_largest(pal_surface *surface, pal_note *note)
+static pal_err keep_largest(pal_surface *surface, pal_diagnostic *diag)
 {
     int n_piece = 0, best = 0, kept = 0;
     int32_t *label = malloc(sizeof *label * (size_t)surface->n_tri);
@@ -42,7 +42,7 @@ static pal_err keep_largest(pal_surface *surface, pal_note *note)
     free(area);
     free(label);
     pal_surface_report dropped = {0};
-    return !err && n_piece > 1 ? pal_surface_clean(surface, 0, &dropped, note) : err;
+    return !err && n_piece > 1 ? pal_surface_clean(surface, 0, &dropped, diag) : err;
 }
 
 /* a closed surface whose triangles run clockwise seen from outside is turned */
@@ -57,11 +57,11 @@ static void turn_outward(pal_surface *surface)
 }
 
 pal_err pal_scene_shell_prepare(const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,
-                                pal_note *note)
+                                pal_diagnostic *diag)
 {
     pal_surface own = {0};
     pal_err err = pal_surface_copy(surface, &own);
-    if (!err && options->largest_only) err = keep_largest(&own, note);
+    if (!err && options->largest_only) err = keep_largest(&own, diag);
     int target = options->target_tri ? options->target_tri : own.n_tri > MANY_TRI ? WANTED_TRI : own.n_tri;
     pal_surface_topology facts = {.manifold = false};
     if (!err) err = pal_surface_check(&own, &facts);
@@ -69,17 +69,17 @@ pal_err pal_scene_shell_prepare(const pal_surface *surface, const pal_surface_sc
     if (!err && own.n_tri > target && facts.manifold && facts.oriented) err = pal_surface_decimate(&own, target);
     if (!err) turn_outward(&own);
     if (!err) err = pal_prepared_surface(&own, out);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "no memory for %d triangles", surface->n_tri);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "no memory for %d triangles", surface->n_tri);
     pal_surface_free(&own);
     return err;
 }
 
 pal_err pal_scene_shell_inspect(const pal_surface *surface, const pal_surface_scene *options,
-                                pal_surface_scene_report *report, pal_note *note)
+                                pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_levels levels;
     const pal_levels_options wanted = {.n_level = options->n_level ? options->n_level : LEVELS};
-    PAL_TRY(pal_levels_make(surface, &wanted, &levels, note));
+    PAL_TRY(pal_levels_make(surface, &wanted, &levels, diag));
     report->n_level = levels.n_level;
     report->n_piece = levels.n_component;
     report->level_byte = levels.n_byte;
@@ -95,32 +95,32 @@ pal_err pal_scene_shell_inspect(const pal_surface *surface, const pal_surface_sc
                       (options->thickness_m > 0 ? options->thickness_m : thickness_m);
     pal_levels_free(&levels);
     if (options->inflate_Pa != 0 && report->n_open_edge > 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "pressure is asked for, but the surface has %d open edge%s",
-                            report->n_open_edge, report->n_open_edge == 1 ? "" : "s");
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "pressure is asked for, but the surface has %d open edge%s",
+                                  report->n_open_edge, report->n_open_edge == 1 ? "" : "s");
     return PAL_ERR_OK;
 }
 
 pal_err pal_scene_shell_dress(pal_body_def *body, const pal_surface_scene *options,
-                              const pal_surface_scene_report *report, pal_note *note)
+                              const pal_surface_scene_report *report, pal_diagnostic *diag)
 {
-    pal_item_init(&body->model, "bodies[0].model", "adaptive_springs");
-    PAL_TRY(pal_item_put_number(&body->model, "levels", options->n_level ? options->n_level : LEVELS, note));
-    PAL_TRY(pal_item_put_number(&body->model, "thickness_m",
-                                options->thickness_m > 0 ? options->thickness_m : thickness_m, note));
-    pal_item_init(&body->output, "bodies[0].output", "surface_out");
-    if (report->n_open_edge > 0 && !(options->hold > 0)) body->support[0] = (pal_support){.rim = true};
+    pal_entry_init(&body->model, "bodies[0].model", "adaptive_springs");
+    PAL_TRY(pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : LEVELS, diag));
+    PAL_TRY(pal_entry_put_number(&body->model, "thickness_m",
+                                 options->thickness_m > 0 ? options->thickness_m : thickness_m, diag));
+    pal_entry_init(&body->output, "bodies[0].output", "surface_output");
+    if (report->n_open_edge > 0 && !(options->hold > 0)) body->support[0] = (pal_support_def){.rim = true};
     if (options->inflate_Pa == 0) return PAL_ERR_OK;
-    pal_item *inflate = &body->effect[body->n_effect++];
-    pal_item_init(inflate, "", "inflate");
-    return pal_item_put_number(inflate, "pressure_Pa", options->inflate_Pa, note);
+    pal_config_entry *inflate = &body->effect[body->n_effect++];
+    pal_entry_init(inflate, "", "inflate");
+    return pal_entry_put_number(inflate, "pressure_Pa", options->inflate_Pa, diag);
 }
 
 /* ---- shapes ---- */
 
 /* the box around an opening's ring and cap */
-static pal_support around(const pal_surface *surface, const int32_t ring[PAL_STOMACH_RING], int32_t cap)
+static pal_support_def around(const pal_surface *surface, const int32_t ring[PAL_STOMACH_RING], int32_t cap)
 {
-    pal_support box = {.lowest = false};
+    pal_support_def box = {.lowest = false};
     for (int c = 0; c < 3; c++) {
         box.low_m[c] = box.high_m[c] = surface->x[3 * (size_t)cap + (size_t)c];
         for (int k = 0; k < PAL_STOMACH_RING; k++) {
@@ -146,7 +146,7 @@ static pal_err make_stomach(pal_scene_shape *out)
     return PAL_ERR_OK;
 }
 
-pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_note *note)
+pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_diagnostic *diag)
 {
     *out = (pal_scene_shape){.name = name};
     pal_err err;
@@ -156,11 +156,11 @@ pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_note *n
         err = pal_sphere_make(sphere_m, &out->surface);
         out->title = "Sphere", out->in_space = true;
     } else if (!strcmp(name, "sheet")) {
-        err = pal_sheet_make(SHEET, SHEET, sheet_m, sheet_m, &out->surface, note);
-        out->title = "Sheet of fabric", out->n_support = 1, out->support[0] = (pal_support){.rim = true};
+        err = pal_sheet_make(SHEET, SHEET, sheet_m, sheet_m, &out->surface, diag);
+        out->title = "Sheet of fabric", out->n_support = 1, out->support[0] = (pal_support_def){.rim = true};
     } else {
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "there is no shape \"%.40s\": known are organ, stomach, sphere, sheet", name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "there is no shape \"%.40s\": known are organ, stomach, sphere, sheet", name);
     }
-    return err ? pal_note_set(note, err, "the shape %s: %s", name, pal_err_text(err)) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(diag, err, "the shape %s: %s", name, pal_err_text(err)) : PAL_ERR_OK;
 }

@@ -41,12 +41,12 @@ static pal_err make_mesh(const pal_cells *cells, const double origin_m[3], pal_p
 }
 
 pal_err pal_solid_load(const char *file, double unit_m, const double *origin_m, pal_loaded_scene *scene, int index,
-                       pal_note *note)
+                       pal_diagnostic *diag)
 {
     pal_cells *cells = &scene->cells[index];
     double origin[3];
     pal_cells_fault fault;
-    PAL_TRY(pal_cell_file_load(file, cells, note));
+    PAL_TRY(pal_cell_file_load(file, cells, diag));
     for (size_t i = 0; i < 3 * (size_t)cells->n_vertex && unit_m != 1; i++) cells->x[i] *= unit_m;
     if (origin_m)
         pal_copy3(origin, origin_m);
@@ -55,18 +55,29 @@ pal_err pal_solid_load(const char *file, double unit_m, const double *origin_m, 
     for (int32_t i = 0; i < cells->n_vertex && !origin_m; i++)
         pal_sub3(cells->x + 3 * (size_t)i, cells->x + 3 * (size_t)i, origin);
     /* far from its origin a solid may have lost its shape to rounding */
-    if (!pal_cells_shape_good(cells, NULL, &fault))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: cell %d has no volume left about (%g, %g, %g) m", file,
-                            fault.cell + 1, origin[0], origin[1], origin[2]);
+    if (!pal_cells_shape_valid(cells, NULL, &fault))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cell %d has no volume left about (%g, %g, %g) m", file,
+                                  fault.cell + 1, origin[0], origin[1], origin[2]);
     scene->scene.body[index].cells = cells;
     pal_err err = make_mesh(cells, origin, &scene->mesh[index]);
-    return err ? pal_note_set(note, err, "%s: no memory for its boundary", file) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(diag, err, "%s: no memory for its boundary", file) : PAL_ERR_OK;
+}
+
+pal_err pal_solid_show(pal_loaded_scene *scene, int index, pal_diagnostic *diag)
+{
+    pal_prepared mesh = {0};
+    if (make_mesh(&scene->cells[index], scene->mesh[index].surface.origin_m, &mesh))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "body \"%s\": no memory for its boundary",
+                                  scene->scene.body[index].name);
+    pal_prepared_free(&scene->mesh[index]);
+    scene->mesh[index] = mesh;
+    return PAL_ERR_OK;
 }
 
 pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
                        pal_loaded_scene *scene, int index)
 {
-    static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles", "largest"};
+    static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles"};
     const pal_body_def *def = &scene->scene.body[index];
     char at[PAL_JSON_PATH], name[512] = "", units[16] = "", file[PATH];
     double origin_m[3] = {0}, unit_m = 1;
@@ -86,9 +97,9 @@ pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path
     int n =
         name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
     if (n < 0 || (size_t)n >= sizeof file) return pal_json_bad(json, at, "the path is too long");
-    pal_note why = {""};
-    pal_err err = pal_solid_load(file, unit_m, about ? origin_m : NULL, scene, index, &why);
-    return err ? pal_note_set(json->note, err, "%s: %s: %s", json->file, at, why.text) : PAL_ERR_OK;
+    pal_diagnostic reason = {""};
+    pal_err err = pal_solid_load(file, unit_m, about ? origin_m : NULL, scene, index, &reason);
+    return err ? pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, at, reason.text) : PAL_ERR_OK;
 }
 
 void pal_solid_unload(pal_loaded_scene *scene, int index)
@@ -104,7 +115,7 @@ static pal_err read_stroke(const pal_json *json, const cJSON *object, const char
 {
     static const char *const known[] = {"at_m", "radius_m", "soft", "young_factor", "density_factor", NULL};
     char at[PAL_JSON_PATH];
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     *out = (pal_stroke){.soft = 0.5, .young_factor = 1, .density_factor = 1};
     PAL_TRY(pal_json_object(json, object, path, known));
     for (int k = 0; k < 2; k++)
@@ -116,8 +127,8 @@ static pal_err read_stroke(const pal_json *json, const cJSON *object, const char
     PAL_TRY(pal_json_number(json, object, path, "soft", -INFINITY, INFINITY, &out->soft));
     PAL_TRY(pal_json_number(json, object, path, "young_factor", -INFINITY, INFINITY, &out->young_factor));
     PAL_TRY(pal_json_number(json, object, path, "density_factor", -INFINITY, INFINITY, &out->density_factor));
-    if (!pal_stroke_check(out, &why)) return PAL_ERR_OK;
-    return pal_note_set(json->note, PAL_ERR_REFUSED, "%s: %s.%s", json->file, path, why.text);
+    if (!pal_stroke_check(out, &reason)) return PAL_ERR_OK;
+    return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %s.%s", json->file, path, reason.text);
 }
 
 pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index)
@@ -131,7 +142,7 @@ pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *pa
     if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
         return pal_json_bad(json, at, "model \"%s\" cannot be painted; \"subdivision_fem\" can", def->model.name);
     pal_stroke *stroke = calloc((size_t)cJSON_GetArraySize(list), sizeof *stroke);
-    if (!stroke) return pal_note_set(json->note, PAL_ERR_MEMORY, "%s: no memory for %s", json->file, at);
+    if (!stroke) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for %s", json->file, at);
     scene->stroke[index] = stroke;
     def->stroke = stroke;
     for (const cJSON *child = list->child; child; child = child->next, def->n_stroke++)

@@ -9,7 +9,9 @@
  * is *origin_m where it is given (NULL: not), and the file's positions are about it already; else the middle of their
  * box. unit_m: of the file's positions. Errors as of pal_cell_file_load */
 pal_err pal_solid_load(const char *file, double unit_m, const double *origin_m, pal_loaded_scene *scene, int index,
-                       pal_note *note);
+                       pal_diagnostic *diag);
+/* makes mesh [index] anew from the boundary of cells [index], about the same origin; MEMORY */
+pal_err pal_solid_show(pal_loaded_scene *scene, int index, pal_diagnostic *diag);
 /* the keys "cells", "units" and "origin_m" of a body; folder: where a relative name is looked up */
 pal_err pal_solid_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
                        pal_loaded_scene *scene, int index);

@@ -90,11 +90,11 @@ static uint64_t mix_text(uint64_t h, const char *text)
 {
     return mix_bytes(h, text, strlen(text) + 1);
 }
-static uint64_t mix_item(uint64_t h, const pal_item *item)
+static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
 {
     h = mix_text(h, item->name);
     for (int k = 0; k < item->n_value; k++) {
-        const pal_value *v = &item->value[k];
+        const pal_config_value *v = &item->value[k];
         int facts[3] = {(int)v->kind, v->flag, v->n_number};
         h = mix_text(h, v->key);
         h = mix_bytes(h, facts, sizeof facts);
@@ -130,7 +130,7 @@ static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
     int count[4] = {c->n_vertex, c->n_cell, c->n_edge_use, def->n_stroke};
     h = mix_bytes(h, count, sizeof count);
     h = mix_bytes(h, c->x, (size_t)c->n_vertex * 3 * sizeof(double));
-    h = mix_bytes(h, c->vertex_sharp, (size_t)c->n_vertex * sizeof(float));
+    h = mix_bytes(h, c->vertex_sharpness, (size_t)c->n_vertex * sizeof(float));
     h = mix_bytes(h, c->cell_use, ((size_t)c->n_cell + 1) * sizeof(int32_t));
     for (int32_t i = 0; i < c->n_face_use; i++) h = mix_bytes(h, &c->face_use[i].first_use, sizeof(int32_t));
     for (int32_t i = 0; i < c->n_edge_use; i++) h = mix_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
@@ -154,7 +154,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
     h = mix_bytes(h, &scene->step_s, sizeof scene->step_s);
     h = mix_bytes(h, scene->up, sizeof scene->up);
     h = mix_bytes(h, &scene->gravity_m_s2, sizeof scene->gravity_m_s2);
-    h = mix_bytes(h, &scene->most_substep, sizeof scene->most_substep);
+    h = mix_bytes(h, &scene->max_substep, sizeof scene->max_substep);
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body_def *def = &scene->body[b];
         h = mix_mesh(h, def->mesh);
@@ -162,7 +162,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
         h = mix_material(h, &def->material);
         h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
         for (int k = 0; k < def->n_support; k++) {
-            const pal_support *s = &def->support[k];
+            const pal_support_def *s = &def->support[k];
             double number[8] = {s->rim ? 2 : s->lowest, s->lowest ? s->fraction : 0};
             if (!s->lowest && !s->rim)
                 memcpy(number + 2, s->low_m, sizeof s->low_m), memcpy(number + 5, s->high_m, sizeof s->high_m);
@@ -230,7 +230,7 @@ static bool write_header(pal_input_log *log, const pal_scene *scene)
     return write_all(log->file, bytes, sizeof bytes);
 }
 
-pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_note *note,
+pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_diagnostic *diag,
                            pal_input_log **out)
 {
     pal_input_log *log = calloc(1, sizeof *log);
@@ -239,7 +239,7 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
     if (log) log->ring = calloc(1, n_ring);
     if (!log || !log->ring) {
         free(log);
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the input log");
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the input log");
     }
     log->n_ring = n_ring;
     log->file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -247,13 +247,13 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
     bool good = log->file >= 0 && write_header(log, scene) && pthread_create(&log->thread, NULL, writer, log) == 0;
-    int why = errno;
+    int reason = errno;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     if (!good) {
         if (log->file >= 0) close(log->file);
         free(log->ring);
         free(log);
-        return pal_note_set(note, PAL_ERR_IO, "%s: the input log cannot be written: %s", path, strerror(why));
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: the input log cannot be written: %s", path, strerror(reason));
     }
     *out = log;
     return PAL_ERR_OK;
@@ -332,35 +332,36 @@ pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
 /* ---- reader ---- */
 
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
-                             pal_note *note)
+                             pal_diagnostic *diag)
 {
     const uint8_t *from = bytes + sizeof magic;
     if (n_byte < sizeof magic || memcmp(bytes, magic, sizeof magic) != 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 0: not an input log", name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 0: not an input log", name);
     if (n_byte < PAL_INPUT_HEADER)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in its header", name, n_byte);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in its header", name, n_byte);
     uint64_t version = get_u(&from, 4);
     if (version < OLDEST || version > VERSION)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d to %d", name,
-                            (unsigned long long)version, OLDEST, VERSION);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d to %d",
+                                  name, (unsigned long long)version, OLDEST, VERSION);
     pal_input_header header = {.hash_steps = (uint32_t)get_u(&from, 4)};
     get_f(&from, &header.step_s, 1);
     header.fingerprint = get_u(&from, 8);
     header.n_body = (uint32_t)get_u(&from, 4);
     header.n_tool = (uint32_t)get_u(&from, 4);
     if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name,
-                            header.hash_steps, PAL_INPUT_HASH_MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 12: %u steps between hashes are outside 1 .. %d",
+                                  name, header.hash_steps, PAL_INPUT_HASH_MOST);
     *out = header;
     *at = PAL_INPUT_HEADER;
     return PAL_ERR_OK;
 }
 
 pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,
-                             pal_note *note)
+                             pal_diagnostic *diag)
 {
     if (n_byte - *at < PAL_INPUT_HEAD)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut: it has no end record", name, *at);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut: it has no end record", name,
+                                  *at);
     const uint8_t *from = bytes + *at;
     pal_input_record record = {.kind = (pal_input_kind)get_u(&from, 1)};
     record.index = (int)get_u(&from, 1);
@@ -368,10 +369,10 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     uint64_t zero = get_u(&from, 4);
     record.step = get_u(&from, 8);
     if (payload_of(record.kind) != n || zero)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: no record of kind %d has %d bytes", name, *at,
-                            (int)record.kind, n);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: no record of kind %d has %d bytes", name, *at,
+                                  (int)record.kind, n);
     if (n_byte - *at - PAL_INPUT_HEAD < (size_t)n)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in a record", name, *at);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in a record", name, *at);
     if (record.kind == PAL_INPUT_POSE) {
         get_f(&from, record.pose.position_m, 3);
         get_f(&from, record.pose.quat, 4);
@@ -386,8 +387,8 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
         pal_brush *b = &record.brush;
         uint32_t slot = (uint32_t)get_u(&from, 4), kind = (uint32_t)get_u(&from, 4);
         if (slot >= PAL_TOOL_MAX || kind >= PAL_BRUSH_COUNT)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: there is no brush of kind %u on tool %u", name,
-                                *at, kind, slot);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: there is no brush of kind %u on tool %u",
+                                      name, *at, kind, slot);
         record.slot = (int)slot, b->kind = (pal_brush_kind)kind;
         get_f(&from, b->at_m, 3);
         get_f(&from, b->to_m, 3);
@@ -399,8 +400,8 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     } else if (record.kind == PAL_INPUT_ROW) {
         uint64_t on = get_u(&from, 4);
         if (on > 1 || from[PAL_NAME - 1] != 0)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: a row that is neither on nor off, or no name",
-                                name, *at);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "%s: byte %zu: a row that is neither on nor off, or no name", name, *at);
         record.wanted = on == 1;
         memcpy(record.row, from, PAL_NAME);
     } else if (record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END) {

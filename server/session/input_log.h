@@ -21,7 +21,7 @@
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
 #include "server/sim/core/brush.h"
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 
 enum {
     PAL_INPUT_HEADER = 40,
@@ -61,7 +61,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene);
 
 typedef struct pal_input_log pal_input_log;
 /* creates the file and starts the writer thread; ring_byte 0: 4 MiB. IO, MEMORY. [load] */
-pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_note *note,
+pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_diagnostic *diag,
                            pal_input_log **out);
 void pal_input_log_put(pal_input_log *log, const pal_input_record *record); /* [sim] NULL log is fine */
 uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [sim] */
@@ -76,7 +76,7 @@ typedef struct pal_input_header {
 } pal_input_header;
 /* bounds-checked: *at moves on; REFUSED with the byte offset */
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
-                             pal_note *note);
+                             pal_diagnostic *diag);
 pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,
-                             pal_note *note);
+                             pal_diagnostic *diag);
 #endif

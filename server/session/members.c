@@ -27,7 +27,7 @@ static void clean_name(const char *from, char to[PAL_MEMBER_NAME])
         const char *piece = from + at;
         at += size ? (size_t)size : 1;
         if (size && code == ' ') blank = n > 0;
-        if (!size || code == ' ' || !pal_utf8_shown(code)) continue;
+        if (!size || code == ' ' || !pal_utf8_printable(code)) continue;
         if (n + blank + (size_t)size > PAL_MEMBER_NAME - 1 - NAME_NUMBER) break;
         if (blank) to[n++] = ' ';
         blank = false;

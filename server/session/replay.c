@@ -8,22 +8,23 @@
 #include <stdlib.h>
 
 /* is the log whole, in order, and within the scene's tools and bodies? */
-static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header, pal_note *note)
+static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header,
+                     pal_diagnostic *diag)
 {
     size_t at = 0;
     uint64_t step = 0, hash_step = 0;
-    PAL_TRY(pal_input_get_header(name, bytes, n_byte, header, &at, note));
+    PAL_TRY(pal_input_get_header(name, bytes, n_byte, header, &at, diag));
     for (;;) {
         pal_input_record record;
         size_t place = at;
-        PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, note));
+        PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
         /* END first: a log with lost records may have gaps, and that is the better sentence */
         if (record.kind == PAL_INPUT_END && record.n_dropped)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: %llu records were lost while the log was written", name,
-                                (unsigned long long)record.n_dropped);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %llu records were lost while the log was written",
+                                      name, (unsigned long long)record.n_dropped);
         if (record.step < step || record.step > hash_step + header->hash_steps)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: step %llu does not follow step %llu", name, place,
-                                (unsigned long long)record.step, (unsigned long long)step);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: step %llu does not follow step %llu", name,
+                                      place, (unsigned long long)record.step, (unsigned long long)step);
         step = record.step;
         if (record.kind == PAL_INPUT_HASH) hash_step = step;
         bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_LET_GO;
@@ -31,27 +32,28 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
             ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
               record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_ROW) &&
              record.index >= (int)header->n_body))
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
-                                tool ? "tool" : "body", record.index);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
+                                      tool ? "tool" : "body", record.index);
         if (record.kind != PAL_INPUT_END) continue;
         if (at != n_byte)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: %zu bytes after the end record", name, at,
-                                n_byte - at);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: %zu bytes after the end record", name, at,
+                                      n_byte - at);
         return PAL_ERR_OK;
     }
 }
 
 /* one record against the world, which has taken record->step steps */
 static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_record *record,
-                     pal_replay_report *report, pal_note *note)
+                     pal_replay_report *report, pal_diagnostic *diag)
 {
     uint64_t hash;
     switch (record->kind) {
     case PAL_INPUT_POSE:
         report->n_pose++;
         if (pal_world_pose(world, record->index, &record->pose))
-            return pal_note_set(note, PAL_ERR_REFUSED, "step %llu: the world refuses a pose that the log says it took",
-                                (unsigned long long)record->step);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "step %llu: the world refuses a pose that the log says it took",
+                                      (unsigned long long)record->step);
         break;
     case PAL_INPUT_LET_GO:
         return pal_world_pose(world, record->index, NULL);
@@ -63,13 +65,13 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
         return pal_world_reset_body(world, record->index);
     case PAL_INPUT_MATERIAL:
         report->n_command++;
-        return pal_world_material(world, record->index, &record->material, note);
+        return pal_world_material(world, record->index, &record->material, diag);
     case PAL_INPUT_BRUSH:
         report->n_command++;
-        return pal_world_brush(world, record->index, record->slot, &record->brush, note);
+        return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
     case PAL_INPUT_ROW:
         report->n_command++;
-        return pal_world_switch_row(world, scene, record->index, record->row, record->wanted, note);
+        return pal_world_switch_component(world, scene, record->index, record->row, record->wanted, diag);
     case PAL_INPUT_HASH:
     case PAL_INPUT_END:
         hash = pal_world_hash(world);
@@ -85,42 +87,43 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
 }
 
 static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene, pal_world *world,
-                   pal_replay_report *report, pal_note *note)
+                   pal_replay_report *report, pal_diagnostic *diag)
 {
     pal_input_header header;
     pal_input_record record = {.kind = PAL_INPUT_RESET};
     size_t at = 0;
-    PAL_TRY(pal_input_get_header(name, bytes, n_byte, &header, &at, note));
+    PAL_TRY(pal_input_get_header(name, bytes, n_byte, &header, &at, diag));
     while (record.kind != PAL_INPUT_END) {
-        PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, note));
+        PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
         for (; report->n_tick < record.step; report->n_tick++) {
             pal_err err = pal_world_step(world, scene->step_s);
-            pal_world_tidy(world);
+            pal_world_remove_idle(world);
             if (err && err != PAL_ERR_FROZEN)
-                return pal_note_set(note, err, "%s: step %llu: %s", name, (unsigned long long)report->n_tick,
-                                    pal_err_text(err));
+                return pal_diagnostic_set(diag, err, "%s: step %llu: %s", name, (unsigned long long)report->n_tick,
+                                          pal_err_text(err));
         }
-        PAL_TRY(apply(world, scene, &record, report, note));
+        PAL_TRY(apply(world, scene, &record, report, diag));
     }
     return PAL_ERR_OK;
 }
 
 pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene,
-                         pal_replay_report *out, pal_note *note)
+                         pal_replay_report *out, pal_diagnostic *diag)
 {
     pal_input_header header;
     pal_replay_report report = {.first_difference = UINT64_MAX};
-    PAL_TRY(check(name, bytes, n_byte, &header, note));
+    PAL_TRY(check(name, bytes, n_byte, &header, diag));
     if (scene) {
         if (header.fingerprint != pal_scene_fingerprint(scene) || (int)header.n_tool != scene->n_tool ||
             (int)header.n_body != scene->n_body)
-            return pal_note_set(note, PAL_ERR_REFUSED,
-                                "%s: recorded from another scene or another state of it (mesh, material or entries "
-                                "differ)",
-                                name);
+            return pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED,
+                "%s: recorded from another scene or another state of it (mesh, material or entries "
+                "differ)",
+                name);
         pal_world *world;
-        PAL_TRY(pal_world_create(scene, note, &world));
-        pal_err err = run(name, bytes, n_byte, scene, world, &report, note);
+        PAL_TRY(pal_world_create(scene, diag, &world));
+        pal_err err = run(name, bytes, n_byte, scene, world, &report, diag);
         pal_world_destroy(world);
         PAL_TRY(err);
     }
@@ -128,12 +131,12 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
     return PAL_ERR_OK;
 }
 
-pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_note *note)
+pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_REPLAY_MOST, &bytes, &n_byte, note));
-    pal_err err = pal_replay_parse(path, bytes, n_byte, scene, out, note);
+    PAL_TRY(pal_file_read(path, PAL_REPLAY_MOST, &bytes, &n_byte, diag));
+    pal_err err = pal_replay_parse(path, bytes, n_byte, scene, out, diag);
     free(bytes);
     return err;
 }

@@ -19,8 +19,8 @@ typedef struct pal_replay_report {
 /* runs the log at path against a world of this scene. A hash that differs is no error: see the report. REFUSED: not a
  * log, cut, of another scene, or one that lost records while it was written; IO, MEMORY, and what pal_world_create
  * says */
-pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_note *note);
+pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_diagnostic *diag);
 /* the same from memory: name is used in messages; scene NULL only checks that the log is whole */
 pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene,
-                         pal_replay_report *out, pal_note *note);
+                         pal_replay_report *out, pal_diagnostic *diag);
 #endif

@@ -6,9 +6,9 @@
 
 static bool has_row(const pal_world *w, const char *body, const char *row)
 {
-    for (int i = 0; i < pal_world_rows(w); i++) {
-        pal_row_info now;
-        pal_world_row(w, i, &now);
+    for (int i = 0; i < pal_world_component_count(w); i++) {
+        pal_component_info now;
+        pal_world_component_info(w, i, &now);
         if (!strcmp(now.name, row) && !strcmp(now.body, body)) return true;
     }
     return false;
@@ -30,7 +30,7 @@ static void put(pal_rows_off *off, const char *body, const char *row)
     snprintf(off->at[off->n++].row, PAL_NAME, "%s", row);
 }
 
-void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_row_info *row, int n_row,
+void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_component_info *row, int n_row,
                        const pal_world *before, pal_world *next, const pal_scene *scene)
 {
     to->n = 0;
@@ -43,5 +43,5 @@ void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_row
     for (int i = 0; i < to->n; i++)
         for (int b = 0; b < scene->n_body; b++)
             if (!strcmp(scene->body[b].name, to->at[i].body))
-                (void)pal_world_switch_row(next, scene, b, to->at[i].row, false, NULL);
+                (void)pal_world_switch_component(next, scene, b, to->at[i].row, false, NULL);
 }

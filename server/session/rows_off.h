@@ -15,6 +15,6 @@ typedef struct pal_rows_off {
 
 /* What is off in `before` (not in its plan though it was at open, row [n_row], or known to be off since an earlier
  * session, *from) is switched off in `next`, a new world of scene, where that has it, and kept in *to */
-void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_row_info *row, int n_row,
+void pal_rows_off_hand(pal_rows_off *to, const pal_rows_off *from, const pal_component_info *row, int n_row,
                        const pal_world *before, pal_world *next, const pal_scene *scene);
 #endif

@@ -80,10 +80,10 @@ static void push(shape *list, int *n, const shape *s)
     list[(*n)++] = *s;
 }
 
-pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_note *note, pal_sculptor **out)
+pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_diagnostic *diag, pal_sculptor **out)
 {
     if (body < 0 || body >= scene->n_body || !scene->body[body].cells)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body %d is no solid of control cells", body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d is no solid of control cells", body);
     pal_sculptor *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     const pal_body_def *def = &scene->body[body];
@@ -127,12 +127,12 @@ int pal_sculptor_future(const pal_sculptor *sculptor)
 
 /* ---- commands ---- */
 
-static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to, pal_note *note)
+static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_stroke_check(stroke, note));
+    PAL_TRY(pal_stroke_check(stroke, diag));
     if (s->now.n_stroke >= PAL_STROKE_MAX)
-        return pal_note_set(note, PAL_ERR_REFUSED, "there are %d strokes already, the most there may be",
-                            s->now.n_stroke);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are %d strokes already, the most there may be",
+                                  s->now.n_stroke);
     PAL_TRY(copy_shape(&s->now, to));
     pal_stroke *more = realloc(to->stroke, sizeof *more * (size_t)(to->n_stroke + 1));
     if (!more) return PAL_ERR_MEMORY;
@@ -141,30 +141,30 @@ static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to,
     return PAL_ERR_OK;
 }
 
-static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to, pal_note *note)
+static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to, pal_diagnostic *diag)
 {
     const pal_cells *cells = &s->now.cells;
     pal_cells_fault fault;
     if (!command->point_m || command->n_point != cells->n_vertex)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%d points of the shape to be kept, wanted %d", command->n_point,
-                            cells->n_vertex);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d points of the shape to be kept, wanted %d",
+                                  command->n_point, cells->n_vertex);
     for (int i = 0; i < 3 * command->n_point; i++)
         if (!(fabs(command->point_m[i]) <= 1e9))
-            return pal_note_set(note, PAL_ERR_REFUSED, "point %d of the shape to be kept is at %g m", i / 3,
-                                command->point_m[i]);
-    if (!pal_cells_shape_good(cells, command->point_m, &fault))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "the shape as it is cannot be kept: control cell %d is folded over (%s %g)", fault.cell,
-                            fault.face_use < 0 ? "volume" : "area", fault.measure);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "point %d of the shape to be kept is at %g m", i / 3,
+                                      command->point_m[i]);
+    if (!pal_cells_shape_valid(cells, command->point_m, &fault))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "the shape as it is cannot be kept: control cell %d is folded over (%s %g)",
+                                  fault.cell, fault.face_use < 0 ? "volume" : "area", fault.measure);
     PAL_TRY(copy_shape(&s->now, to));
     memcpy(to->cells.x, command->point_m, 3 * sizeof(double) * (size_t)cells->n_vertex);
     return PAL_ERR_OK;
 }
 
 /* back or forth: the shape and the state it was left in */
-static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_turn *turn, pal_note *note)
+static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_turn *turn, pal_diagnostic *diag)
 {
-    if (n == 0) return pal_note_set(note, PAL_ERR_REFUSED, "there is nothing to %s", what);
+    if (n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is nothing to %s", what);
     const shape *from = &list[n - 1];
     size_t n_byte = 3 * sizeof(double) * (size_t)from->cells.n_vertex;
     PAL_TRY(copy_shape(from, &turn->to));
@@ -174,41 +174,42 @@ static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_tu
     return turn->next_x && turn->next_v ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_note *note)
+static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_diagnostic *diag)
 {
     double length = pal_norm3(command->cut_normal);
     turn->cut = command->cut;
     if (command->cut && !(length > 1e-12 && length < 1e12 && fabs(command->cut_m) <= 1e9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "a cut has a direction and a place: %g %g %g at %g m",
-                            command->cut_normal[0], command->cut_normal[1], command->cut_normal[2], command->cut_m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a cut has a direction and a place: %g %g %g at %g m",
+                                  command->cut_normal[0], command->cut_normal[1], command->cut_normal[2],
+                                  command->cut_m);
     if (command->cut) pal_scale3(turn->cut_normal, 1 / length, command->cut_normal);
     turn->cut_m = command->cut_m;
     return copy_shape(&s->now, &turn->to);
 }
 
-static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_note *note)
+static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_diagnostic *diag)
 {
     switch (command->kind) {
     case PAL_SCULPT_CELLS:
-        PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &turn->edit, note));
+        PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &turn->edit, diag));
         turn->to.stroke = copied(s->now.stroke, sizeof *turn->to.stroke * (size_t)s->now.n_stroke);
         turn->to.n_stroke = s->now.n_stroke;
         PAL_TRY(turn->to.stroke ? PAL_ERR_OK : PAL_ERR_MEMORY);
         return pal_cells_copy(&turn->edit.cells, &turn->to.cells);
     case PAL_SCULPT_PAINT:
-        return paint(s, &command->stroke, &turn->to, note);
+        return paint(s, &command->stroke, &turn->to, diag);
     case PAL_SCULPT_KEEP:
-        return keep(s, command, &turn->to, note);
+        return keep(s, command, &turn->to, diag);
     case PAL_SCULPT_CUT:
-        return set_cut(s, command, turn, note);
+        return set_cut(s, command, turn, diag);
     case PAL_SCULPT_UNDO:
-        return turn_to(s->past, s->n_past, "undo", turn, note);
+        return turn_to(s->past, s->n_past, "undo", turn, diag);
     case PAL_SCULPT_REDO:
-        return turn_to(s->future, s->n_future, "redo", turn, note);
+        return turn_to(s->future, s->n_future, "redo", turn, diag);
     case PAL_SCULPT_KINDS:
         break;
     }
-    return pal_note_set(note, PAL_ERR_REFUSED, "there is no way of sculpting %d", (int)command->kind);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no way of sculpting %d", (int)command->kind);
 }
 
 /* ---- turns ---- */
@@ -247,7 +248,7 @@ static pal_err make_room(const pal_sculptor *s, pal_sculpt_turn *turn)
 }
 
 pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scene, const pal_sculpt *command,
-                             pal_note *note, pal_sculpt_turn **out)
+                             pal_diagnostic *diag, pal_sculpt_turn **out)
 {
     const pal_sculptor *s = sculptor;
     pal_sculpt_turn *turn = calloc(1, sizeof *turn);
@@ -257,7 +258,7 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     turn->body = s->body;
     turn->cut = s->cut, turn->cut_m = s->cut_m;
     pal_copy3(turn->cut_normal, s->cut_normal);
-    pal_err err = obey(s, command, turn, note);
+    pal_err err = obey(s, command, turn, diag);
     if (!err) err = make_room(s, turn);
     if (!err) err = make_scene(s, scene, turn);
     if (err)
@@ -276,8 +277,8 @@ const pal_scene *pal_sculpt_scene(const pal_sculpt_turn *turn)
 static void carry_points(pal_sculpt_turn *turn)
 {
     const pal_cells_edit *edit = &turn->edit;
-    pal_cells_edit_place(edit, turn->from, turn->x, turn->next_x);
-    pal_point_rows_place(&edit->rows, turn->v, turn->next_v);
+    pal_cells_edit_positions(edit, turn->from, turn->x, turn->next_x);
+    pal_interpolation_apply(&edit->rows, turn->v, turn->next_v);
 }
 
 void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
@@ -294,8 +295,8 @@ void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
         memcpy(turn->next_x, turn->x, n_byte);
         memcpy(turn->next_v, turn->v, n_byte);
     }
-    pal_world_follow(next, before, turn->body, turn->next_x, turn->next_v);
-    pal_world_loads_by_place(next, turn->body, before);
+    pal_world_transfer(next, before, turn->body, turn->next_x, turn->next_v);
+    pal_world_transfer_loads(next, turn->body, before);
 }
 
 void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)

@@ -37,7 +37,7 @@ typedef struct pal_sculptor pal_sculptor;       /* the body as it is now, past a
 typedef struct pal_sculpt_turn pal_sculpt_turn; /* a command that has been prepared, and the scene it leads to */
 
 /* copies the body's cells and strokes; REFUSED: another model; MEMORY. [load] */
-pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_note *note, pal_sculptor **out);
+pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_diagnostic *diag, pal_sculptor **out);
 void pal_sculptor_destroy(pal_sculptor *sculptor);                 /* NULL is fine; turns live on */
 const pal_cells *pal_sculptor_cells(const pal_sculptor *sculptor); /* control cells now */
 int pal_sculptor_past(const pal_sculptor *sculptor);               /* commands that can be undone, redone */
@@ -47,7 +47,7 @@ int pal_sculptor_future(const pal_sculptor *sculptor);
  * borrows; the sculptor stays as it is. REFUSED with one sentence: what
  * cell_edits says, a stroke out of range, more than PAL_STROKE_MAX, nothing to undo, points that fold a cell; MEMORY */
 pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scene, const pal_sculpt *command,
-                             pal_note *note, pal_sculpt_turn **out);
+                             pal_diagnostic *diag, pal_sculpt_turn **out);
 /* to build a world or session from; lives as long as the turn */
 const pal_scene *pal_sculpt_scene(const pal_sculpt_turn *turn);
 /* pal_session_carry with user a pal_sculpt_turn: brings `before` over into `next`, and keeps the state of before for

@@ -21,10 +21,10 @@ static const double young_most_Pa = 1e12; /* beyond any solid */
 
 /* ---- what the thread does ---- */
 
-static void say(pal_session *s, const pal_note *note)
+static void say(pal_session *s, const pal_diagnostic *diag)
 {
     pthread_mutex_lock(&s->note_lock);
-    s->note = *note;
+    s->diag = *diag;
     pthread_mutex_unlock(&s->note_lock);
 }
 
@@ -61,7 +61,7 @@ static double slowdown(const pal_session *s)
 
 static void publish(pal_session *s)
 {
-    pal_frame *frame = pal_trio_slot(&s->frames);
+    pal_frame *frame = pal_triple_buffer_slot(&s->frames);
     (void)pal_frame_fit(frame, s->world); /* without memory that frame goes without the field */
     pal_world_frame(s->world, frame);
     frame->end_ns = s->end_ns;
@@ -79,7 +79,7 @@ static void publish(pal_session *s)
             frame->tool[t].pose = place->pose;
         }
     }
-    pal_trio_publish(&s->frames);
+    pal_triple_buffer_publish(&s->frames);
     if (s->options.wake) s->options.wake(s->options.user);
 }
 
@@ -89,7 +89,7 @@ static bool take_poses(pal_session *s, uint64_t now)
     bool changed = false;
     for (int t = 0; t < s->scene->n_tool; t++) {
         tool_place *place = &s->tool[t];
-        const pose_slot *slot = pal_trio_take(&place->trio);
+        const pose_slot *slot = pal_triple_buffer_take(&place->triple_buffer);
         bool gone = place->present && now > place->arrived_ns && now - place->arrived_ns > s->lease_ns;
         pal_input_record record = {.index = t, .step = s->step};
         if (slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns)) {
@@ -120,20 +120,20 @@ static bool take_poses(pal_session *s, uint64_t now)
 static void look(pal_session *s, const pal_command *command)
 {
     uint32_t *n = &s->n_look[command->body][command->field];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (!command->wanted && *n == 0) return;
     *n = command->wanted ? *n + 1 : *n - 1;
     if (!command->wanted && *n > 0) return;
-    if (pal_world_field(s->world, command->body, command->field, command->wanted, &note)) {
+    if (pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) {
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-        say(s, &note);
+        say(s, &diag);
     }
 }
 
 static void brush(pal_session *s, const pal_command *command)
 {
-    pal_note note = {""};
-    if (pal_world_brush(s->world, command->body, command->slot, &command->brush, &note)) {
+    pal_diagnostic diag = {""};
+    if (pal_world_brush(s->world, command->body, command->slot, &command->brush, &diag)) {
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
     } else {
         s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
@@ -142,24 +142,24 @@ static void brush(pal_session *s, const pal_command *command)
                                                       .step = s->step,
                                                       .slot = command->slot,
                                                       .brush = command->brush});
-        note.text[0] = 0;
+        diag.text[0] = 0;
     }
-    say(s, &note);
+    say(s, &diag);
 }
 
 static void switch_row(pal_session *s, const pal_command *command)
 {
-    pal_note note = {""};
-    if (pal_world_switch_row(s->world, s->scene, command->body, command->row, command->wanted, &note)) {
+    pal_diagnostic diag = {""};
+    if (pal_world_switch_component(s->world, s->scene, command->body, command->row, command->wanted, &diag)) {
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
     } else {
         pal_input_record record = {
             .kind = PAL_INPUT_ROW, .index = command->body, .step = s->step, .wanted = command->wanted};
         memcpy(record.row, command->row, sizeof record.row);
         pal_input_log_put(s->log, &record);
-        note.text[0] = 0;
+        diag.text[0] = 0;
     }
-    say(s, &note);
+    say(s, &diag);
 }
 
 /* has somebody begun to look, or the last one ceased to? true: what is shown is new */
@@ -174,7 +174,7 @@ static bool look_around(pal_session *s)
 
 static void obey(pal_session *s, const pal_command *command)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     switch (command->kind) {
     case PAL_COMMAND_PAUSE:
         s->paused = true;
@@ -187,30 +187,30 @@ static void obey(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_RESET:
         pal_world_reset(s->world);
-        say(s, &note);
+        say(s, &diag);
         for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
         pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
         break;
     case PAL_COMMAND_RESET_BODY:
         (void)pal_world_reset_body(s->world, command->body);
-        say(s, &note);
+        say(s, &diag);
         pal_input_log_put(s->log,
                           &(pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = command->body, .step = s->step});
         break;
     case PAL_COMMAND_MATERIAL:
-        if (pal_world_material(s->world, command->body, &command->material, &note)) {
+        if (pal_world_material(s->world, command->body, &command->material, &diag)) {
             atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
         } else {
             pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_MATERIAL,
                                                           .index = command->body,
                                                           .step = s->step,
                                                           .material = command->material});
-            note.text[0] = 0;
+            diag.text[0] = 0;
             pthread_mutex_lock(&s->note_lock);
             s->material[command->body] = command->material;
             pthread_mutex_unlock(&s->note_lock);
         }
-        say(s, &note);
+        say(s, &diag);
         break;
     case PAL_COMMAND_FIELD:
         look(s, command);
@@ -234,7 +234,7 @@ static bool take_commands(pal_session *s)
     pal_command command;
     bool any = false, was_paused = s->paused;
     /* a flood that refills the ring as fast as it is emptied must not keep the step waiting */
-    for (int k = 0; k < N_COMMAND && pal_ring_get(s->command, &command); k++, any = true) obey(s, &command);
+    for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) obey(s, &command);
     if (was_paused != s->paused) forget_pace(s);
     return any;
 }
@@ -242,14 +242,15 @@ static bool take_commands(pal_session *s)
 /* what went wrong in a step: the bodies that stand still, with their reasons */
 static void tell(pal_session *s, pal_err err)
 {
-    pal_note note;
-    pal_note_set(&note, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
-    for (int b = 0; b < pal_world_bodies(s->world); b++) {
+    pal_diagnostic diag;
+    pal_diagnostic_set(&diag, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
+    for (int b = 0; b < pal_world_body_count(s->world); b++) {
         const pal_body *body = pal_world_body(s->world, b);
-        size_t used = strlen(note.text);
-        if (body->frozen) (void)snprintf(note.text + used, sizeof note.text - used, "; %s: %s", body->name, body->why);
+        size_t used = strlen(diag.text);
+        if (body->frozen)
+            (void)snprintf(diag.text + used, sizeof diag.text - used, "; %s: %s", body->name, body->reason);
     }
-    say(s, &note);
+    say(s, &diag);
 }
 
 static void step(pal_session *s)
@@ -257,7 +258,7 @@ static void step(pal_session *s)
     if (s->n_marks == 0) mark_pace(s, pal_clock_ns());
     uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(s->world, s->scene->step_s);
-    pal_world_tidy(s->world);
+    pal_world_remove_idle(s->world);
     s->work_ns = pal_clock_thread_ns() - before;
     s->end_ns = pal_clock_ns();
     s->step++;
@@ -270,9 +271,9 @@ static void step(pal_session *s)
 
 static void estimate(pal_session *s, bool stepped)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_watch_step(&s->watch, s->world, step_ms, &note)) say(s, &note);
+    if (pal_watch_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
 }
 
 /* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
@@ -322,38 +323,39 @@ static void *simulate(void *user)
 
 static pal_err copy_plan(pal_session *s)
 {
-    s->n_row = pal_world_rows(s->world);
+    s->n_row = pal_world_component_count(s->world);
     s->row = calloc((size_t)s->n_row + 1, sizeof *s->row);
     if (!s->row) return PAL_ERR_MEMORY;
     for (int k = 0; k < s->n_row; k++) {
-        pal_world_row(s->world, k, &s->row[k]);
+        pal_world_component_info(s->world, k, &s->row[k]);
         s->row[k].spent_ns = s->row[k].n_run = 0;
     }
-    s->n_part = pal_world_parts(s->world);
+    s->n_part = pal_world_part_count(s->world);
     for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
-    for (int b = 0; b < pal_world_bodies(s->world); b++)
-        for (int k = 0; k < PAL_FIELD_COUNT; k++) s->gives[b][k] = pal_world_gives(s->world, b, (pal_field)k);
-    for (int b = 0; b < pal_world_bodies(s->world); b++)
-        s->reach_m = fmax(s->reach_m, reach_sizes * pal_world_body(s->world, b)->size_m);
+    for (int b = 0; b < pal_world_body_count(s->world); b++)
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) s->gives[b][k] = pal_world_has_field(s->world, b, (pal_field)k);
+    for (int b = 0; b < pal_world_body_count(s->world); b++)
+        s->reach_m = fmax(s->reach_m, reach_sizes * pal_world_body(s->world, b)->length_scale_m);
     return PAL_ERR_OK;
 }
 
-static pal_err prepare(pal_session *s, pal_note *note)
+static pal_err prepare(pal_session *s, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_world_create(s->scene, note, &s->world));
+    PAL_TRY(pal_world_create(s->scene, diag, &s->world));
     pal_err err = copy_plan(s);
-    s->command = pal_ring_create(N_COMMAND, sizeof(pal_command));
+    s->command = pal_command_queue_create(N_COMMAND, sizeof(pal_command));
     bool whole = !err && s->command;
     for (int k = 0; k < 3; k++) whole = (s->frame[k] = pal_frame_create(s->world)) && whole;
-    if (!whole) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the session's frames");
-    pal_trio_init(&s->frames, s->frame[0], s->frame[1], s->frame[2]);
+    if (!whole) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the session's frames");
+    pal_triple_buffer_init(&s->frames, s->frame[0], s->frame[1], s->frame[2]);
     for (int t = 0; t < PAL_TOOL_MAX; t++)
-        pal_trio_init(&s->tool[t].trio, &s->tool[t].slot[0], &s->tool[t].slot[1], &s->tool[t].slot[2]);
-    if (s->options.record_path) return pal_input_log_open(s->options.record_path, s->scene, 0, note, &s->log);
+        pal_triple_buffer_init(&s->tool[t].triple_buffer, &s->tool[t].slot[0], &s->tool[t].slot[1],
+                               &s->tool[t].slot[2]);
+    if (s->options.record_path) return pal_input_log_open(s->options.record_path, s->scene, 0, diag, &s->log);
     return PAL_ERR_OK;
 }
 
-pal_err pal_session_start(pal_session *s, pal_note *note)
+pal_err pal_session_start(pal_session *s, pal_diagnostic *diag)
 {
     /* signals belong to the thread that waits for them */
     sigset_t all, old;
@@ -361,7 +363,8 @@ pal_err pal_session_start(pal_session *s, pal_note *note)
     pthread_sigmask(SIG_SETMASK, &all, &old);
     s->running = !pthread_create(&s->thread, NULL, simulate, s);
     pthread_sigmask(SIG_SETMASK, &old, NULL);
-    return s->running ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
+    return s->running ? PAL_ERR_OK
+                      : pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
 }
 
 void pal_session_stop(pal_session *s)
@@ -374,7 +377,7 @@ void pal_session_stop(pal_session *s)
 static void release(pal_session *s)
 {
     for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
-    pal_ring_destroy(s->command);
+    pal_command_queue_destroy(s->command);
     pal_world_destroy(s->world);
     pal_watch_close(&s->watch);
     pthread_mutex_destroy(&s->note_lock);
@@ -383,10 +386,11 @@ static void release(pal_session *s)
     free(s);
 }
 
-pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_note *note, pal_session **out)
+pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_diagnostic *diag,
+                         pal_session **out)
 {
     pal_session *s = calloc(1, sizeof *s);
-    if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a session");
+    if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a session");
     pthread_mutex_init(&s->note_lock, NULL);
     pal_watch_init(&s->watch, scene);
     s->scene = scene;
@@ -398,8 +402,8 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->paused = s->options.start_paused;
     s->watched = true;
     atomic_init(&s->beat_ns, pal_clock_ns());
-    pal_err err = prepare(s, note);
-    if (!err && !s->options.hold) err = pal_session_start(s, note);
+    pal_err err = prepare(s, diag);
+    if (!err && !s->options.hold) err = pal_session_start(s, diag);
     if (err) {
         if (s->log) pal_input_log_close(s->log, 0, 0);
         release(s);
@@ -409,12 +413,13 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     return PAL_ERR_OK;
 }
 
-pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out)
+pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_diagnostic *diag,
+                               pal_session **out)
 {
     pal_session_options options = before->options;
     options.hold = true;
     options.record_path = NULL;
-    return pal_session_open(scene, &options, note, out);
+    return pal_session_open(scene, &options, diag, out);
 }
 
 void pal_session_close(pal_session *s)
@@ -444,9 +449,10 @@ int pal_session_rows(const pal_session *s)
     return s->n_row;
 }
 
-void pal_session_row(const pal_session *s, int row, pal_row_info *out)
+void pal_session_row(const pal_session *s, int row, pal_component_info *out)
 {
-    *out = row >= 0 && row < s->n_row ? s->row[row] : (pal_row_info){.name = "", .body = "", .stage = "", .why = ""};
+    *out = row >= 0 && row < s->n_row ? s->row[row]
+                                      : (pal_component_info){.name = "", .body = "", .stage = "", .reason = ""};
 }
 
 int pal_session_parts(const pal_session *s)
@@ -474,11 +480,11 @@ static pal_err refuse(pal_session *s)
 pal_err pal_session_put_pose(pal_session *s, int tool, const pal_pose *pose)
 {
     if (tool < 0 || tool >= s->scene->n_tool || (pose && !pal_pose_ok(pose, s->reach_m))) return refuse(s);
-    pose_slot *slot = pal_trio_slot(&s->tool[tool].trio);
+    pose_slot *slot = pal_triple_buffer_slot(&s->tool[tool].triple_buffer);
     slot->present = pose != NULL;
     if (pose) slot->pose = *pose;
     slot->arrived_ns = pal_clock_ns();
-    pal_trio_publish(&s->tool[tool].trio);
+    pal_triple_buffer_publish(&s->tool[tool].triple_buffer);
     return PAL_ERR_OK;
 }
 
@@ -507,7 +513,7 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
     if (command->kind == PAL_COMMAND_ROW &&
         (command->body < 0 || command->body >= s->scene->n_body || !memchr(command->row, 0, sizeof command->row)))
         return refuse(s);
-    return pal_ring_put(s->command, command);
+    return pal_command_queue_put(s->command, command);
 }
 
 bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
@@ -517,7 +523,7 @@ bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
 
 const pal_frame *pal_session_take_frame(pal_session *s)
 {
-    return pal_trio_take(&s->frames);
+    return pal_triple_buffer_take(&s->frames);
 }
 
 void pal_session_watch(pal_session *s, bool looks)
@@ -538,9 +544,9 @@ void pal_session_material(pal_session *s, int body, pal_material *out)
     pthread_mutex_unlock(&s->note_lock);
 }
 
-void pal_session_last_note(pal_session *s, pal_note *out)
+void pal_session_last_note(pal_session *s, pal_diagnostic *out)
 {
     pthread_mutex_lock(&s->note_lock);
-    *out = s->note;
+    *out = s->diag;
     pthread_mutex_unlock(&s->note_lock);
 }

@@ -59,10 +59,12 @@ typedef struct pal_session_options {
 } pal_session_options;
 
 /* builds the world and starts the thread; borrows the scene (and its meshes) until close. [load] */
-pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_note *note, pal_session **out);
+pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_diagnostic *diag,
+                         pal_session **out);
 /* opens a session for another scene with the options of a running one, with hold and without a record. [any] while no
  * other thread closes `before` */
-pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_note *note, pal_session **out);
+pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_diagnostic *diag,
+                               pal_session **out);
 /* Lets `next`, opened with hold, go on where `before` is, in two halves. carry_over stops the thread of before between
  * two steps, hands what was looked at and switched off over, and its world's state (carry; what it does not do is at
  * rest): as slow as carry is, and at most one step. go_on hands poses, orders and counts over and starts the thread of
@@ -73,9 +75,9 @@ pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene
  * there is time */
 typedef void pal_session_carry(void *user, pal_world *next, const pal_world *before);
 void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_carry *carry, void *user);
-pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note);
+pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_diagnostic *diag);
 pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user,
-                           pal_note *note);
+                           pal_diagnostic *diag);
 /* Before the carry, so that it is short: the thread of before stops between two steps for `look`, which takes from its
  * world what it needs, and goes on while `rehearse` brings the world of next as near as it can. Over again, at most
  * PAL_SESSION_REHEARSALS times, as long as look says that it is worth it (the first says whether there is anything to
@@ -93,7 +95,7 @@ const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
 /* the plan at open and the shown parts: constant while the session lives (this release); frames name the rows that are
  * there now, with those of fields. [any] */
 int pal_session_rows(const pal_session *session);
-void pal_session_row(const pal_session *session, int row, pal_row_info *out); /* spent_ns is 0: see frames */
+void pal_session_row(const pal_session *session, int row, pal_component_info *out); /* spent_ns is 0: see frames */
 int pal_session_parts(const pal_session *session);
 void pal_session_shown(const pal_session *session, int part, pal_shown *out);
 bool pal_session_gives(const pal_session *session, int body, pal_field field); /* can it be shown? */
@@ -118,5 +120,5 @@ void pal_session_material(pal_session *session, int body, pal_material *out);
  * ms old; false: nobody does, or there is none yet. A session that follows starts anew. Copies. [any] */
 bool pal_session_estimate(pal_session *session, int body, pal_estimate *out);
 /* last thing that went wrong in a command (a refused material or brush), "" when nothing; copies. [any] */
-void pal_session_last_note(pal_session *session, pal_note *out);
+void pal_session_last_note(pal_session *session, pal_diagnostic *out);
 #endif

@@ -18,12 +18,12 @@ static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
     uint64_t away_ns = now_ns - to->carried_ns;
     for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
         tool_place *a = &to->tool[t], *b = &from->tool[t];
-        const pose_slot *slot = pal_trio_take(&b->trio);
+        const pose_slot *slot = pal_triple_buffer_take(&b->triple_buffer);
         if (slot) {
-            pose_slot *kept = pal_trio_slot(&a->trio);
+            pose_slot *kept = pal_triple_buffer_slot(&a->triple_buffer);
             *kept = *slot;
             kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
-            pal_trio_publish(&a->trio);
+            pal_triple_buffer_publish(&a->triple_buffer);
         }
         b->arrived_ns = later(b->arrived_ns, away_ns, now_ns);
         a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
@@ -52,8 +52,8 @@ static void hand_orders(pal_session *to, pal_session *from)
                           memory_order_relaxed);
     pal_watch_hand_over(&to->watch, &from->watch);
     pal_command command;
-    for (int k = 0; k < N_COMMAND && pal_ring_get(from->command, &command); k++)
-        (void)pal_ring_put(to->command, &command);
+    for (int k = 0; k < N_COMMAND && pal_command_queue_get(from->command, &command); k++)
+        (void)pal_command_queue_put(to->command, &command);
 }
 
 static void stood(pal_session *next, uint64_t since_ns)
@@ -89,11 +89,11 @@ void pal_session_carry_over(pal_session *next, pal_session *before, pal_session_
     carry(user, next->world, before->world);
 }
 
-pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note)
+pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_diagnostic *diag)
 {
     hand_orders(next, before);
     hand_tools(next, before, pal_clock_ns());
-    pal_err err = pal_session_start(next, note);
+    pal_err err = pal_session_start(next, diag);
     stood(next, next->stopped_ns);
     if (!err && before->log)
         pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
@@ -105,10 +105,11 @@ pal_err pal_session_go_on(pal_session *next, pal_session *before, pal_note *note
     return err;
 }
 
-pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user, pal_note *note)
+pal_err pal_session_follow(pal_session *next, pal_session *before, pal_session_carry *carry, void *user,
+                           pal_diagnostic *diag)
 {
     pal_session_carry_over(next, before, carry, user);
-    return pal_session_go_on(next, before, note);
+    return pal_session_go_on(next, before, diag);
 }
 
 double pal_session_stood_s(const pal_session *session, int *n_rehearsed)

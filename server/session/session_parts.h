@@ -1,8 +1,8 @@
 /* What session.c and session_follow.c share: the session's record and its thread. Private to these. */
 #ifndef PAL_SESSION_SESSION_PARTS_H
 #define PAL_SESSION_SESSION_PARTS_H
-#include "server/base/ring.h"
-#include "server/base/trio.h"
+#include "server/base/command_queue.h"
+#include "server/base/triple_buffer.h"
 #include "server/estimate/watch.h"
 #include "server/session/input_log.h"
 #include "server/session/rows_off.h"
@@ -20,7 +20,7 @@ typedef struct pose_slot {
 } pose_slot;
 
 typedef struct tool_place {
-    pal_trio trio;
+    pal_triple_buffer triple_buffer;
     pose_slot slot[3];
     /* the rest is the simulation thread's */
     pal_pose pose;
@@ -39,7 +39,7 @@ struct pal_session {
     pal_world *world;
     double reach_m;
     uint64_t step_ns, lease_ns;
-    pal_row_info *row;
+    pal_component_info *row;
     int n_row;
     pal_rows_off off; /* since sessions before this one */
     pal_shown part[PAL_BODY_MAX];
@@ -50,15 +50,15 @@ struct pal_session {
 
     /* crossing points */
     tool_place tool[PAL_TOOL_MAX];
-    pal_ring *command;
+    pal_command_queue *command;
     pal_frame *frame[3];
-    pal_trio frames;
+    pal_triple_buffer frames;
     _Atomic bool stop;
     _Atomic bool replaced; /* another one is about to go on where it stands */
     _Atomic uint64_t beat_ns, n_refused;
     _Atomic int n_watch; /* who looks at frames; only_watched alone asks */
     pthread_mutex_t note_lock;
-    pal_note note;
+    pal_diagnostic diag;
     pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
     pal_watch watch;                     /* who looks at estimates */
 
@@ -79,6 +79,6 @@ struct pal_session {
 };
 
 /* the simulation thread, of who opens, follows and closes; INTERNAL: it could not be started */
-pal_err pal_session_start(pal_session *session, pal_note *note);
+pal_err pal_session_start(pal_session *session, pal_diagnostic *diag);
 void pal_session_stop(pal_session *session); /* between two steps; waits for it */
 #endif

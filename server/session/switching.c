@@ -1,47 +1,47 @@
-/* Live switches: a scene made by pal_setting_make, and a transfer to it from the one that runs. */
+/* Live switches: a scene made by pal_configuration_make, and a transfer to it from the one that runs. */
 #include "server/session/switching.h"
 
 #include <stdlib.h>
 
 struct pal_switch {
     int body;
-    bool rehearsed;
+    bool has_rehearsed;
     pal_scene from; /* what the new scene is made of */
-    pal_set_scene *set;
+    pal_configured_scene *set;
     pal_transfer *transfer;
     pal_transfer_report report;
 };
 
-static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
-                       pal_note *note, pal_switch *s)
+static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_configuration *to,
+                       pal_diagnostic *diag, pal_switch *s)
 {
-    pal_setting now, next;
+    pal_configuration now, next;
     if (body < 0 || body >= scene->n_body)
-        return pal_note_set(note, PAL_ERR_REFUSED, "there is no body %d to be switched", body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no body %d to be switched", body);
     s->body = body;
     s->from = *scene;
     if (base) {
         s->from.body[body] = *base;
         s->from.body[body].material = scene->body[body].material;
     }
-    PAL_TRY(pal_setting_check_live(&s->from, body, to, note));
-    PAL_TRY(pal_setting_make(&s->from, body, to, note, &s->set));
+    PAL_TRY(pal_configuration_check_live(&s->from, body, to, diag));
+    PAL_TRY(pal_configuration_make(&s->from, body, to, diag, &s->set));
     s->set->scene.accuracy[0] = 0; /* was said of the setting before */
-    pal_setting_of(scene, body, &now);
-    pal_setting_of(&s->set->scene, body, &next);
-    if (pal_setting_same(&now, &next)) {
-        char text[PAL_SETTING_TEXT];
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" is as wanted already: %s", scene->body[body].name,
-                            pal_setting_text(&now, text));
+    pal_configuration_of(scene, body, &now);
+    pal_configuration_of(&s->set->scene, body, &next);
+    if (pal_configuration_equal(&now, &next)) {
+        char text[PAL_CONFIGURATION_TEXT];
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" is as wanted already: %s", scene->body[body].name,
+                                  pal_configuration_text(&now, text));
     }
-    return pal_transfer_make(scene, &s->set->scene, body, note, &s->transfer);
+    return pal_transfer_make(scene, &s->set->scene, body, diag, &s->transfer);
 }
 
-pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_setting *to,
-                           pal_note *note, pal_switch **out)
+pal_err pal_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_configuration *to,
+                           pal_diagnostic *diag, pal_switch **out)
 {
     pal_switch *s = calloc(1, sizeof *s);
-    pal_err err = s ? prepare(scene, base, body, to, note, s) : PAL_ERR_MEMORY;
+    pal_err err = s ? prepare(scene, base, body, to, diag, s) : PAL_ERR_MEMORY;
     if (err)
         pal_switch_free(s);
     else
@@ -57,16 +57,16 @@ const pal_scene *pal_switch_scene(const pal_switch *change)
 bool pal_switch_look(void *change, const pal_world *before)
 {
     pal_switch *s = change;
-    const double near_m = PAL_SWITCH_GONE * pal_world_look(before, s->body)->size_m;
-    if (s->rehearsed && pal_transfer_gone_m(s->transfer, before) <= near_m) return false;
-    return pal_transfer_look(s->transfer, before);
+    const double near_m = PAL_SWITCH_GONE * pal_world_view_body(before, s->body)->length_scale_m;
+    if (s->has_rehearsed && pal_transfer_drift_m(s->transfer, before) <= near_m) return false;
+    return pal_transfer_snapshot(s->transfer, before);
 }
 
 void pal_switch_rehearse(void *change, pal_world *next)
 {
     pal_switch *s = change;
     pal_transfer_rehearse(s->transfer, next);
-    s->rehearsed = true;
+    s->has_rehearsed = true;
 }
 
 static _Thread_local uint64_t n_carried;
@@ -80,24 +80,24 @@ void pal_switch_carry(void *change, pal_world *next, const pal_world *before)
 {
     pal_switch *s = change;
     n_carried++;
-    pal_transfer_carry(s->transfer, next, before, &s->report);
+    pal_transfer_apply(s->transfer, next, before, &s->report);
 }
 
-void pal_switch_report_of(const pal_switch *change, pal_switch_report *out)
+void pal_switch_report_of(const pal_switch *change, pal_refine_history *out)
 {
     const pal_transfer_report *r = &change->report;
-    *out = (pal_switch_report){.energy_before_J = r->energy_before_J,
-                               .energy_after_J = r->energy_after_J,
-                               .most_move_m = r->most_move_m,
-                               .body_move_m = r->body_move_m,
-                               .frame_move_m = r->frame_move_m,
-                               .scale = r->scale};
+    *out = (pal_refine_history){.energy_before_J = r->energy_before_J,
+                                .energy_after_J = r->energy_after_J,
+                                .max_move_m = r->max_move_m,
+                                .body_move_m = r->body_move_m,
+                                .frame_move_m = r->frame_move_m,
+                                .scale = r->scale};
 }
 
 void pal_switch_free(pal_switch *change)
 {
     if (!change) return;
     pal_transfer_free(change->transfer);
-    pal_set_scene_free(change->set);
+    pal_configured_scene_free(change->set);
     free(change);
 }

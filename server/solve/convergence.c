@@ -38,12 +38,13 @@ void pal_convergence_orders(pal_convergence_point *point, int n)
         double p = 1;
         now->order = now->change_order = now->estimate_percent = NAN;
         if (!before) continue;
-        now->order = pal_observed_order(before->result.h_m, before->rms_percent, now->result.h_m, now->rms_percent);
+        now->order =
+            pal_observed_order(before->result.edge_m, before->rms_percent, now->result.edge_m, now->rms_percent);
         if (k > 1) {
-            const double h[3] = {point[k - 2].result.h_m, before->result.h_m, now->result.h_m};
+            const double h[3] = {point[k - 2].result.edge_m, before->result.edge_m, now->result.edge_m};
             p = now->change_order = pal_richardson_order(h, before->change_percent, now->change_percent);
         }
-        now->estimate_percent = now->change_percent / (pow(before->result.h_m / now->result.h_m, p) - 1);
+        now->estimate_percent = now->change_percent / (pow(before->result.edge_m / now->result.edge_m, p) - 1);
     }
 }
 
@@ -73,29 +74,29 @@ static void compare(const pal_solution *s, const double *x, int n, const pal_sam
 
 pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
                         const pal_solve_options *options, const pal_samples *samples, const int *resolution, int n,
-                        pal_convergence_point *out, int *n_done, pal_note *note)
+                        pal_convergence_point *out, int *n_done, pal_diagnostic *diag)
 {
     double *x = NULL, *u[2] = {NULL, NULL};
     int n_point = 0, done = 0;
     if (n_done) *n_done = 0;
     if (n < 1 || n > PAL_CONVERGENCE_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MOST);
     for (int k = 1; k < n; k++)
         if (resolution[k] <= resolution[k - 1])
-            return pal_note_set(note, PAL_ERR_REFUSED, "resolution %d comes after %d: wanted ascending ones",
-                                resolution[k], resolution[k - 1]);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d comes after %d: wanted ascending ones",
+                                      resolution[k], resolution[k - 1]);
     pal_err err = choose_points(surface, samples, &x, &n_point);
     for (int k = 0; k < 2 && !err; k++) {
         u[k] = malloc(3 * (size_t)(n_point > 0 ? n_point : 1) * sizeof *u[k]);
         if (!u[k]) err = PAL_ERR_MEMORY;
     }
-    if (err) pal_note_set(note, err, "no memory for %d points", n_point);
+    if (err) pal_diagnostic_set(diag, err, "no memory for %d points", n_point);
     for (; done < n && !err; done++) {
         pal_solution *s = NULL;
         pal_solve_options now = *options;
         out[done] = (pal_convergence_point){.resolution = resolution[done]};
         now.resolution = resolution[done];
-        err = pal_solve(problem, load_case, surface, &now, &s, &out[done].result, note);
+        err = pal_solve(problem, load_case, surface, &now, &s, &out[done].result, diag);
         if (err) break;
         compare(s, x, n_point, samples, done ? u[(done + 1) & 1] : NULL, u[done & 1], &out[done]);
         pal_solution_free(s);

@@ -1,8 +1,8 @@
 /* Convergence under refinement: one load case solved at several resolutions, errors and observed orders. The error is
  * that of samples.h against a reference; without one (and beside it) it is estimated from the change between
  * resolutions (Richardson 1911; Roache 1994). [load] */
-#ifndef PAL_LAB_CONVERGENCE_H
-#define PAL_LAB_CONVERGENCE_H
+#ifndef PAL_SOLVE_CONVERGENCE_H
+#define PAL_SOLVE_CONVERGENCE_H
 #include "server/solve/solve.h"
 
 enum { PAL_CONVERGENCE_MOST = 16 };
@@ -23,7 +23,7 @@ typedef struct pal_convergence_point {
  * points that are whole, also after an error. Errors as of pal_solve, and MEMORY */
 pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
                         const pal_solve_options *options, const pal_samples *samples, const int *resolution, int n,
-                        pal_convergence_point *out, int *n_done, pal_note *note);
+                        pal_convergence_point *out, int *n_done, pal_diagnostic *diag);
 
 /* the four derived numbers of points whose h, rms_percent and change_percent are set */
 void pal_convergence_orders(pal_convergence_point *point, int n);

@@ -11,7 +11,8 @@
 #include "server/solve/load_case.h"
 
 #include "server/base/vec3.h"
-#include "server/num/shape.h"
+#include "server/mesh/volume/loose_parts.h"
+#include "server/num/shape_functions.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -41,7 +42,7 @@ bool pal_box_holds(const pal_box *box, const double x[3], double slack)
 
 double pal_case_slack(const pal_tets *tets)
 {
-    return 1e-6 * tets->h_m;
+    return 1e-6 * tets->edge_m;
 }
 
 /* ---- voxels ---- */
@@ -72,27 +73,51 @@ static void align(const pal_problem *p, int resolution, const pal_surface *surfa
 /* share of the surface's volume that the filled voxels miss */
 static double missing(const pal_prepared *mesh)
 {
-    double sum = 0, cube = mesh->tets.h_m * mesh->tets.h_m * mesh->tets.h_m;
+    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
     for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_voxel_wish *wish,
-                        pal_prepared *out, pal_note *note)
+/* what no support holds is left out, as where a scene is made ready (mesh/loose_parts.h) */
+static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
-    pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .least_fill = wish->least_fill};
-    bool chosen = !(wish->least_fill > 0);
-    if (chosen) voxel.least_fill = wish->fill ? drop_fill : whole_fill;
-    if (wish->align) align(problem, wish->resolution, surface, voxel.ahead);
-    PAL_TRY(pal_prepared_make(surface, &voxel, out, NULL, note));
-    if (!chosen || !wish->fill || !(missing(out) > most_missing)) return PAL_ERR_OK;
-    pal_prepared_free(out);
-    voxel.least_fill = keep_fill;
-    return pal_prepared_make(surface, &voxel, out, NULL, note);
+    const pal_tets *tets = &mesh->tets;
+    pal_loose_parts parts;
+    uint8_t *fixed = calloc((size_t)tets->n_node, sizeof *fixed);
+    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
+    for (int i = 0; i < tets->n_node; i++) {
+        double x[3];
+        pal_add3(x, tets->x + 3 * (size_t)i, tets->origin_m);
+        for (int k = 0; k < p->n_support && !fixed[i]; k++)
+            fixed[i] = pal_box_holds(&p->support[k].region, x, pal_case_slack(tets));
+    }
+    pal_err err = pal_loose_parts_drop("problem", fixed, false, mesh, &parts, diag);
+    free(fixed);
+    return err;
 }
 
-pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support out[PAL_PROBLEM_REGIONS],
-                          pal_note *note)
+pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_voxel_wish *wish,
+                        pal_prepared *out, pal_diagnostic *diag)
+{
+    pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .min_fill = wish->min_fill};
+    pal_prepare_report report;
+    bool chosen = !(wish->min_fill > 0);
+    if (chosen) voxel.min_fill = wish->fill ? drop_fill : whole_fill;
+    if (wish->align) align(problem, wish->resolution, surface, voxel.ahead);
+    PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
+    if (chosen && wish->fill && missing(out) > most_missing) {
+        pal_prepared_free(out);
+        voxel.min_fill = keep_fill;
+        PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
+    }
+    if (report.voxel.n_component == 1) return PAL_ERR_OK;
+    pal_err err = drop_loose(problem, out, diag);
+    if (err) pal_prepared_free(out);
+    return err;
+}
+
+pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support_def out[PAL_PROBLEM_REGIONS],
+                          pal_diagnostic *diag)
 {
     double slack = pal_case_slack(tets);
     for (int k = 0; k < problem->n_support; k++) {
@@ -104,9 +129,10 @@ pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_
             found = pal_box_holds(box, x, slack);
         }
         if (!found)
-            return pal_note_set(note, PAL_ERR_REFUSED, "supports[%d]: no node of the body lies in %s (voxels of %g m)",
-                                k, pal_box_show(box).text, tets->h_m);
-        out[k] = (pal_support){.lowest = false};
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "supports[%d]: no node of the body lies in %s (voxels of %g m)", k,
+                                      pal_box_show(box).text, tets->edge_m);
+        out[k] = (pal_support_def){.lowest = false};
         pal_sub3(out[k].low_m, box->low_m, tets->origin_m);
         pal_sub3(out[k].high_m, box->high_m, tets->origin_m);
         for (int c = 0; c < 3; c++) out[k].low_m[c] -= slack, out[k].high_m[c] += slack;
@@ -138,12 +164,12 @@ typedef struct job {
     const pal_locate *locate;
     const pal_surface *surface;
     double *f;
-    pal_note *note;
+    pal_diagnostic *diag;
 } job;
 
 static void spread(const job *j, int element, const double local[4], const double force_N[3])
 {
-    double n[PAL_CORNERS_MOST];
+    double n[PAL_MAX_CORNERS];
     const int32_t *node;
     int n_corner = pal_case_shape(j->body, element, local, n, &node);
     for (int k = 0; k < n_corner; k++) pal_axpy3(j->f + 3 * node[k], n[k], force_N);
@@ -167,14 +193,14 @@ static pal_err add_traction(const job *j, double *area_m2)
     const pal_problem_load *load = &j->load_case->load[j->index];
     const double *origin = j->body->tets->origin_m;
     double low[3], high[3], area = 0, per_area[3];
-    pal_piece *piece = NULL;
+    pal_quadrature_point *piece = NULL;
     int n_piece = 0;
     char facing[96] = "";
     pal_sub3(low, load->region.low_m, origin);
     pal_sub3(high, load->region.high_m, origin);
     pal_err err =
         pal_locate_surface(j->locate, j->surface, low, high, load->has_normal ? load->normal : NULL, &piece, &n_piece);
-    if (err) return pal_note_set(j->note, err, "%s: no memory for its surface", path_of(j).text);
+    if (err) return pal_diagnostic_set(j->diag, err, "%s: no memory for its surface", path_of(j).text);
     for (int k = 0; k < n_piece; k++) area += piece[k].area_m2;
     if (area_m2) area_m2[j->index] = area;
     if (!(area > 0)) {
@@ -182,8 +208,8 @@ static pal_err add_traction(const job *j, double *area_m2)
         if (load->has_normal)
             snprintf(facing, sizeof facing, " that faces (%g, %g, %g)", load->normal[0], load->normal[1],
                      load->normal[2]);
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", path_of(j).text,
-                            pal_box_show(&load->region).text, facing);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", path_of(j).text,
+                                  pal_box_show(&load->region).text, facing);
     }
     if (load->has_traction)
         pal_copy3(per_area, load->traction_Pa);
@@ -204,20 +230,20 @@ static pal_err add_point(const job *j)
     double x[3], local[4], outside;
     pal_sub3(x, load->point_m, j->body->tets->origin_m);
     int element = pal_locate_point(j->locate, x, local, &outside);
-    if (outside > j->body->h_m)
-        return pal_note_set(
-            j->note, PAL_ERR_REFUSED, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
-            path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside, j->body->h_m);
+    if (outside > j->body->edge_m)
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
+            path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside, j->body->edge_m);
     spread(j, element, local, load->force_N);
     return PAL_ERR_OK;
 }
 
 pal_err pal_case_force(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
                        const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
-                       pal_note *note)
+                       pal_diagnostic *diag)
 {
     const pal_problem_load *l = &load_case->load[load];
-    job j = {problem, load_case, load, body, locate, surface, force_N, note};
+    job j = {problem, load_case, load, body, locate, surface, force_N, diag};
     if (l->kind == PAL_LOAD_TRACTION) return add_traction(&j, area_m2);
     if (l->kind == PAL_LOAD_POINT) return add_point(&j);
     for (int i = 0; i < body->n_node; i++) pal_axpy3(force_N + 3 * i, body->mass_kg[i], l->gravity_m_s2);
@@ -226,9 +252,9 @@ pal_err pal_case_force(const pal_problem *problem, const pal_problem_case *load_
 
 pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, const pal_body *body,
                         const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
-                        pal_note *note)
+                        pal_diagnostic *diag)
 {
     for (int k = 0; k < load_case->n_load; k++)
-        PAL_TRY(pal_case_force(problem, load_case, k, body, locate, surface, force_N, area_m2, note));
+        PAL_TRY(pal_case_force(problem, load_case, k, body, locate, surface, force_N, area_m2, diag));
     return PAL_ERR_OK;
 }

@@ -3,29 +3,29 @@
 #include "server/solve/preflight.h"
 
 #include "server/base/vec3.h"
-#include "server/num/conjugate.h"
+#include "server/num/conjugate_gradient.h"
 #include "server/num/lanczos.h"
-#include "server/sim/springs/spring_shape.h"
-#include "server/sim/subdivision/solid.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/springs/spring_constraint.h"
+#include "server/sim/subdivision/subdivision_solid.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double least_shape = 0.1, least_edge_S = 1e-6, least_fill = 0.05, least_mass = 1e-3;
+static const double least_shape = 0.1, least_edge_S = 1e-6, min_fill = 0.05, least_mass = 1e-3;
 enum { MOST_LANCZOS = 24 };
 
 typedef struct probe {
     pal_world *world;
     pal_body *body;
-    pal_row force[32];
+    pal_component force[32];
     int n_force;
     double way_m; /* of the differences */
     double *x, *low;
     bool failed;
-    int most_cg; /* iterations for each axis of the slowest motion */
+    int max_cg; /* iterations for each axis of the slowest motion */
 } probe;
 
 /* ---- places ---- */
@@ -53,7 +53,7 @@ static void look_at_edges(const pal_body *body, const double *x, const int32_t *
         for (int b = 0; b < a; b++, n_edge++) {
             double length = pal_dist3(x + 3 * (size_t)corner[a], x + 3 * (size_t)corner[b]);
             *mean2 += length * length;
-            if (length < least_edge_S * body->size_m)
+            if (length < least_edge_S * body->length_scale_m)
                 weak(&out->edge, corner[a], length, x + 3 * (size_t)corner[a], body);
             if (corner[a] == out->limit_node || corner[b] == out->limit_node)
                 out->limit_edge_m = fmin(out->limit_edge_m, length);
@@ -77,9 +77,11 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
 /* volumes: springs keep the volumes of tetrahedra */
 static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
-    const pal_tets *tets = body->embed ? NULL : body->tets;
-    const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->shell ? body->shell->levels.first_face[1] : 0;
-    const int32_t *simplex = tets ? tets->tet : body->shell ? body->shell->levels.face : NULL;
+    const pal_tets *tets = body->interpolation ? NULL : body->tets;
+    const int n = tets ? 4 : 3, n_simplex = tets             ? tets->n_tet
+                                            : body->adaptive ? body->adaptive->levels.first_face[1]
+                                                             : 0;
+    const int32_t *simplex = tets ? tets->tet : body->adaptive ? body->adaptive->levels.face : NULL;
     for (int e = 0; e < n_simplex; e++) {
         const int32_t *corner = simplex + (size_t)n * (size_t)e;
         double mean2, at[3];
@@ -91,10 +93,10 @@ static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_b
     }
     int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
     const int32_t *element = body->element ? body->element : simplex;
-    for (int e = 0; body->fill && element && !body->embed && e < n_fill; e++) {
+    for (int e = 0; body->fill && element && !body->interpolation && e < n_fill; e++) {
         double at[3];
         middle(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
-        if ((double)body->fill[e] < least_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
+        if ((double)body->fill[e] < min_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
     }
     out->n_element = body->element ? body->n_element
                      : body->solid ? pal_cell_elements_count(&body->solid->elements)
@@ -107,8 +109,8 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        out->n_held += body->held[i] != 0;
-        if (!body->held[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+        out->n_held += body->fixed[i] != 0;
+        if (!body->fixed[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
@@ -119,11 +121,11 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
     const pal_body *body = p->body;
     double *bound = calloc((size_t)body->n_dof + 1, sizeof *bound), most = 0;
     if (!bound) return false;
-    for (int i = 0; i < p->n_force && !body->embed; i++)
+    for (int i = 0; i < p->n_force && !body->interpolation; i++)
         if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (body->held[i] || !(bound[i] > most * body->mass_kg[i])) continue;
+        if (body->fixed[i] || !(bound[i] > most * body->mass_kg[i])) continue;
         most = bound[i] / body->mass_kg[i];
         out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
         pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
@@ -139,13 +141,13 @@ static void force_at(probe *p, const double *v, double way_m, double *out)
 {
     pal_body *body = p->body;
     for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = p->x[i] + way_m * v[i];
-    pal_body_place(body);
+    pal_body_update_nodes(body);
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
     pal_step step = {.body = body, .force = p->force, .n_force = p->n_force, .dt_s = 1e-3, .n_sub = 1};
     for (int i = 0; i < p->n_force; i++) p->failed |= p->force[i].effect->run(p->force[i].self, &step) != PAL_ERR_OK;
-    if (body->embed) {
+    if (body->interpolation) {
         memset(out, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-        pal_point_rows_pull(body->embed, body->f, out);
+        pal_interpolation_apply_transpose(body->interpolation, body->f, out);
     } else {
         memcpy(out, body->f, 3 * sizeof(double) * (size_t)body->n_dof);
     }
@@ -162,7 +164,7 @@ static void apply(void *user, const double *v, double *out)
     force_at(p, v, -way, p->low);
     force_at(p, v, way, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
-        bool moves = body->mass_kg[i / 3] > 0 && !body->held[i / 3];
+        bool moves = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3];
         out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
     }
 }
@@ -177,7 +179,7 @@ static bool over_mass(void *user, const double *b, double *out)
 {
     const pal_body *body = ((const probe *)user)->body;
     for (int i = 0; i < 3 * body->n_dof; i++)
-        out[i] = body->mass_kg[i / 3] > 0 && !body->held[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
+        out[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
     return true;
 }
 
@@ -203,7 +205,7 @@ static double fast(probe *p, double *room)
     uint64_t seed = 7;
     for (int i = 0; i < n; i++) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
-        l.z[i] = body->held[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
+        l.z[i] = body->fixed[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
     }
     (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
     free(basis);
@@ -217,20 +219,20 @@ static double slow(probe *p, double *room)
     size_t n = 3 * (size_t)body->n_dof;
     double least = INFINITY, *u = room, *b = room + n;
     for (size_t axis = 0; axis < 3; axis++) {
-        pal_conjugate cg = {.n = (int)n,
-                            .multiply = apply,
-                            .precondition = precondition,
-                            .user = p,
-                            .r = room + 2 * n,
-                            .z = room + 3 * n,
-                            .p = room + 4 * n,
-                            .q = room + 5 * n};
+        pal_conjugate_gradient cg = {.n = (int)n,
+                                     .multiply = apply,
+                                     .precondition = precondition,
+                                     .user = p,
+                                     .r = room + 2 * n,
+                                     .z = room + 3 * n,
+                                     .p = room + 4 * n,
+                                     .q = room + 5 * n};
         double uf = 0, uu = 0;
         for (size_t i = 0; i < n; i++) {
             u[i] = 0;
-            b[i] = cg.r[i] = i % 3 == axis && !body->held[i / 3] ? body->mass_kg[i / 3] : 0;
+            b[i] = cg.r[i] = i % 3 == axis && !body->fixed[i / 3] ? body->mass_kg[i / 3] : 0;
         }
-        (void)pal_conjugate_run(&cg, u, 0.03 * sqrt(pal_sum_products((int)n, b, b)), 1, p->most_cg);
+        (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
         /* u'Ku = u'(b - r) */
         for (size_t i = 0; i < n; i++) uf += u[i] * (b[i] - cg.r[i]), uu += body->mass_kg[i / 3] * u[i] * u[i];
         if (uu > 0 && uf / uu < least) least = uf / uu;
@@ -245,7 +247,7 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
     double *room = calloc(8 * n + 1, sizeof *room);
     if (!room) return false;
     p->x = room + 6 * n, p->low = room + 7 * n;
-    p->way_m = 1e-5 * body->h_m;
+    p->way_m = 1e-5 * body->edge_m;
     memcpy(p->x, body->x, n * sizeof(double));
     out->fast_1_s = out->n_held < body->n_active ? fast(p, room) : (double)NAN;
     out->slow_1_s = out->n_held > 0 && out->n_held < body->n_active ? slow(p, room) : (double)NAN;
@@ -253,7 +255,7 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
     out->condition = out->fast_1_s * out->fast_1_s / (out->slow_1_s * out->slow_1_s);
     out->slow_s = 2 * M_PI / out->slow_1_s;
     memcpy(body->x, p->x, n * sizeof(double));
-    pal_body_place(body);
+    pal_body_update_nodes(body);
     free(room);
     return true;
 }
@@ -262,9 +264,9 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
 
 /* ns of a row for one evaluation, from what `palpate bench` measured on the machine of README's tables; NaN: not known
  */
-static double row_ns(const pal_body *body, const char *name)
+static double component_ns(const pal_body *body, const char *name)
 {
-    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->shell ? body->shell->n_spring : 0;
+    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->adaptive ? body->adaptive->n_spring : 0;
     const double n_cell = body->solid ? pal_cell_elements_count(&body->solid->elements) : 0;
     const struct {
         const char *name;
@@ -287,10 +289,10 @@ static double foresee_ms(const probe *p, const pal_body *body, int n_sub, int b)
     double forces = 0, solve = 0;
     const char *solver = "";
     pal_solve_report report;
-    for (int i = 0; i < p->n_force; i++) forces += row_ns(body, p->force[i].effect->name);
-    for (int i = 0; i < pal_world_rows(p->world); i++) {
-        pal_row_info info;
-        pal_world_row(p->world, i, &info);
+    for (int i = 0; i < p->n_force; i++) forces += component_ns(body, p->force[i].effect->name);
+    for (int i = 0; i < pal_world_component_count(p->world); i++) {
+        pal_component_info info;
+        pal_world_component_info(p->world, i, &info);
         if (info.body == body->name && !strcmp(info.stage, "solve")) solver = info.name;
     }
     if (!(forces > 0) || !strcmp(solver, "static_newton")) return NAN;
@@ -333,15 +335,15 @@ static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
 
 /* ---- all ---- */
 
-static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int most_cg, pal_preflight_body *out)
+static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int max_cg, pal_preflight_body *out)
 {
     pal_body *body = pal_world_body(world, b);
-    probe p = {.world = world, .body = body, .most_cg = most_cg};
+    probe p = {.world = world, .body = body, .max_cg = max_cg};
     bool volumes = false;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        const pal_row *row = pal_world_effect(world, i);
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *row = pal_world_component(world, i);
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         if (info.body != body->name || row->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
         p.force[p.n_force++] = *row;
         volumes = volumes || !strcmp(info.name, "tet_volume");
@@ -362,15 +364,15 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
     return PAL_ERR_OK;
 }
 
-pal_err pal_preflight_look(const pal_scene *scene, int most_cg, pal_preflight *out, pal_note *note)
+pal_err pal_preflight_look(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag)
 {
     pal_world *world = NULL;
     *out = (pal_preflight){.n_body = scene->n_body};
-    PAL_TRY(pal_world_create(scene, note, &world));
+    PAL_TRY(pal_world_create(scene, diag, &world));
     out->n_byte = pal_world_bytes(world);
     pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) {
-        err = look_at_body(world, scene, b, most_cg, &out->body[b]);
+        err = look_at_body(world, scene, b, max_cg, &out->body[b]);
         out->foreseen_ms += out->body[b].foreseen_ms;
     }
     pal_world_destroy(world);

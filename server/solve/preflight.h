@@ -2,8 +2,8 @@
  * weak and where they are, conditioning, memory, and what a step will cost, foreseen from counts. A scene that cannot
  * run is refused with the reason that pal_world_create gives. Works on a world of its own, at rest; costs some hundred
  * evaluations of the forces, most of them for the slowest motion. Thread: [load]. */
-#ifndef PAL_LAB_PREFLIGHT_H
-#define PAL_LAB_PREFLIGHT_H
+#ifndef PAL_SOLVE_PREFLIGHT_H
+#define PAL_SOLVE_PREFLIGHT_H
 #include "server/sim/world/world.h"
 
 /* the worst of a kind, and how many there are; places in the scene frame */
@@ -45,10 +45,10 @@ typedef struct pal_preflight {
     size_t n_byte;      /* of the world                       */
 } pal_preflight;
 
-/* most_cg: iterations of the conjugate gradients for the slowest motion, along each axis. With few of them slow_1_s is
+/* max_cg: iterations of the conjugate gradients for the slowest motion, along each axis. With few of them slow_1_s is
  * too large and the condition a lower bound. REFUSED, BUDGET, MEMORY as pal_world_create */
 enum { PAL_PREFLIGHT_FULL = 250, PAL_PREFLIGHT_QUICK = 40 };
-pal_err pal_preflight_look(const pal_scene *scene, int most_cg, pal_preflight *out, pal_note *note);
+pal_err pal_preflight_look(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag);
 /* sentences for people about one body, one a line, worst first; returns how many lines (at most `most`). Nothing weak:
  * limit and conditioning alone */
 enum { PAL_PREFLIGHT_LINE = 200, PAL_PREFLIGHT_LINES = 8 };

@@ -17,7 +17,7 @@ typedef struct csv {
     const char *name;
     const char *at, *end; /* of this line, without its end */
     int line;
-    pal_note *note;
+    pal_diagnostic *diag;
 } csv;
 
 static bool is_blank(char c)
@@ -70,16 +70,16 @@ static pal_err read_header(csv *c)
     char word[WORD];
     for (int k = 0; k < COLUMNS; k++) {
         if (!next_cell(c, word))
-            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz", c->name,
-                                c->line, k);
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz",
+                                      c->name, c->line, k);
         if (strcmp(word, column_name[k]))
-            return pal_note_set(c->note, PAL_ERR_REFUSED,
-                                "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name, c->line,
-                                k + 1, shown(word), column_name[k]);
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED,
+                                      "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
+                                      c->line, k + 1, shown(word), column_name[k]);
     }
     if (next_cell(c, word))
-        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
-                            c->line, shown(word));
+        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
+                                  c->line, shown(word));
     return PAL_ERR_OK;
 }
 
@@ -88,15 +88,16 @@ static pal_err read_row(csv *c, double out[COLUMNS])
     char word[WORD], *end;
     for (int k = 0; k < COLUMNS; k++) {
         if (!next_cell(c, word))
-            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6", c->name, c->line, k);
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6", c->name, c->line,
+                                      k);
         out[k] = strtod(word, &end);
         if (end == word || *end || !isfinite(out[k]))
-            return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
-                                c->name, c->line, k + 1, column_name[k], shown(word));
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
+                                      c->name, c->line, k + 1, column_name[k], shown(word));
     }
     if (next_cell(c, word))
-        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
-                            c->line, shown(word));
+        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
+                                  c->line, shown(word));
     return PAL_ERR_OK;
 }
 
@@ -119,23 +120,23 @@ static pal_err read_all(csv *c, const char *text, const char *last, pal_samples 
             if (x) out->x = x;
             double *u = realloc(out->u, 3 * cap * sizeof *u);
             if (u) out->u = u;
-            if (!x || !u) return pal_note_set(c->note, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
+            if (!x || !u) return pal_diagnostic_set(c->diag, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
         }
         pal_copy3(out->x + 3 * out->n, row);
         pal_copy3(out->u + 3 * out->n, row + 3);
         out->n++;
     }
     if (!header)
-        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz", c->name,
-                            c->line ? c->line : 1);
+        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz",
+                                  c->name, c->line ? c->line : 1);
     if (out->n == 0)
-        return pal_note_set(c->note, PAL_ERR_REFUSED, "%s: line %d: no row below the header", c->name, c->line);
+        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: no row below the header", c->name, c->line);
     return PAL_ERR_OK;
 }
 
-pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_samples *out, pal_note *note)
+pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_samples *out, pal_diagnostic *diag)
 {
-    csv c = {.name = name, .note = note};
+    csv c = {.name = name, .diag = diag};
     pal_samples made = {0};
     const char *text = (const char *)bytes;
     /* a mark that spreadsheets put in front */
@@ -148,28 +149,28 @@ pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte,
     return err;
 }
 
-pal_err pal_samples_read(const char *path, pal_samples *out, pal_note *note)
+pal_err pal_samples_read(const char *path, pal_samples *out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, (size_t)256 << 20, &bytes, &n_byte, note));
-    pal_err err = pal_samples_parse(path, bytes, n_byte, out, note);
+    PAL_TRY(pal_file_read(path, (size_t)256 << 20, &bytes, &n_byte, diag));
+    pal_err err = pal_samples_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }
 
-pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_note *note)
+pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diagnostic *diag)
 {
     size_t most = 32 + (size_t)samples->n * ROW, n = 0;
     char *text = malloc(most);
-    if (!text) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d samples", path, samples->n);
+    if (!text) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d samples", path, samples->n);
     n += (size_t)snprintf(text, most, "x,y,z,ux,uy,uz\n");
     for (int i = 0; i < samples->n; i++) {
         const double *x = samples->x + 3 * i, *u = samples->u + 3 * i;
         n += (size_t)snprintf(text + n, most - n, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1],
                               u[2]);
     }
-    pal_err err = pal_file_write(path, text, n, note);
+    pal_err err = pal_file_write(path, text, n, diag);
     free(text);
     return err;
 }

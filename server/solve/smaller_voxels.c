@@ -28,14 +28,14 @@ static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], flo
     for (int i = 0; i < 3 * t->n_node; i++)
         low[i % 3] = fmin(low[i % 3], t->x[i]), high[i % 3] = fmax(high[i % 3], t->x[i]);
     for (int c = 0; c < 3; c++) {
-        n[c] = (int)floor((high[c] - low[c]) / t->h_m + 0.5) + 2;
-        low[c] -= t->h_m;
+        n[c] = (int)floor((high[c] - low[c]) / t->edge_m + 0.5) + 2;
+        low[c] -= t->edge_m;
     }
     *fill = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **fill);
     if (!*fill) return PAL_ERR_MEMORY;
     for (int e = 0; e < mesh->hexes.n_hex; e++) {
         int at[3];
-        place_of(t, &mesh->hexes, e, low, t->h_m, at);
+        place_of(t, &mesh->hexes, e, low, t->edge_m, at);
         (*fill)[cell(n, at[0], at[1], at[2])] = fmaxf(mesh->hexes.fill[e], 1e-6f);
     }
     return PAL_ERR_OK;
@@ -46,7 +46,8 @@ static pal_err lay_fine(const pal_prepared *mesh, const double low[3], const int
                         pal_voxels *out)
 {
     size_t n_cell = 1;
-    *out = (pal_voxels){.h_m = mesh->tets.h_m / split, .n_inside = (int64_t)mesh->hexes.n_hex * split * split * split};
+    *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split,
+                        .n_inside = (int64_t)mesh->hexes.n_hex * split * split * split};
     for (int c = 0; c < 3; c++) {
         out->n[c] = n[c] * split;
         out->low_m[c] = low[c];
@@ -62,7 +63,7 @@ static pal_err lay_fine(const pal_prepared *mesh, const double low[3], const int
     return PAL_ERR_OK;
 }
 
-pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_note *note)
+pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
 {
     double low[3];
     int n[3], n_hex = mesh->hexes.n_hex;
@@ -71,17 +72,17 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_note *note)
     pal_tets tets = {0};
     pal_hexes hexes = {0};
     if (n_hex == 0 || split < 1)
-        return pal_note_set(note, PAL_ERR_REFUSED, "there are no voxels to split by %d", split);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to split by %d", split);
     if ((double)n_hex * split * split * split > MOST)
-        return pal_note_set(note, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex, split,
-                            MOST);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
+                                  split, MOST);
     pal_err err = lay_coarse(mesh, low, n, &fill);
     if (!err) err = lay_fine(mesh, low, n, fill, split, &fine);
     if (!err) err = pal_voxels_split(&fine, &tets);
-    if (!err) err = pal_hexes_find(&tets, &hexes, note);
+    if (!err) err = pal_hexes_find(&tets, &hexes, diag);
     for (int e = 0; e < hexes.n_hex && !err; e++) {
         int at[3];
-        place_of(&tets, &hexes, e, low, fine.h_m, at);
+        place_of(&tets, &hexes, e, low, fine.edge_m, at);
         hexes.fill[e] = fill[cell(n, at[0] / split, at[1] / split, at[2] / split)];
     }
     free(fill);
@@ -89,7 +90,7 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_note *note)
     if (err) {
         pal_tets_free(&tets);
         pal_hexes_free(&hexes);
-        return pal_note_set(note, err, "no memory to split %d voxels by %d", n_hex, split);
+        return pal_diagnostic_set(diag, err, "no memory to split %d voxels by %d", n_hex, split);
     }
     hexes.measured = mesh->hexes.measured;
     pal_tets_free(&mesh->tets);

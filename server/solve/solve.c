@@ -9,7 +9,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/world/world.h"
 #include "server/solve/load_case.h"
 #include "server/solve/smaller_voxels.h"
@@ -38,7 +38,7 @@ typedef struct job {
     const pal_solve_options *options;
     pal_solution *s;
     pal_solve_result *result;
-    pal_note *note;
+    pal_diagnostic *diag;
 } job;
 
 static bool say(const job *j, const char *what, double fraction)
@@ -56,18 +56,19 @@ static pal_err material_of(const job *j, int index, pal_material *out)
     *out = (pal_material){.young_Pa = isnan(o->young_Pa) ? m->young_Pa : o->young_Pa,
                           .poisson = isnan(o->poisson) ? m->poisson : o->poisson,
                           .density_kg_m3 = m->density_kg_m3};
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     double asked = out->poisson;
     if (!(asked > -1 && asked < 0.5))
-        return pal_note_set(j->note, PAL_ERR_REFUSED,
-                            "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5",
-                            m->id, asked);
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
+            "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5", m->id, asked);
     if (!(out->young_Pa > 0))
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "material \"%s\": E %g Pa is not a stiffness: wanted more than 0",
-                            m->id, out->young_Pa);
-    pal_err err = pal_material_check(out, &why);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
+                                  "material \"%s\": E %g Pa is not a stiffness: wanted more than 0", m->id,
+                                  out->young_Pa);
+    pal_err err = pal_material_check(out, &reason);
     j->result->clamped |= out->poisson != asked;
-    return err ? pal_note_set(j->note, err, "material \"%s\": %s", m->id, why.text) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(j->diag, err, "material \"%s\": %s", m->id, reason.text) : PAL_ERR_OK;
 }
 
 /* the first material is the body's own; all others, and the first unless it is everywhere, are regions */
@@ -76,8 +77,8 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     const pal_problem *p = j->problem;
     const double *origin = j->s->mesh.tets.origin_m;
     if (p->n_material > 1 && (!isnan(j->options->young_Pa) || !isnan(j->options->poisson)))
-        return pal_note_set(j->note, PAL_ERR_REFUSED, "E or nu is given, but the problem has %d materials",
-                            p->n_material);
+        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "E or nu is given, but the problem has %d materials",
+                                  p->n_material);
     PAL_TRY(material_of(j, 0, &body->material));
     for (int k = 1; k < p->n_material; k++) {
         pal_material m;
@@ -103,8 +104,8 @@ static pal_err check_covered(const job *j)
         for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
         for (int k = 0; k < p->n_material && !found; k++) found = pal_box_holds(&p->material[k].region, middle, 0);
         if (!found)
-            return pal_note_set(j->note, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
-                                p->n_material, middle[0], middle[1], middle[2]);
+            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
+                                      p->n_material, middle[0], middle[1], middle[2]);
     }
     return PAL_ERR_OK;
 }
@@ -114,34 +115,34 @@ static pal_err set_supports(const job *j, pal_body_def *body)
     const pal_problem *p = j->problem;
     body->n_support = 0;
     if (p->n_support == 0 && !j->options->inertia_relief)
-        return pal_note_set(
-            j->note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
             "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
             "balances them by its mass)");
     body->n_support = p->n_support;
-    return pal_case_supports(p, &j->s->mesh.tets, body->support, j->note);
+    return pal_case_supports(p, &j->s->mesh.tets, body->support, j->diag);
 }
 
 static pal_err set_items(const job *j, pal_body_def *body)
 {
     const pal_solve_options *o = j->options;
-    pal_item_init(&body->model, "model", "fem");
-    PAL_TRY(pal_item_put_text(&body->model, "element", o->element, j->note));
-    PAL_TRY(pal_item_put_text(&body->model, "law", o->law, j->note));
-    PAL_TRY(pal_item_put_bool(&body->model, "fill", o->fill, j->note));
-    pal_item_init(&body->solver, "solver", "static_newton");
-    PAL_TRY(pal_item_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->note));
-    PAL_TRY(pal_item_put_number(&body->solver, "newton", NEWTON_A_STEP, j->note));
-    if (o->linear) PAL_TRY(pal_item_put_text(&body->solver, "linear", o->linear, j->note));
+    pal_entry_init(&body->model, "model", "fem");
+    PAL_TRY(pal_entry_put_text(&body->model, "element", o->element, j->diag));
+    PAL_TRY(pal_entry_put_text(&body->model, "law", o->law, j->diag));
+    PAL_TRY(pal_entry_put_bool(&body->model, "fill", o->fill, j->diag));
+    pal_entry_init(&body->solver, "solver", "static_newton");
+    PAL_TRY(pal_entry_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->diag));
+    PAL_TRY(pal_entry_put_number(&body->solver, "newton", NEWTON_A_STEP, j->diag));
+    if (o->linear) PAL_TRY(pal_entry_put_text(&body->solver, "linear", o->linear, j->diag));
     if (o->inertia_relief && j->problem->n_support == 0)
-        PAL_TRY(pal_item_put_text(&body->solver, "free", "inertia_relief", j->note));
+        PAL_TRY(pal_entry_put_text(&body->solver, "free", "inertia_relief", j->diag));
     return PAL_ERR_OK;
 }
 
 static pal_err make_world(const job *j)
 {
     pal_scene *scene = calloc(1, sizeof *scene);
-    if (!scene) return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the scene");
+    if (!scene) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the scene");
     pal_scene_default(scene);
     pal_body_def *body = &scene->body[0];
     scene->step_s = lab_step_s;
@@ -155,7 +156,7 @@ static pal_err make_world(const job *j)
     if (!err) err = check_covered(j);
     if (!err) err = set_supports(j, body);
     if (!err) err = set_items(j, body);
-    if (!err) err = pal_world_create(scene, j->note, &j->s->world);
+    if (!err) err = pal_world_create(scene, j->diag, &j->s->world);
     free(scene);
     if (err) return err;
     j->s->body = pal_world_body(j->s->world, 0);
@@ -168,13 +169,13 @@ static pal_err set_loads(const job *j)
     pal_solution *s = j->s;
     const pal_body *b = s->body;
     double *f = calloc(3 * (size_t)b->n_node, sizeof *f);
-    if (!f) return pal_note_set(j->note, PAL_ERR_MEMORY, "no memory for the loads");
+    if (!f) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the loads");
     pal_err err =
-        pal_case_forces(j->problem, j->load_case, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->note);
+        pal_case_forces(j->problem, j->load_case, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->diag);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(j->result->load_N, j->result->load_N, f + 3 * i);
         err = pal_world_load(s->world, 0, i, f + 3 * i);
-        if (err) pal_note_set(j->note, err, "loads: node %d takes no load of %g N", i, pal_norm3(f + 3 * i));
+        if (err) pal_diagnostic_set(j->diag, err, "loads: node %d takes no load of %g N", i, pal_norm3(f + 3 * i));
     }
     free(f);
     return err;
@@ -188,7 +189,7 @@ static void move_supports(const job *j, double share)
     pal_body *b = j->s->body;
     for (int i = 0; i < b->n_node; i++) {
         double x[3];
-        if (!b->held[i]) continue;
+        if (!b->fixed[i]) continue;
         pal_add3(x, b->x_rest + 3 * i, j->s->mesh.tets.origin_m);
         for (int k = 0; k < j->problem->n_support; k++)
             if (pal_box_holds(&j->problem->support[k].region, x, pal_case_slack(&j->s->mesh.tets))) {
@@ -196,14 +197,14 @@ static void move_supports(const job *j, double share)
                 pal_axpy3(b->x + 3 * i, share, j->problem->support[k].move_m);
             }
     }
-    pal_world_moved(j->s->world, 0);
+    pal_world_invalidate_limits(j->s->world, 0);
 }
 
 static int count_ramp(const job *j)
 {
     double most = 0;
     for (int k = 0; k < j->problem->n_support; k++) most = fmax(most, pal_norm3(j->problem->support[k].move_m));
-    double n = ceil(most / (0.5 * j->s->body->h_m));
+    double n = ceil(most / (0.5 * j->s->body->edge_m));
     return n > MOST_RAMP ? MOST_RAMP : (int)n;
 }
 
@@ -220,16 +221,17 @@ static pal_err converge(const job *j, double fraction)
         j->result->n_cg += report.n_cg;
         j->result->residual = report.residual;
         if (err || j->s->body->frozen)
-            return pal_note_set(j->note, PAL_ERR_NUMERIC,
-                                "no solution: the body froze after %d iterations at a residual of %g",
-                                j->result->n_newton, report.residual);
+            return pal_diagnostic_set(j->diag, PAL_ERR_NUMERIC,
+                                      "no solution: the body froze after %d iterations at a residual of %g",
+                                      j->result->n_newton, report.residual);
         if (report.converged) return PAL_ERR_OK;
         if (j->result->n_newton >= most || report.n_newton == 0)
-            return pal_note_set(j->note, PAL_ERR_NUMERIC, "no solution after %d iterations: residual %g, step size %g",
-                                j->result->n_newton, report.residual, report.step_size);
+            return pal_diagnostic_set(j->diag, PAL_ERR_NUMERIC,
+                                      "no solution after %d iterations: residual %g, step size %g", j->result->n_newton,
+                                      report.residual, report.step_size);
         snprintf(what, sizeof what, "solve: iteration %d, residual %.2g", j->result->n_newton, report.residual);
         if (!say(j, what, fraction))
-            return pal_note_set(j->note, PAL_ERR_STATE, "stopped after %d iterations", j->result->n_newton);
+            return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped after %d iterations", j->result->n_newton);
     }
 }
 
@@ -261,9 +263,9 @@ static void sum_up(const job *j)
     for (int i = 0; i < b->n_node; i++) {
         double u[3];
         pal_sub3(u, b->x + 3 * i, b->x_rest + 3 * i);
-        r->most_m = fmax(r->most_m, pal_norm3(u));
-        r->work_J += b->outer ? pal_dot3(b->outer + 3 * i, u) : 0;
-        if (b->held[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
+        r->max_m = fmax(r->max_m, pal_norm3(u));
+        r->work_J += b->external_force ? pal_dot3(b->external_force + 3 * i, u) : 0;
+        if (b->fixed[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
     }
     r->energy_J = pal_world_energy_J(j->s->world);
 }
@@ -274,7 +276,7 @@ static void sum_up(const job *j)
 static double volume_of(const pal_solution *s)
 {
     const pal_body *b = s->body;
-    double sum = 0, cube = b->h_m * b->h_m * b->h_m;
+    double sum = 0, cube = b->edge_m * b->edge_m * b->edge_m;
     for (int e = 0; e < b->n_element; e++) {
         const int32_t *node = b->element + (size_t)b->n_corner * (size_t)e;
         double edge[3][3], normal[3];
@@ -289,27 +291,27 @@ static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    pal_voxel_wish wish = {o->resolution, o->fill, o->least_fill, o->align};
-    PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->note));
-    if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->note));
+    pal_voxel_wish wish = {o->resolution, o->fill, o->min_fill, o->align};
+    PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->diag));
+    if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
     s->hex = b->n_corner == 8;
     s->element = o->element;
     j->result->n_node = b->n_node;
     j->result->n_element = b->n_element;
-    j->result->h_m = b->h_m;
+    j->result->edge_m = b->edge_m;
     j->result->volume_m3 = volume_of(s);
-    for (int i = 0; i < b->n_node; i++) j->result->n_held += b->held[i] != 0;
+    for (int i = 0; i < b->n_node; i++) j->result->n_held += b->fixed[i] != 0;
     j->result->n_dof = 3 * (b->n_node - j->result->n_held);
     pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
-    return err ? pal_note_set(j->note, err, "no memory to find points in the mesh") : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(j->diag, err, "no memory to find points in the mesh") : PAL_ERR_OK;
 }
 
 pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
-                  const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_note *note)
+                  const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_diagnostic *diag)
 {
-    pal_note own = {""};
+    pal_diagnostic own = {""};
     double start = pal_clock_s();
     *result = (pal_solve_result){0};
     job j = {.problem = problem,
@@ -317,14 +319,15 @@ pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case,
              .options = options,
              .s = calloc(1, sizeof *j.s),
              .result = result,
-             .note = note ? note : &own};
-    if (!j.s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a solution");
+             .diag = diag ? diag : &own};
+    if (!j.s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a solution");
     say(&j, "prepare", 0);
     pal_err err = prepare(&j, surface);
     if (!err) err = set_loads(&j);
     double ready = pal_clock_s(), early_s = factored(&j);
     result->prepare_s = ready - start - early_s;
-    if (!err && !say(&j, "solve", 0)) err = pal_note_set(note, PAL_ERR_STATE, "stopped before the first iteration");
+    if (!err && !say(&j, "solve", 0))
+        err = pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped before the first iteration");
     if (!err) err = solve(&j);
     if (!err) sum_up(&j);
     double end = pal_clock_s();
@@ -360,18 +363,19 @@ void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
     }
 }
 
-pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_note *note)
+pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_diagnostic *diag)
 {
     const pal_body *b = s->body;
     size_t n = 3 * (size_t)b->n_node;
     pal_samples all = {.n = b->n_node, .x = malloc(n * sizeof(double)), .u = malloc(n * sizeof(double))};
-    pal_err err =
-        all.x && all.u ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    pal_err err = all.x && all.u
+                      ? PAL_ERR_OK
+                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(all.x + 3 * i, b->x_rest + 3 * i, s->mesh.tets.origin_m);
         pal_sub3(all.u + 3 * i, b->x + 3 * i, b->x_rest + 3 * i);
     }
-    if (!err) err = pal_samples_write(&all, path, note);
+    if (!err) err = pal_samples_write(&all, path, diag);
     pal_samples_free(&all);
     return err;
 }
@@ -380,15 +384,15 @@ pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_note *note
 static void measure(const pal_solution *s, double *stress_Pa, double *volume_m3)
 {
     const pal_body *b = s->body;
-    for (int r = 0; r < pal_world_rows(s->world); r++) {
-        const pal_row *row = pal_world_effect(s->world, r);
+    for (int r = 0; r < pal_world_component_count(s->world); r++) {
+        const pal_component *row = pal_world_component(s->world, r);
         if (row->effect->measure) row->effect->measure(row->self, b, PAL_FIELD_VON_MISES_PA, stress_Pa, volume_m3);
     }
     for (int i = 0; i < b->n_node; i++) stress_Pa[i] = volume_m3[i] > 0 ? stress_Pa[i] / volume_m3[i] : 0;
 }
 
 static pal_err write_vtk(const pal_solution *s, const char *path, const double *moved, const double *stress,
-                         pal_note *note)
+                         pal_diagnostic *diag)
 {
     const pal_body *b = s->body;
     const pal_vtk_field field[2] = {{"displacement_m", 3, moved}, {"von_mises_Pa", 1, stress}};
@@ -401,20 +405,20 @@ static pal_err write_vtk(const pal_solution *s, const char *path, const double *
                                .node = b->element,
                                .n_point = 2,
                                .point = field};
-    return pal_mesh_write_vtk(path, &grid, note);
+    return pal_mesh_write_vtk(path, &grid, diag);
 }
 
-pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_note *note)
+pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_diagnostic *diag)
 {
     const pal_body *b = s->body;
     size_t n = (size_t)b->n_node;
     double *stress = calloc(n, sizeof *stress), *volume = calloc(n, sizeof *volume), *moved = calloc(3 * n, 8);
     pal_err err = stress && volume && moved
                       ? PAL_ERR_OK
-                      : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
     if (!err) measure(s, stress, volume);
     for (size_t k = 0; k < 3 * n && !err; k++) moved[k] = b->x[k] - b->x_rest[k];
-    if (!err) err = write_vtk(s, path, moved, stress, note);
+    if (!err) err = write_vtk(s, path, moved, stress, diag);
     free(moved);
     free(stress);
     free(volume);

@@ -1,7 +1,7 @@
 /* Solves a load case: surface -> voxel mesh -> world with model fem and solver static_newton -> displacements. [load]
  */
-#ifndef PAL_LAB_SOLVE_H
-#define PAL_LAB_SOLVE_H
+#ifndef PAL_SOLVE_SOLVE_H
+#define PAL_SOLVE_SOLVE_H
 #include "server/sim/core/problem.h"
 #include "server/solve/sample_points.h"
 
@@ -10,8 +10,8 @@ typedef struct pal_solve_options {
     const char *law;     /* "linear" | "corotational" | "neo_hookean"                     */
     int resolution;      /* voxels on the longest axis                                   */
     bool fill;           /* scale cut voxels by their filled share; false: voxels at least half filled, whole */
-    double least_fill;   /* cut voxels with less inside are dropped; 0: with fill 0.25, or 0.02 where that would lose
-                            2.5 % of the volume; without fill 0.5 */
+    double min_fill;     /* cut voxels with less inside are dropped; 0: with fill 0.25, or 0.02 where that would lose
+                              2.5 % of the volume; without fill 0.5 */
     bool align;          /* shift the voxels so that their faces lie on the border of a support that cuts the body */
     int split;           /* each voxel is solved as split^3 of its fill: the border's error apart; 0: 1          */
     double tolerance;    /* of the residual, relative to the loads; 0: 1e-8               */
@@ -29,14 +29,14 @@ typedef struct pal_solve_result {
     int n_held; /* nodes in supports                                         */
     double residual;
     double prepare_s, assemble_s, factor_s, solve_s, total_s; /* solve_s: Newton without assembling and factoring */
-    double h_m;                        /* voxel edge                                                */
+    double edge_m;                     /* voxel edge                                                */
     double volume_m3;                  /* of the material, by fill                                   */
     double load_N[3];                  /* sum of all loads                                           */
     double area_m2[PAL_PROBLEM_LOADS]; /* that each traction found                      */
     double reaction_N[3];              /* of the supports on the body; zero: free                    */
     double work_J;                     /* f . u                                                      */
     double energy_J;                   /* elastic                                                    */
-    double most_m;                     /* largest displacement of a node                             */
+    double max_m;                      /* largest displacement of a node                             */
     bool clamped;                      /* a Poisson ratio above 0.4999 was taken as 0.4999           */
 } pal_solve_result;
 
@@ -45,12 +45,12 @@ typedef struct pal_solution pal_solution; /* owns mesh and world */
  * surface, a point outside the body, an empty support, no support, a point of no material; MEMORY. The result is filled
  * as far as it got */
 pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
-                  const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_note *note);
+                  const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_diagnostic *diag);
 void pal_solution_free(pal_solution *solution); /* NULL is fine */
 /* displacement of the material point x (frame of the problem), through the shape functions of its element (or of the
  * nearest one, extrapolated) */
 void pal_solution_at(const pal_solution *solution, const double x[3], double u[3]);
 /* legacy VTK (unstructured grid, displacement, von Mises stress) and CSV x,y,z,ux,uy,uz of all nodes; IO, MEMORY */
-pal_err pal_solution_vtk(const pal_solution *solution, const char *path, pal_note *note);
-pal_err pal_solution_csv(const pal_solution *solution, const char *path, pal_note *note);
+pal_err pal_solution_vtk(const pal_solution *solution, const char *path, pal_diagnostic *diag);
+pal_err pal_solution_csv(const pal_solution *solution, const char *path, pal_diagnostic *diag);
 #endif

@@ -24,7 +24,7 @@ const char *pal_study_off_text(const pal_study_file *file, double error_m, char 
     char own[64] = "";
     if (s->reference_m > 0) snprintf(own, sizeof own, ", +- %.2g mm of the reference,", 1e3 * s->reference_m);
     snprintf(out, PAL_STUDY_OFF, "%.3g mm off%s under %s, that move it by up to %.3g mm", 1e3 * error_m, own,
-             file->loads, 1e3 * s->most_m);
+             file->loads, 1e3 * s->max_m);
     return out;
 }
 
@@ -32,7 +32,7 @@ void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, 
 {
     char reference[sizeof study->reference];
     int n = snprintf(out, n_byte, "within %.3g mm, %.2g %% of the largest displacement", 1e3 * error_m,
-                     1e2 * error_m / study->most_m);
+                     1e2 * error_m / study->max_m);
     static const char of[] = ", of ";
     size_t left = n > 0 && (size_t)n + sizeof of < n_byte ? n_byte - (size_t)n - sizeof of : 0;
     snprintf(reference, sizeof reference, "%s", study->reference);
@@ -84,7 +84,7 @@ static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const 
 
 void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out, size_t n_byte)
 {
-    char asked[80], text[PAL_SETTING_TEXT], own[48] = "";
+    char asked[80], text[PAL_CONFIGURATION_TEXT], own[48] = "";
     const pal_study_point *best = NULL;
     int n = 0;
     for (int k = 0; k < study->n_point; k++) {
@@ -97,7 +97,7 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_setti
         snprintf(out, n_byte,
                  "none of the settings is named, since the reference itself is only within %.3g mm where %.3g mm move: "
                  "hold more of the body (palpate prepare --hold 20, with --up as it lies), study it without --quick",
-                 1e3 * study->reference_m, 1e3 * study->most_m);
+                 1e3 * study->reference_m, 1e3 * study->max_m);
         return;
     }
     pal_setting_wish_text(wish, asked);
@@ -107,85 +107,89 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_setti
         snprintf(out, n_byte, "none of the settings was measured, so none is %s", asked);
     else
         snprintf(out, n_byte, "none of the %d settings is %s: the nearest is %s, %.3g mm%s in %.3g ms", n, asked,
-                 pal_setting_text(&best->priced.setting, text), 1e3 * best->priced.error_m, own, best->priced.ms);
+                 pal_configuration_text(&best->priced.setting, text), 1e3 * best->priced.error_m, own, best->priced.ms);
 }
 
 /* ---- a scene and its study ---- */
 
 /* reads and checks; *out NULL and OK: there is none. The sentence is about the study */
-static pal_err find(const char *path, const pal_scene *scene, pal_study_file **out, pal_note *note)
+static pal_err find(const char *path, const pal_scene *scene, pal_study_file **out, pal_diagnostic *diag)
 {
     char shape[PAL_STUDY_SHAPE];
     *out = NULL;
     if (access(path, F_OK)) return PAL_ERR_OK;
-    PAL_TRY(pal_study_file_read(path, out, note));
+    PAL_TRY(pal_study_file_read(path, out, diag));
     pal_study_front(&(*out)->study);
     int body = (*out)->index;
     if (body < scene->n_body && !strcmp(pal_study_shape(&scene->body[body], shape), (*out)->shape)) return PAL_ERR_OK;
     free(*out);
     *out = NULL;
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: is of another body than this scene's, or of other material", path);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is of another body than this scene's, or of other material",
+                              path);
 }
 
 static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_setting_wish *wish,
-                    pal_studied *out, pal_note *note)
+                    pal_studied *out, pal_diagnostic *diag)
 {
-    char asked[80], text[PAL_SETTING_TEXT], none[360], off[PAL_STUDY_OFF];
+    char asked[80], text[PAL_CONFIGURATION_TEXT], none[360], off[PAL_STUDY_OFF];
     const pal_study *study = &out->file->study;
     pal_setting_wish_text(wish, asked);
     out->picked = pal_study_serving(study, "", wish);
     if (out->picked < 0) {
         pal_study_none(study, "", wish, none, sizeof none);
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none, word);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none,
+                                  word);
     }
-    const pal_priced_setting *p = &study->point[out->picked].priced;
-    pal_setting setting = p->setting;
-    pal_note why = {""};
+    const pal_measured_configuration *p = &study->point[out->picked].priced;
+    pal_configuration setting = p->setting;
+    pal_diagnostic reason = {""};
     if (setting.step_s == 0) setting.step_s = study->step_s;
-    pal_err err = pal_setting_make(scene, out->file->index, &setting, &why, &out->set);
-    if (err) return pal_note_set(note, err, "%s: %s: %s", path, pal_setting_text(&p->setting, text), why.text);
+    pal_err err = pal_configuration_make(scene, out->file->index, &setting, &reason, &out->set);
+    if (err)
+        return pal_diagnostic_set(diag, err, "%s: %s: %s", path, pal_configuration_text(&p->setting, text),
+                                  reason.text);
     out->scene = &out->set->scene;
     snprintf(out->said, sizeof out->said, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
-             scene->body[out->file->index].name, pal_setting_text(&p->setting, text),
+             scene->body[out->file->index].name, pal_configuration_text(&p->setting, text),
              pal_study_off_text(out->file, p->error_m, off), p->ms, out->n_setting, path, asked);
     return PAL_ERR_OK;
 }
 
-pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_note *note)
+pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_diagnostic *diag)
 {
     char stem[PAL_STUDY_PATH], path[PAL_STUDY_PATH + 8], machine[PAL_MACHINE_TEXT], asked[80];
     const pal_setting_wish wish = {scene->max_error_m, scene->budget_ms};
     bool wanted = wish.within_m > 0 || wish.budget_ms > 0;
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     *out = (pal_studied){.scene = scene, .picked = -1};
-    PAL_TRY(pal_study_stem(word, NULL, stem, note));
+    PAL_TRY(pal_study_stem(word, NULL, stem, diag));
     snprintf(path, sizeof path, "%s.json", stem);
-    pal_err err = find(path, scene, &out->file, &why);
+    pal_err err = find(path, scene, &out->file, &reason);
     if (!out->file && wanted)
-        return pal_note_set(note, err ? err : PAL_ERR_REFUSED,
-                            "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
-                            pal_setting_wish_text(&wish, asked), err ? "and " : "but there is no ",
-                            err ? why.text : path, word, err ? " --again" : "");
+        return pal_diagnostic_set(diag, err ? err : PAL_ERR_REFUSED,
+                                  "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
+                                  pal_setting_wish_text(&wish, asked), err ? "and " : "but there is no ",
+                                  err ? reason.text : path, word, err ? " --again" : "");
     if (!out->file) {
-        if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", why.text);
+        if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", reason.text);
         return PAL_ERR_OK;
     }
     out->body = out->file->index;
     out->setting = malloc(PAL_STUDY_POINTS * sizeof *out->setting);
-    if (!out->setting) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", path);
+    if (!out->setting) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
     out->n_setting = pal_study_settings(&out->file->study, out->setting);
     if (strcmp(pal_machine_name(machine), out->file->study.machine) != 0)
         snprintf(out->warn, sizeof out->warn, "%.150s: its milliseconds are of %.100s, this is %.100s", path,
                  out->file->study.machine, machine);
     else if (!out->file->whole)
         snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d settings", path,
-                 out->file->study.n_point, out->file->n_all);
-    return wanted ? pick(word, path, scene, &wish, out, note) : PAL_ERR_OK;
+                 out->file->study.n_point, out->file->n_finest);
+    return wanted ? pick(word, path, scene, &wish, out, diag) : PAL_ERR_OK;
 }
 
 void pal_studied_close(pal_studied *studied)
 {
-    pal_set_scene_free(studied->set);
+    pal_configured_scene_free(studied->set);
     free(studied->file);
     free(studied->setting);
     *studied = (pal_studied){0};

@@ -1,7 +1,7 @@
 /* The setting that a scene asks for (accuracy.max_error_mm, budget.step_ms), picked from the study kept beside it.
  * Thread: [load]. */
-#ifndef PAL_COMMANDS_STUDIED_SCENE_H
-#define PAL_COMMANDS_STUDIED_SCENE_H
+#ifndef PAL_STUDY_STUDIED_SCENE_H
+#define PAL_STUDY_STUDIED_SCENE_H
 #include "server/study/study_store.h"
 
 /* what is asked for; 0: not asked */
@@ -25,18 +25,18 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_setti
 
 /* a scene as it runs */
 typedef struct pal_studied {
-    const pal_scene *scene; /* the loaded one, or `set`'s                               */
-    pal_study_file *file;   /* NULL: there is no study beside it, or none of this body */
-    pal_set_scene *set;     /* NULL: it runs as it is written                           */
-    int picked;             /* point of the study; -1: none was asked for               */
-    int body, n_setting;    /* what a session may switch to                             */
-    pal_priced_setting *setting;
+    const pal_scene *scene;    /* the loaded one, or `set`'s                               */
+    pal_study_file *file;      /* NULL: there is no study beside it, or none of this body */
+    pal_configured_scene *set; /* NULL: it runs as it is written                           */
+    int picked;                /* point of the study; -1: none was asked for               */
+    int body, n_setting;       /* what a session may switch to                             */
+    pal_measured_configuration *setting;
     char said[720]; /* which setting was picked and from which study; "": none                           */
     char warn[400]; /* a study that was not looked at, or that another machine made; "": nothing to say */
 } pal_studied;
 /* word: as it was given to the command (scene_arg.h); scene: loaded from it, borrowed until close. REFUSED when a
  * setting is asked for and there is no study, one of another body, or none of its settings serves: one sentence that
- * says what to run; errors of pal_setting_make. *out is closed by pal_studied_close, also after an error */
-pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_note *note);
+ * says what to run; errors of pal_configuration_make. *out is closed by pal_studied_close, also after an error */
+pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_diagnostic *diag);
 void pal_studied_close(pal_studied *studied); /* a zeroed struct is fine */
 #endif

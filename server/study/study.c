@@ -42,7 +42,8 @@ static pal_err take_room(pal_study_job *job, int n_probe)
     job->seconds = job->options->seconds > 0 ? job->options->seconds : usual_s;
     job->n_way = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
     job->way = calloc((size_t)job->n_way, sizeof *job->way), job->own = calloc((size_t)job->n_way, sizeof *job->own);
-    return made && job->way && job->own ? PAL_ERR_OK : pal_note_set(job->note, PAL_ERR_MEMORY, "no memory for a study");
+    return made && job->way && job->own ? PAL_ERR_OK
+                                        : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
 }
 
 /* evenly picked vertices of the shown surface, or the points of the samples */
@@ -50,14 +51,14 @@ static pal_err take_probes(pal_study_job *job)
 {
     const pal_samples *samples = job->options->samples;
     pal_study_world w;
-    pal_setting s = {.size = job->shell ? 0 : COARSE};
-    snprintf(s.model, PAL_NAME, "%s", job->shell ? "adaptive_springs" : "fem");
-    PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
+    pal_configuration s = {.size = job->adaptive ? 0 : COARSE};
+    snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
+    PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
     int n = surface->n_vertex, most = samples ? samples->n : n < PAL_STUDY_PROBES ? n : PAL_STUDY_PROBES;
     double low[3], high[3];
     pal_surface_box(surface, low, high);
-    job->out->size_m = pal_dist3(low, high);
+    job->out->length_scale_m = pal_dist3(low, high);
     pal_err err = take_room(job, most);
     for (int i = 0; i < most && !err; i++) {
         if (samples)
@@ -76,10 +77,10 @@ static const pal_study_point *known(const pal_study *before, const pal_study_wis
 {
     for (int i = 0; before && i < before->n_point; i++) {
         const pal_study_point *p = &before->point[i];
-        bool fitted = p->priced.setting.k_distance_J > 0 || !strncmp(p->why, "calibration:", 12);
-        pal_setting bare = p->priced.setting;
+        bool fitted = p->priced.setting.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
+        pal_configuration bare = p->priced.setting;
         bare.k_distance_J = bare.k_area_J = bare.k_volume_J = 0;
-        if (fitted == wish->calibrate && pal_setting_same(&bare, &wish->setting)) return p;
+        if (fitted == wish->calibrate && pal_configuration_equal(&bare, &wish->setting)) return p;
     }
     return NULL;
 }
@@ -88,10 +89,10 @@ static pal_err sweep(pal_study_job *job, const pal_study_wish *wish, int n)
 {
     const pal_study_options *o = job->options;
     for (int i = 0; i < n; i++) {
-        char name[PAL_SETTING_TEXT];
+        char name[PAL_CONFIGURATION_TEXT];
         const pal_study_point *old = known(o->before, &wish[i]);
-        bool go = !o->progress || o->progress(pal_setting_text(&wish[i].setting, name), (double)i / n, o->user);
-        if (!go) return pal_note_set(job->note, PAL_ERR_STATE, "stopped after %d of %d settings", i, n);
+        bool go = !o->progress || o->progress(pal_configuration_text(&wish[i].setting, name), (double)i / n, o->user);
+        if (!go) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i, n);
         if (old)
             job->out->point[i] = *old;
         else
@@ -99,7 +100,7 @@ static pal_err sweep(pal_study_job *job, const pal_study_wish *wish, int n)
         job->out->n_point = i + 1;
         pal_study_front(job->out);
         if (o->done && !o->done(job->out, n, o->user))
-            return pal_note_set(job->note, PAL_ERR_STATE, "stopped after %d of %d settings", i + 1, n);
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i + 1, n);
     }
     return PAL_ERR_OK;
 }
@@ -109,7 +110,8 @@ static pal_err check_methods(const pal_study_job *job)
     const pal_study_options *o = job->options;
     if (o->n_method == 0) return PAL_ERR_OK;
     pal_err err = PAL_ERR_REFUSED;
-    for (int i = 0; i < o->n_method && err; i++) err = pal_setting_fits(&job->scene->body[0], o->method[i], job->note);
+    for (int i = 0; i < o->n_method && err; i++)
+        err = pal_configuration_check_model(&job->scene->body[0], o->method[i], job->diag);
     return err;
 }
 
@@ -124,7 +126,7 @@ static bool all_known(const pal_study_job *job, const pal_study_wish *wish, int 
 static void take_over(pal_study *to, const pal_study *from)
 {
     memcpy(to->reference, from->reference, sizeof to->reference);
-    to->reference_m = from->reference_m, to->most_m = from->most_m, to->size_m = from->size_m;
+    to->reference_m = from->reference_m, to->max_m = from->max_m, to->length_scale_m = from->length_scale_m;
 }
 
 /* fine elements under the edge of a patch may find no rest where the coarse estimate saw one: then half as strong */
@@ -142,13 +144,14 @@ static pal_err press(pal_study_job *job)
 static pal_err study(pal_study_job *job)
 {
     pal_study_wish *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
-    if (!wish) return pal_note_set(job->note, PAL_ERR_MEMORY, "no memory for a study");
+    if (!wish) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
     int n = err ? 0 : pal_study_list(job, wish);
     /* with nothing left to measure the reference is asked for only where it costs nothing */
     bool whole = !err && !job->options->recall && all_known(job, wish, n);
-    if (!err && n == 0) err = pal_note_set(job->note, PAL_ERR_REFUSED, "no method of those asked for fits the body");
+    if (!err && n == 0)
+        err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
     if (whole) take_over(job->out, before);
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
@@ -169,9 +172,9 @@ static void set_supports(pal_study_job *job)
     pal_body_def *body = &job->scene->body[0];
     const pal_surface *s = &body->mesh->surface;
     for (int k = 0; k < body->n_support; k++) {
-        pal_support box;
-        if (!job->shell && pal_setting_box(job->scene, 0, k, &box)) body->support[k] = box;
-        const pal_support *from = &body->support[k];
+        pal_support_def box;
+        if (!job->adaptive && pal_configuration_support_box(job->scene, 0, k, &box)) body->support[k] = box;
+        const pal_support_def *from = &body->support[k];
         pal_problem_support *to = &job->problem->support[job->problem->n_support];
         pal_add3(to->region.low_m, from->low_m, s->origin_m);
         pal_add3(to->region.high_m, from->high_m, s->origin_m);
@@ -185,21 +188,21 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     const pal_study_options *o = job->options;
     memset(out, 0, sizeof *out);
     if (body < 0 || body >= scene->n_body)
-        return pal_note_set(job->note, PAL_ERR_REFUSED, "body %d: the scene has %d", body, scene->n_body);
+        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body %d: the scene has %d", body, scene->n_body);
     if (!(o->seconds >= 0 && o->seconds <= 60))
-        return pal_note_set(job->note, PAL_ERR_REFUSED, "seconds: %g is outside [0, 60]", o->seconds);
+        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "seconds: %g is outside [0, 60]", o->seconds);
     job->scene = malloc(sizeof *job->scene);
     job->problem = calloc(1, sizeof *job->problem);
-    if (!job->scene || !job->problem) return pal_note_set(job->note, PAL_ERR_MEMORY, "no memory for a study");
+    if (!job->scene || !job->problem) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
     *job->scene = *scene;
     job->scene->n_body = 1;
     if (body != 0) job->scene->body[0] = scene->body[body];
     pal_body_def *def = &job->scene->body[0];
     /* a scene's own grid of constants is no setting */
     def->spring_grid = (pal_spring_grid){.n = {0}};
-    job->shell = !def->cells && def->mesh->tets.n_node < 1;
-    pal_setting now;
-    pal_setting_of(job->scene, 0, &now);
+    job->adaptive = !def->cells && def->mesh->tets.n_node < 1;
+    pal_configuration now;
+    pal_configuration_of(job->scene, 0, &now);
     job->law = pal_study_is(now.law, "neo_hookean") ? "neo_hookean" : "corotational";
     snprintf(out->name, sizeof out->name, "%.*s", PAL_NAME - 1, scene->name);
     pal_machine_name(out->machine);
@@ -207,10 +210,10 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     return check_methods(job);
 }
 
-pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_note *note)
+pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_diagnostic *diag)
 {
-    pal_note own = {{0}};
-    pal_study_job job = {.options = options, .out = out, .note = note ? note : &own};
+    pal_diagnostic own = {{0}};
+    pal_study_job job = {.options = options, .out = out, .diag = diag ? diag : &own};
     pal_err err = begin(&job, scene, options->body);
     if (!err) {
         const pal_material *m = &job.scene->body[0].material;
@@ -232,7 +235,7 @@ pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options
 /* ---- from a problem ---- */
 
 /* the first material is the body's own, all others are regions */
-static pal_err set_materials(const pal_problem *p, const double origin[3], pal_body_def *body, pal_note *note)
+static pal_err set_materials(const pal_problem *p, const double origin[3], pal_body_def *body, pal_diagnostic *diag)
 {
     body->material.young_Pa = p->material[0].young_Pa, body->material.poisson = p->material[0].poisson;
     body->material.density_kg_m3 = p->material[0].density_kg_m3;
@@ -244,26 +247,26 @@ static pal_err set_materials(const pal_problem *p, const double origin[3], pal_b
         pal_sub3(r->low_m, m->region.low_m, origin);
         pal_sub3(r->high_m, m->region.high_m, origin);
     }
-    pal_note why = {{0}};
-    pal_err err = pal_material_check(&body->material, &why);
-    return err ? pal_note_set(note, err, "materials[0]: %s", why.text) : PAL_ERR_OK;
+    pal_diagnostic reason = {{0}};
+    pal_err err = pal_material_check(&body->material, &reason);
+    return err ? pal_diagnostic_set(diag, err, "materials[0]: %s", reason.text) : PAL_ERR_OK;
 }
 
-static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, pal_prepared *out, pal_note *note)
+static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, pal_prepared *out, pal_diagnostic *diag)
 {
     pal_voxel_wish wish = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
-    pal_err err = pal_case_voxels(p, surface, &wish, out, note);
+    pal_err err = pal_case_voxels(p, surface, &wish, out, diag);
     /* thinner than such voxels */
     while (err == PAL_ERR_REFUSED && wish.resolution < FINEST_SCENE) {
         wish.resolution *= 2;
-        err = pal_case_voxels(p, surface, &wish, out, note);
+        err = pal_case_voxels(p, surface, &wish, out, diag);
     }
     return err;
 }
 
-static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_set_scene *set, pal_note *note)
+static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_configured_scene *set, pal_diagnostic *diag)
 {
-    static const char *const effects[] = {"tool_push", "tool_grab", "finite_guard"};
+    static const char *const effects[] = {"tool_push", "tool_grasp", "finite_guard"};
     pal_scene *scene = &set->scene;
     double low[3], high[3];
     pal_surface_box(surface, low, high);
@@ -273,17 +276,17 @@ static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_set_s
     pal_body_default(body, "body", &set->mesh);
     snprintf(scene->name, sizeof scene->name, "problem");
     if (p->name[0]) snprintf(scene->title, sizeof scene->title, "%s", p->name);
-    pal_item_init(&body->model, "bodies[0].model", "fem");
-    pal_item_init(&body->solver, "bodies[0].solver", "implicit_euler");
+    pal_entry_init(&body->model, "bodies[0].model", "fem");
+    pal_entry_init(&body->solver, "bodies[0].solver", "implicit_euler");
     body->n_effect = 3;
     for (int k = 0; k < 3; k++) {
-        char path[PAL_ITEM_TEXT];
+        char path[PAL_ENTRY_TEXT];
         snprintf(path, sizeof path, "bodies[0].effects[%d]", k);
-        pal_item_init(&body->effect[k], path, effects[k]);
+        pal_entry_init(&body->effect[k], path, effects[k]);
     }
-    PAL_TRY(set_materials(p, surface->origin_m, body, note));
+    PAL_TRY(set_materials(p, surface->origin_m, body, diag));
     body->n_support = p->n_support;
-    PAL_TRY(pal_case_supports(p, &set->mesh.tets, body->support, note));
+    PAL_TRY(pal_case_supports(p, &set->mesh.tets, body->support, diag));
     double slack = hair * pal_dist3(low, high);
     for (int k = 0; k < p->n_support; k++)
         for (int c = 0; c < 3; c++) {
@@ -292,39 +295,40 @@ static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_set_s
         }
     pal_tools_default(scene, 3);
     for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
-    return pal_scene_check(scene, note);
+    return pal_scene_check(scene, diag);
 }
 
-pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_note *note,
-                                pal_set_scene **out)
+pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_diagnostic *diag,
+                                pal_configured_scene **out)
 {
     *out = NULL;
     if (problem->n_support == 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "supports: none, so a live body is held by nothing");
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "supports: none, so a live body is held by nothing");
     for (int k = 0; k < problem->n_support; k++)
         if (problem->support[k].moved && pal_norm3(problem->support[k].move_m) > 0)
-            return pal_note_set(note, PAL_ERR_REFUSED, "supports[%d]: moves, a live body's support stands still", k);
-    pal_set_scene *set = calloc(1, sizeof *set);
-    if (!set) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a scene");
-    pal_err err = problem_voxels(problem, surface, &set->mesh, note);
-    if (!err) err = dress(problem, surface, set, note);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "supports[%d]: moves, a live body's support stands still",
+                                      k);
+    pal_configured_scene *set = calloc(1, sizeof *set);
+    if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
+    pal_err err = problem_voxels(problem, surface, &set->mesh, diag);
+    if (!err) err = dress(problem, surface, set, diag);
     if (err)
-        pal_set_scene_free(set);
+        pal_configured_scene_free(set);
     else
         *out = set;
     return err;
 }
 
 pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
-                          const pal_study_options *options, pal_study *out, pal_note *note)
+                          const pal_study_options *options, pal_study *out, pal_diagnostic *diag)
 {
-    pal_note own = {{0}};
-    pal_study_job job = {.options = options, .out = out, .note = note ? note : &own};
-    pal_set_scene *set = NULL;
+    pal_diagnostic own = {{0}};
+    pal_study_job job = {.options = options, .out = out, .diag = diag ? diag : &own};
+    pal_configured_scene *set = NULL;
     memset(out, 0, sizeof *out);
     if (load_case->n_load == 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "load case \"%s\": has no load", load_case->id);
-    PAL_TRY(pal_study_problem_scene(problem, surface, job.note, &set));
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load case \"%s\": has no load", load_case->id);
+    PAL_TRY(pal_study_problem_scene(problem, surface, job.diag, &set));
     pal_err err = begin(&job, &set->scene, options->body);
     if (!err) {
         *job.problem = *problem;
@@ -334,6 +338,6 @@ pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *lo
         err = study(&job);
     }
     free_job(&job);
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     return err;
 }

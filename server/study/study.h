@@ -23,10 +23,10 @@
  * named. Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the
  * reference under all loads but the last (the pull), which judges them unseen; where there is one load only, the
  * point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor picked. */
-#ifndef PAL_LAB_STUDY_H
-#define PAL_LAB_STUDY_H
+#ifndef PAL_STUDY_STUDY_H
+#define PAL_STUDY_STUDY_H
+#include "server/sim/core/configuration.h"
 #include "server/sim/core/problem.h"
-#include "server/sim/core/setting.h"
 #include "server/solve/sample_points.h"
 
 #include <stdint.h>
@@ -34,12 +34,13 @@
 enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_WAY = 512 };
 
 typedef struct pal_study_point {
-    pal_priced_setting priced;  /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
-    pal_err err;                /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
-    char why[PAL_SETTING_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged by" */
-    int n_node, n_substep;      /* of a step at rest; both of a surface that adapts: as they are at the end */
+    pal_measured_configuration priced; /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
+    pal_err err; /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
+    char reason[PAL_CONFIGURATION_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged
+                                            by" */
+    int n_node, n_substep;               /* of a step at rest; both of a surface that adapts: as they are at the end */
     double ms_p95;
-    double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / most_m */
+    double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / max_m */
     double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
     double prepare_s;                   /* mesh and world                                                           */
     double n_element;                   /* finite elements; 0: it has none, or they were not kept */
@@ -51,13 +52,13 @@ typedef struct pal_study_point {
 } pal_study_point;
 
 typedef struct pal_study {
-    char name[PAL_NAME]; /* of scene or problem                                      */
-    char machine[128];   /* processor and cores, as the system names it               */
-    char reference[160]; /* how the reference was made, for people                    */
-    double reference_m;  /* its own estimated error                                   */
-    double most_m;       /* largest displacement of the reference                     */
-    double size_m;       /* box diagonal of the body                                  */
-    double step_s;       /* of the scene, for "real time"                             */
+    char name[PAL_NAME];   /* of scene or problem                                      */
+    char machine[128];     /* processor and cores, as the system names it               */
+    char reference[160];   /* how the reference was made, for people                    */
+    double reference_m;    /* its own estimated error                                   */
+    double max_m;          /* largest displacement of the reference                     */
+    double length_scale_m; /* box diagonal of the body                                  */
+    double step_s;         /* of the scene, for "real time"                             */
     int n_point;
     pal_study_point point[PAL_STUDY_POINTS];
 } pal_study;
@@ -66,7 +67,7 @@ typedef struct pal_study {
 typedef struct pal_study_answer {
     pal_err err; /* OK, or NUMERIC and FROZEN: there is none */
     int n_node;
-    char why[PAL_SETTING_TEXT];
+    char reason[PAL_CONFIGURATION_TEXT];
 } pal_study_answer;
 
 typedef struct pal_study_options {
@@ -85,7 +86,7 @@ typedef struct pal_study_options {
     bool (*recall)(uint64_t key, pal_study_answer *answer, double *value, int n, void *user);
     void (*remember)(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user);
     /* [load] after every point: the study so far, to be kept; may be NULL. False stops with STATE */
-    bool (*done)(const pal_study *study, int n_all, void *user);
+    bool (*done)(const pal_study *study, int n_finest, void *user);
     bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */
     bool (*goes_on)(void *user); /* asked between the steps of whatever runs; may be NULL; false stops with STATE */
     void *user;
@@ -93,16 +94,16 @@ typedef struct pal_study_options {
 
 /* sweeps; out (large: on the heap) is whole up to where it came, also after an error. REFUSED: no such body, no method
  * fits, a load that meets nothing; STATE: stopped; MEMORY */
-pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_note *note);
+pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_diagnostic *diag);
 pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
-                          const pal_study_options *options, pal_study *out, pal_note *note);
+                          const pal_study_options *options, pal_study *out, pal_diagnostic *diag);
 /* the scene that a problem's body would be served as: material, supports, tools; *out owns its mesh
- * (pal_set_scene_free)
+ * (pal_configured_scene_free)
  */
-pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_note *note,
-                                pal_set_scene **out);
+pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_diagnostic *diag,
+                                pal_configured_scene **out);
 
-/* share of most_m that the reference's own error may be before nothing that is measured against it is worth naming */
+/* share of max_m that the reference's own error may be before nothing that is measured against it is worth naming */
 #define PAL_STUDY_TRUST 0.3
 /* is the reference worth its name? [any] */
 bool pal_study_trusted(const pal_study *study);
@@ -116,7 +117,8 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
 /* cost and error foreseen for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a +
  * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
  * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
-bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m);
+bool pal_study_foresee(const pal_study *study, const pal_configuration *setting, int leave_out, double *ms,
+                       double *error_m);
 /* Cost foreseen for a setting that is made and has not run: of n_node nodes, n_element elements and n_substep sub-steps
  * in a step of its own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known
  * for that: what the other points of its model took, leave_out (-1: none) being no part of them, with their knobs,
@@ -125,6 +127,6 @@ bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int l
  * refined is not known before it runs: the share is that of what the other levels refined, sub-steps are those of its
  * finest level. false: fewer than three points of the model, none with such an element, law or solver, or none that
  * adapts */
-bool pal_study_foresee_cost(const pal_study *study, const pal_setting *setting, int n_node, double n_element,
+bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *setting, int n_node, double n_element,
                             int n_substep, double read_ms, int leave_out, double *ms);
 #endif

@@ -21,7 +21,7 @@ static const double ridge = 3e-2, enough = 30, trust = 0.1;
 static const double knobs_per_e = 4, whole_nodes = 1000;
 
 typedef struct seen {
-    const pal_setting *setting;
+    const pal_configuration *setting;
     double n_node, n_element, n_substep, ms; /* of a step of its own */
     double read_ms;
     double f[FEATURES];
@@ -32,7 +32,7 @@ typedef struct cost_law {
     double a, c, w[FEATURES], misfit; /* c: elements a ms of reading */
 } cost_law;
 
-static void features(const pal_setting *s, double n_node, double f[FEATURES])
+static void features(const pal_configuration *s, double n_node, double f[FEATURES])
 {
     static const char *const word[] = {"hex8",        "tet4",   "tet10",      "refined",       "linear",
                                        "neo_hookean", "sdirk2", "central_cg", "implicit_euler"};
@@ -164,12 +164,12 @@ static cost_law best_fit(const seen *p, int n)
 
 /* ---- counts ---- */
 
-static bool adapts(const pal_setting *s)
+static bool adapts(const pal_configuration *s)
 {
     return pal_study_is(s->model, "adaptive_springs") && !pal_study_is(s->element, "refined") && s->size > 1;
 }
 
-static bool counts(const pal_study *study, int i, int leave_out, const pal_setting *s)
+static bool counts(const pal_study *study, int i, int leave_out, const pal_configuration *s)
 {
     const pal_study_point *p = &study->point[i];
     return i != leave_out && !p->err && p->priced.ms > 0 && isfinite(p->priced.ms) && p->n_node > 0 &&
@@ -177,10 +177,10 @@ static bool counts(const pal_study *study, int i, int leave_out, const pal_setti
 }
 
 /* nodes of a body that adapts, wholly refined: as counted of that setting, else four times as many with each level */
-static double refined_nodes(const pal_study *study, int leave_out, const pal_setting *s, double coarse)
+static double refined_nodes(const pal_study *study, int leave_out, const pal_configuration *s, double coarse)
 {
     for (int i = 0; i < study->n_point; i++) {
-        const pal_setting *q = &study->point[i].priced.setting;
+        const pal_configuration *q = &study->point[i].priced.setting;
         if (counts(study, i, leave_out, s) && pal_study_is(q->element, "refined") && q->size == s->size)
             return study->point[i].n_node;
     }
@@ -189,12 +189,12 @@ static double refined_nodes(const pal_study *study, int leave_out, const pal_set
 
 /* sub-steps on its finest level, which one refined face is enough for: counted where it is wholly refined, else twice
  * as many with each level */
-static double finest_substeps(const pal_study *study, int leave_out, const pal_setting *s)
+static double finest_substeps(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     double coarse = NAN;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        const pal_setting *q = &p->priced.setting;
+        const pal_configuration *q = &p->priced.setting;
         if (!counts(study, i, leave_out, s)) continue;
         /* of steps of their own */
         double n = p->n_substep * s->step_s / q->step_s;
@@ -206,7 +206,7 @@ static double finest_substeps(const pal_study *study, int leave_out, const pal_s
 
 /* how many of its nodes will be in use is seen of other levels: the same share of what refining could add; NaN: there
  * are none */
-static double nodes_in_use(const pal_study *study, int leave_out, const pal_setting *s)
+static double nodes_in_use(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     double coarse = NAN, share = 0;
     int n = 0;
@@ -224,16 +224,16 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_sett
 
 /* ---- foreseen ---- */
 
-static double distance(const seen *p, const pal_setting *s, double n_node)
+static double distance(const seen *p, const pal_configuration *s, double n_node)
 {
-    const pal_setting *q = p->setting;
+    const pal_configuration *q = p->setting;
     int knobs = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
                 !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
                 ((q->k_distance_J > 0) != (s->k_distance_J > 0));
     return knobs + knobs_per_e * fabs(log(p->n_node / n_node));
 }
 
-static bool has_words(const seen *p, int n, const pal_setting *s)
+static bool has_words(const seen *p, int n, const pal_configuration *s)
 {
     bool element = false, law = false, solver = false;
     for (int i = 0; i < n; i++) {
@@ -245,15 +245,15 @@ static bool has_words(const seen *p, int n, const pal_setting *s)
 
 /* are the elements of all that count known? Else nodes stand for them: springs, studies kept before they were counted
  */
-static bool are_counted(const pal_study *study, int leave_out, const pal_setting *s)
+static bool are_counted(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     for (int i = 0; i < study->n_point; i++)
         if (counts(study, i, leave_out, s) && !(study->point[i].n_element > 0)) return false;
     return true;
 }
 
-bool pal_study_foresee_cost(const pal_study *study, const pal_setting *s, int n_node, double n_element, int n_substep,
-                            double read_ms, int leave_out, double *ms)
+bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *s, int n_node, double n_element,
+                            int n_substep, double read_ms, int leave_out, double *ms)
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;

@@ -30,16 +30,17 @@ static bool look(void *user, const pal_fit_step *step)
     return pal_study_goes_on(user);
 }
 
-static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_setting *setting, pal_note *note)
+static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_configuration *setting,
+                   pal_diagnostic *diag)
 {
     pal_calibration_info info;
     pal_fit_result result;
-    const pal_fit_options options = {.most_evaluation = MOST_EVALUATIONS, .step = look, .user = job};
+    const pal_fit_options options = {.max_evaluation = MOST_EVALUATIONS, .step = look, .user = job};
     pal_calibration_info_of(calibration, &info);
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
     if (!theta) return PAL_ERR_MEMORY;
     memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
-    pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, note);
+    pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, diag);
     for (int k = 0; k < info.n_kind && !err; k++) {
         if (info.kind[k] == PAL_SPRING_DISTANCE) setting->k_distance_J = exp(theta[k]);
         if (info.kind[k] == PAL_SPRING_AREA) setting->k_area_J = exp(theta[k]);
@@ -49,7 +50,7 @@ static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_s
     return err;
 }
 
-pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
+pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagnostic *diag)
 {
     pal_samples samples[PAL_STUDY_LOADS] = {{0}};
     pal_calibrate_case cases[PAL_STUDY_LOADS];
@@ -66,11 +67,11 @@ pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note)
             .load_case = job->load[k], .samples = &samples[k], .truth_name = "reference", .fit = true};
     }
     if (job->problem->n_support == 0)
-        err = pal_note_set(note, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
     if (!err)
         err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
-                                     &calibration, note);
-    if (!err) err = fit(job, calibration, setting, note);
+                                     &calibration, diag);
+    if (!err) err = fit(job, calibration, setting, diag);
     pal_calibration_destroy(calibration);
     for (int k = 0; k < n_fit; k++) pal_samples_free(&samples[k]);
     return err;

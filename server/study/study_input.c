@@ -27,65 +27,68 @@ static bool is_problem(const char *word)
     return found;
 }
 
-static pal_err no_case(const pal_problem *p, const char *id, pal_note *note)
+static pal_err no_case(const pal_problem *p, const char *id, pal_diagnostic *diag)
 {
     char list[320] = "";
     size_t n = 0;
     for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
         n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
                               k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case: there is no load case or reference \"%.40s\"; known are %s",
-                        p->path, id, list);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                              "%s: --case: there is no load case or reference \"%.40s\"; known are %s", p->path, id,
+                              list);
 }
 
-static pal_err open_problem(const pal_study_question *q, pal_study_input *out, const char **samples, pal_note *note)
+static pal_err open_problem(const pal_study_question *q, pal_study_input *out, const char **samples,
+                            pal_diagnostic *diag)
 {
     pal_surface_report report = {0};
-    if (q->body) return pal_note_set(note, PAL_ERR_REFUSED, "%s: --body: a problem has one body", q->word);
-    PAL_TRY(pal_problem_read(q->word, &out->problem, note));
+    if (q->body) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --body: a problem has one body", q->word);
+    PAL_TRY(pal_problem_read(q->word, &out->problem, diag));
     pal_problem *p = out->problem;
     const pal_problem_reference *named = q->load_case ? pal_problem_reference_find(p, q->load_case) : NULL;
     out->load_case = named          ? pal_problem_case_find(p, named->load_case)
                      : q->load_case ? pal_problem_case_find(p, q->load_case)
                                     : &p->load_case[0];
-    if (!out->load_case) return no_case(p, q->load_case, note);
+    if (!out->load_case) return no_case(p, q->load_case, diag);
     if (named && !*samples) *samples = named->file;
     pal_mesh_file_options file = {.unit_m = p->unit_m, .weld = PAL_MESH_WELD};
-    PAL_TRY(pal_mesh_file_read(p->surface, &file, &out->surface, &report, NULL, NULL, note));
-    pal_note why = {""};
-    pal_err err = pal_study_problem_scene(p, &out->surface, &why, &out->made);
-    if (err) return pal_note_set(note, err, "%s: %s", q->word, why.text);
+    PAL_TRY(pal_mesh_file_read(p->surface, &file, &out->surface, &report, NULL, NULL, diag));
+    pal_diagnostic reason = {""};
+    pal_err err = pal_study_problem_scene(p, &out->surface, &reason, &out->made);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", q->word, reason.text);
     out->scene = &out->made->scene;
     return PAL_ERR_OK;
 }
 
-static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal_note *note)
+static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal_diagnostic *diag)
 {
     if (q->load_case && !q->kept_case)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has", q->word);
-    PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, note));
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has",
+                                  q->word);
+    PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, diag));
     const pal_scene *scene = out->scene = &out->loaded->scene;
     for (out->body = 0; q->body && out->body < scene->n_body; out->body++)
         if (!strcmp(scene->body[out->body].name, q->body)) return PAL_ERR_OK;
     if (!q->body) return PAL_ERR_OK;
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: --body: there is no \"%.40s\", the first is \"%s\"", q->word,
-                        q->body, scene->body[0].name);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --body: there is no \"%.40s\", the first is \"%s\"", q->word,
+                              q->body, scene->body[0].name);
 }
 
-pal_err pal_study_input_open(const pal_study_question *q, pal_study_input *out, pal_note *note)
+pal_err pal_study_input_open(const pal_study_question *q, pal_study_input *out, pal_diagnostic *diag)
 {
     const char *samples = q->samples;
     *out = (pal_study_input){0};
-    PAL_TRY(is_problem(q->word) ? open_problem(q, out, &samples, note) : open_scene(q, out, note));
+    PAL_TRY(is_problem(q->word) ? open_problem(q, out, &samples, diag) : open_scene(q, out, diag));
     if (!samples) return PAL_ERR_OK;
-    PAL_TRY(pal_samples_read(samples, &out->samples, note));
+    PAL_TRY(pal_samples_read(samples, &out->samples, diag));
     out->has_samples = true;
     return PAL_ERR_OK;
 }
 
 void pal_study_input_close(pal_study_input *input)
 {
-    pal_set_scene_free(input->made);
+    pal_configured_scene_free(input->made);
     pal_scene_free(input->loaded);
     free(input->problem);
     pal_surface_free(&input->surface);
@@ -129,8 +132,8 @@ void pal_study_input_describe(const pal_study_input *in, const pal_study_questio
     const pal_scene *scene = in->scene;
     /* whatever the reference depends on beside the body itself */
     uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
-    pal_setting now;
-    pal_setting_of(scene, in->body, &now);
+    pal_configuration now;
+    pal_configuration_of(scene, in->body, &now);
     sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
     char loads[80] = "three presses and a pull";
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);

@@ -1,6 +1,6 @@
 /* What `palpate study` is asked to study: a scene's body, or a load case of a problem. Thread: [load]. */
-#ifndef PAL_COMMANDS_STUDY_INPUT_H
-#define PAL_COMMANDS_STUDY_INPUT_H
+#ifndef PAL_STUDY_STUDY_INPUT_H
+#define PAL_STUDY_STUDY_INPUT_H
 #include "server/scene/scene_file.h"
 #include "server/study/study_store.h"
 
@@ -11,7 +11,7 @@ typedef struct pal_study_input {
     pal_problem *problem;     /* NULL: a scene   */
     const pal_problem_case *load_case;
     pal_surface surface;
-    pal_set_scene *made;
+    pal_configured_scene *made;
     bool has_samples;
     pal_samples samples; /* static reference of the first load */
 } pal_study_input;
@@ -29,7 +29,7 @@ typedef struct pal_study_question {
 
 /* reads it; REFUSED: a case of a scene, a body of a problem, names that are not there, one sentence; errors of the
  * readers. Closed by pal_study_input_close, also after an error */
-pal_err pal_study_input_open(const pal_study_question *question, pal_study_input *out, pal_note *note);
+pal_err pal_study_input_open(const pal_study_question *question, pal_study_input *out, pal_diagnostic *diag);
 void pal_study_input_close(pal_study_input *input);
 #define PAL_STUDY_SECONDS 0.5 /* of the dynamic run, where none are given */
 /* what of pal_study_input_describe's loads can be asked for again: seconds (0: not said), quick, load case ("": none)

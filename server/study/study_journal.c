@@ -18,7 +18,7 @@ typedef struct record_head {
     uint64_t key;
     int32_t err, n_node;
     int64_t n;
-    char why[PAL_SETTING_TEXT];
+    char reason[PAL_CONFIGURATION_TEXT];
 } record_head;
 
 struct pal_study_journal {
@@ -47,7 +47,7 @@ static size_t whole_record(const unsigned char *at, size_t left)
     if (left < size_of(0)) return 0;
     record_head head = head_of(at);
     bool sound = head.n >= 0 && head.n <= MOST_NUMBERS && head.err >= 0 && head.err < PAL_ERR_COUNT &&
-                 head.n_node >= 0 && memchr(head.why, 0, sizeof head.why);
+                 head.n_node >= 0 && memchr(head.reason, 0, sizeof head.reason);
     size_t size = sound ? size_of(head.n) : 0;
     if (size == 0 || size > left) return 0;
     memcpy(&sum, at + size - sizeof sum, sizeof sum);
@@ -81,22 +81,22 @@ static pal_err take(pal_study_journal *j, uint64_t of, size_t *whole)
     return err;
 }
 
-pal_err pal_study_journal_open(const char *path, uint64_t of, bool again, pal_study_journal **out, pal_note *note)
+pal_err pal_study_journal_open(const char *path, uint64_t of, bool again, pal_study_journal **out, pal_diagnostic *diag)
 {
     pal_study_journal *j = calloc(1, sizeof *j);
     size_t whole = 0;
     *out = NULL;
-    if (!j) return pal_note_set(note, PAL_ERR_MEMORY, "%.300s: no memory", path);
+    if (!j) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%.300s: no memory", path);
     snprintf(j->path, sizeof j->path, "%s", path);
     pal_err err = again ? PAL_ERR_OK : take(j, of, &whole);
-    if (err) pal_note_set(note, err, "%.300s: no memory for its records", path);
+    if (err) pal_diagnostic_set(diag, err, "%.300s: no memory for its records", path);
     if (!err) {
         j->file = fopen(path, whole ? "r+b" : "w+b");
         bool fine = j->file &&
                     (whole ? ftruncate(fileno(j->file), (off_t)whole) == 0 && fseek(j->file, (long)whole, SEEK_SET) == 0
                            : fwrite(magic, HEAD - sizeof of, 1, j->file) == 1 &&
                                  fwrite(&of, sizeof of, 1, j->file) == 1 && fflush(j->file) == 0);
-        if (!fine) err = pal_note_set(note, PAL_ERR_IO, "%.300s: %s", path, strerror(errno));
+        if (!fine) err = pal_diagnostic_set(diag, PAL_ERR_IO, "%.300s: %s", path, strerror(errno));
     }
     if (err)
         pal_study_journal_close(j);
@@ -119,7 +119,7 @@ bool pal_study_journal_find(const pal_study_journal *j, uint64_t key, pal_study_
         record_head head = head_of(j->record[k]);
         if (head.key != key || head.n != n) continue;
         *answer = (pal_study_answer){.err = (pal_err)head.err, .n_node = head.n_node};
-        memcpy(answer->why, head.why, sizeof answer->why);
+        memcpy(answer->reason, head.reason, sizeof answer->reason);
         memcpy(value, j->record[k] + sizeof head, (size_t)n * sizeof *value);
         return true;
     }
@@ -132,7 +132,7 @@ pal_err pal_study_journal_add(pal_study_journal *j, uint64_t key, const pal_stud
     record_head head;
     memset(&head, 0, sizeof head);
     head.key = key, head.err = answer->err, head.n_node = answer->n_node, head.n = n;
-    snprintf(head.why, sizeof head.why, "%s", answer->why);
+    snprintf(head.reason, sizeof head.reason, "%s", answer->reason);
     size_t size = size_of(n);
     unsigned char *record = n >= 0 && n <= MOST_NUMBERS ? malloc(size) : NULL;
     if (!record || !j->file) {

@@ -35,7 +35,8 @@ static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
 }
 
 /* what is asked of which setting under which load at which points */
-static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_setting *s, const pal_problem_case *load)
+static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_configuration *s,
+                       const pal_problem_case *load)
 {
     const double number[] = {s->size,       s->step_s,    s->tolerance, s->k_distance_J, s->k_area_J,
                              s->k_volume_J, job->seconds, job->tip,     job->n_probe};
@@ -63,39 +64,39 @@ static void remember(const pal_study_job *job, uint64_t key, const pal_study_ans
 }
 
 /* forwards an answer's error with its sentence */
-static pal_err said(const pal_study_answer *answer, pal_note *note)
+static pal_err said(const pal_study_answer *answer, pal_diagnostic *diag)
 {
-    return answer->err ? pal_note_set(note, answer->err, "%s", answer->why) : PAL_ERR_OK;
+    return answer->err ? pal_diagnostic_set(diag, answer->err, "%s", answer->reason) : PAL_ERR_OK;
 }
 
-pal_err pal_study_kept_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                              int *n_node, pal_note *note)
+pal_err pal_study_kept_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
+                              double *u, int *n_node, pal_diagnostic *diag)
 {
     uint64_t key = sum_of(job, "rest", setting, load);
     pal_study_answer answer = {.n_node = 0};
-    pal_note why = {{0}};
+    pal_diagnostic reason = {{0}};
     int n = 3 * job->n_probe;
     if (!recall(job, key, &answer, u, n)) {
-        answer.err = pal_study_static(job, setting, load, u, &answer.n_node, &why);
-        snprintf(answer.why, sizeof answer.why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+        answer.err = pal_study_static(job, setting, load, u, &answer.n_node, &reason);
+        snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
         if (answer.err) memset(u, 0, sizeof *u * (size_t)n);
         remember(job, key, &answer, u, n);
     }
     *n_node = answer.n_node;
-    return said(&answer, note);
+    return said(&answer, diag);
 }
 
-pal_err pal_study_kept_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], pal_note *note)
+pal_err pal_study_kept_way(pal_study_job *job, const pal_configuration *setting, double (*way)[3], pal_diagnostic *diag)
 {
     uint64_t key = sum_of(job, "way", setting, job->load[0]);
     pal_study_answer answer = {.n_node = 0};
-    pal_note why = {{0}};
+    pal_diagnostic reason = {{0}};
     int n = 3 * job->n_way;
     if (!recall(job, key, &answer, way[0], n)) {
-        answer.err = pal_study_way(job, setting, way, NULL, 0, NULL, NULL, &why);
-        snprintf(answer.why, sizeof answer.why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+        answer.err = pal_study_way(job, setting, way, NULL, 0, NULL, NULL, &reason);
+        snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
         if (answer.err) memset(way, 0, sizeof *way * (size_t)job->n_way);
         remember(job, key, &answer, way[0], n);
     }
-    return said(&answer, note);
+    return said(&answer, diag);
 }

@@ -19,7 +19,7 @@ static const double wide_of = 1.5;
 
 static double pull_of(const pal_study_job *job)
 {
-    return job->shell ? wall_share : pull_share;
+    return job->adaptive ? wall_share : pull_share;
 }
 
 static double diagonal(const pal_surface *s, double low[3])
@@ -37,7 +37,7 @@ static pal_err choose_places(const pal_study_job *job, const pal_study_world *w,
     for (int i = 0; i < job->n_probe; i++) {
         far[i] = INFINITY;
         for (int k = 0; k < w->body->n_dof; k++)
-            if (w->body->held[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
+            if (w->body->fixed[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
     }
     for (int p = 0; p < PRESSES; p++) {
         out[p] = 0;
@@ -110,36 +110,37 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
     job->load[index] = c;
 }
 
-static pal_setting coarse(const pal_study_job *job)
+static pal_configuration coarse(const pal_study_job *job)
 {
     int size = (int)(coarse_share * job->reference);
-    pal_setting s = {.size = job->shell ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
-    snprintf(s.model, PAL_NAME, "%s", job->shell ? "adaptive_springs" : "fem");
-    snprintf(s.law, PAL_NAME, "%s", job->shell ? "" : "linear");
+    pal_configuration s = {.size = job->adaptive ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
+    snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
+    snprintf(s.law, PAL_NAME, "%s", job->adaptive ? "" : "linear");
     return s;
 }
 
 /* so that what it moves most moves by its share: by what the coarse body answers, which is linear in it or nearly so */
-static pal_err scale_load(pal_study_job *job, int index, double size_m)
+static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
 {
-    pal_setting s = coarse(job);
+    pal_configuration s = coarse(job);
     double *total = job->problem->load_case[index].load[0].total_N;
-    const double share[2] = {job->shell ? first_share : press_share, press_share};
+    const double share[2] = {job->adaptive ? first_share : press_share, press_share};
     /* a linear body says all at once; from a guess of what a body of that stiffness bears */
-    double guess = job->scene->body[0].material.young_Pa * first_share * size_m * size_m * (job->shell ? 1e-3 : 1);
+    double guess = job->scene->body[0].material.young_Pa * first_share * length_scale_m * length_scale_m *
+                   (job->adaptive ? 1e-3 : 1);
     pal_scale3(total, guess, total);
-    for (int round = 0; round < (job->shell ? 2 : 1); round++) {
+    for (int round = 0; round < (job->adaptive ? 2 : 1); round++) {
         int n_node;
-        PAL_TRY(pal_study_kept_static(job, &s, job->load[index], job->now, &n_node, job->note));
+        PAL_TRY(pal_study_kept_static(job, &s, job->load[index], job->now, &n_node, job->diag));
         double moved = 0;
         for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
         if (!(moved > 0) || !isfinite(moved))
-            return pal_note_set(job->note, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
-                                pal_norm3(total));
-        double wanted = share[round] * size_m / moved, size_N = pal_norm3(total);
+            return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
+                                      pal_norm3(total));
+        double wanted = share[round] * length_scale_m / moved, size_N = pal_norm3(total);
         /* a hand pulls with what the tool may, and no farther than a body can be said to bear */
         double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
-        if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * size_m / moved);
+        if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * length_scale_m / moved);
         pal_scale3(total, wanted, total);
     }
     return PAL_ERR_OK;
@@ -152,8 +153,9 @@ bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
     bool none = err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
     for (int i = 0; i < job->n_probe && !err; i++) moved = fmax(moved, pal_norm3(job->still[index] + 3 * i));
     if (none) times = 0.5;
-    if (!err && moved > 0) times = press_share * job->out->size_m / moved;
-    if (!err && index == PULL) times = moved > 0 ? fmin(wide_of * pull_of(job) * job->out->size_m / moved, 1) : 1;
+    if (!err && moved > 0) times = press_share * job->out->length_scale_m / moved;
+    if (!err && index == PULL)
+        times = moved > 0 ? fmin(wide_of * pull_of(job) * job->out->length_scale_m / moved, 1) : 1;
     if (!none && times <= wide_of && times >= (index == PULL ? 1 : 1 / wide_of)) return false;
     job->round[index]++;
     pal_scale3(total, times, total);
@@ -163,25 +165,25 @@ bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
 pal_err pal_study_presses(pal_study_job *job)
 {
     pal_study_world w;
-    pal_setting s = coarse(job);
+    pal_configuration s = coarse(job);
     int place[PRESSES], n_held = 0;
     double low[3];
-    PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
-    for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->held[i] != 0;
+    PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
+    for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->fixed[i] != 0;
     pal_err err = PAL_ERR_OK;
-    if (n_held == 0 && !job->shell)
-        err = pal_note_set(job->note, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
-                           job->scene->body[0].name);
+    if (n_held == 0 && !job->adaptive)
+        err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
+                                 job->scene->body[0].name);
     if (!err) err = choose_places(job, &w, place);
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
-    double size_m = diagonal(surface, low);
+    double length_scale_m = diagonal(surface, low);
     for (int k = 0; k < PRESSES && !err; k++)
-        place_load(job, k, surface, job->probe + 3 * place[k], patch_share * size_m);
+        place_load(job, k, surface, job->probe + 3 * place[k], patch_share * length_scale_m);
     /* where it moves most: at the place that is farthest from what holds it */
-    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * size_m);
+    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * length_scale_m);
     pal_study_close(&w);
     job->n_load = job->n_press = job->problem->n_case = PULL + 1;
-    for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, size_m);
+    for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, length_scale_m);
     return err;
 }
 

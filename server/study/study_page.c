@@ -8,12 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_SETTING_TEXT };
+enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_CONFIGURATION_TEXT };
 
-const char *pal_study_method(const pal_setting *setting, char out[PAL_SETTING_TEXT])
+const char *pal_study_method(const pal_configuration *setting, char out[PAL_CONFIGURATION_TEXT])
 {
     bool calibrated = setting->k_distance_J > 0;
-    snprintf(out, PAL_SETTING_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
+    snprintf(out, PAL_CONFIGURATION_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
              calibrated ? " calibrated" : "");
     return out;
 }
@@ -53,10 +53,10 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 {
     const pal_study *s = &file->study;
     int order[PAL_STUDY_POINTS], n_bad = 0;
-    char text[PAL_SETTING_TEXT];
+    char text[PAL_CONFIGURATION_TEXT];
     fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
     fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
-            1e3 * s->most_m);
+            1e3 * s->max_m);
     if (!pal_study_trusted(s))
         fprintf(to,
                 "So much that no setting is named: hold more of the body (palpate prepare --hold 20, with --up as "
@@ -81,11 +81,11 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
         print_cell(to, 9, "%.4f", 1e3 * p->static_rms_m);
         print_cell(to, 9, "%.4f", 1e3 * p->static_most_m);
-        print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->most_m);
-        print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->most_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->max_m);
+        print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->max_m);
         print_cell(to, 9, "%.4f", 1e3 * p->way_most_m);
-        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_setting_text(&p->priced.setting, text),
-                p->why[0] ? "; " : "", p->why);
+        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_configuration_text(&p->priced.setting, text),
+                p->reason[0] ? "; " : "", p->reason);
     }
     fprintf(to,
             "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that. "
@@ -96,8 +96,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     for (int k = 0; k < s->n_point && n_bad > 0; k++) {
         const pal_study_point *p = &s->point[order[k]];
         if (!is_measured(p))
-            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_setting_text(&p->priced.setting, text),
-                    p->why[0] ? p->why : pal_err_text(p->err));
+            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->priced.setting, text),
+                    p->reason[0] ? p->reason : pal_err_text(p->err));
     }
 }
 
@@ -106,7 +106,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 /* the knobs of a point on the front, as short as its mark allows */
 static void knobs_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
-    const pal_setting *s = &p->priced.setting;
+    const pal_configuration *s = &p->priced.setting;
     bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
     int n = s->size > 0 ? snprintf(out, n_byte, "%d %s", s->size,
                                    voxels         ? "voxels"
@@ -140,7 +140,7 @@ static double usual_tolerance(const pal_study *study)
 
 /* what a drawing of a study borrows */
 typedef struct series {
-    char name[METHODS][PAL_SETTING_TEXT];
+    char name[METHODS][PAL_CONFIGURATION_TEXT];
     int n_method, n[METHODS], n_front;
     bool apart[METHODS]; /* not for the front, as their `why` says */
     double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
@@ -156,9 +156,9 @@ typedef struct series {
 
 static void add_point(series *s, const pal_study *study, const pal_study_point *p)
 {
-    char name[PAL_SETTING_TEXT];
+    char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
-    bool apart = p->why[0] != 0;
+    bool apart = p->reason[0] != 0;
     pal_study_method(&p->priced.setting, name);
     while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
@@ -166,9 +166,9 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
         s->apart[k] = apart;
         memcpy(s->name[s->n_method++], name, sizeof name);
     }
-    char *tip = s->tip_text[s->n_tip++], text[PAL_SETTING_TEXT];
-    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_setting_text(&p->priced.setting, text), p->priced.ms,
-             1e3 * p->priced.error_m, apart ? "; " : "", p->why);
+    char *tip = s->tip_text[s->n_tip++], text[PAL_CONFIGURATION_TEXT];
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->priced.setting, text), p->priced.ms,
+             1e3 * p->priced.error_m, apart ? "; " : "", p->reason);
     s->tip[k][s->n[k]] = tip;
     s->x[k][s->n[k]] = p->priced.ms;
     s->y[k][s->n[k]++] = 1e3 * p->priced.error_m;
@@ -181,12 +181,12 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     s->n_label++;
 }
 
-pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_note *note)
+pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_diagnostic *diag)
 {
     const pal_study *study = &file->study;
     int order[PAL_STUDY_POINTS];
     series *s = calloc(1, sizeof *s);
-    if (!s) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a drawing");
+    if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
     pal_study_order(study, order);
     s->usual = usual_tolerance(study);
     for (int k = 0; k < study->n_point; k++)
@@ -223,7 +223,7 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
     }
     if (any_apart)
         plot.y_label = "largest error, mm (hollow: fitted to this load or failed a torture, so not on the front)";
-    pal_err err = pal_plot_text(&plot, svg, n_byte, note);
+    pal_err err = pal_plot_text(&plot, svg, n_byte, diag);
     free(s);
     return err;
 }
@@ -299,7 +299,7 @@ static void put_order(FILE *to, const pal_study_file *file, int row)
 static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p, int row)
 {
     const pal_study *s = &file->study;
-    char text[PAL_SETTING_TEXT];
+    char text[PAL_CONFIGURATION_TEXT];
     bool measured = is_measured(p);
     fprintf(to, "<tr%s><td>%s</td><td class=\"n\">",
             p->priced.front ? " class=\"front\""
@@ -307,11 +307,11 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
                             : " class=\"bad\"",
             p->priced.front ? "&#9733;" : "");
     fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
-    put_text(to, pal_setting_text(&p->priced.setting, text));
+    put_text(to, pal_configuration_text(&p->priced.setting, text));
     if (p->priced.front) put_order(to, file, row);
-    if (!measured || p->why[0]) {
+    if (!measured || p->reason[0]) {
         fputs("<br>", to);
-        put_text(to, p->why[0] ? p->why : pal_err_text(p->err));
+        put_text(to, p->reason[0] ? p->reason : pal_err_text(p->err));
     }
     fputs("</td>", to);
     put_number(to, "%.3f", p->priced.ms);
@@ -320,8 +320,8 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
     put_number(to, "%.4f", 1e3 * p->priced.error_m);
     put_number(to, "%.4f", 1e3 * p->static_rms_m);
     put_number(to, "%.4f", 1e3 * p->static_most_m);
-    put_number(to, "%.2f", 1e2 * p->static_rms_m / s->most_m);
-    put_number(to, "%.2f", 1e2 * p->static_most_m / s->most_m);
+    put_number(to, "%.2f", 1e2 * p->static_rms_m / s->max_m);
+    put_number(to, "%.2f", 1e2 * p->static_most_m / s->max_m);
     put_number(to, "%.4f", 1e3 * p->way_rms_m);
     put_number(to, "%.4f", 1e3 * p->way_most_m);
     fprintf(to, "<td class=\"n\">%d</td><td class=\"n\">%d</td>", p->n_node, p->n_substep);
@@ -380,11 +380,11 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     put_fact(to, "machine", s->machine);
     put_fact(to, "reference", s->reference);
     snprintf(text, sizeof text, "%.3g mm; the most that moves %.4g mm, the body %.4g mm across", 1e3 * s->reference_m,
-             1e3 * s->most_m, 1e3 * s->size_m);
+             1e3 * s->max_m, 1e3 * s->length_scale_m);
     put_fact(to, "its own error", text);
     if (is_quick(file)) put_fact(to, "quick", "a coarse reference: errors below its own are of chance");
     put_fact(to, "loads", file->loads);
-    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_all, file->whole ? "" : ", broken off");
+    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_finest, file->whole ? "" : ", broken off");
     put_fact(to, "settings", text);
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
@@ -409,33 +409,33 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     fputs("</body></html>\n", to);
 }
 
-static pal_err write_page(const pal_study_file *file, const char *svg, const char *path, pal_note *note)
+static pal_err write_page(const pal_study_file *file, const char *svg, const char *path, pal_diagnostic *diag)
 {
     char *bytes = NULL;
     size_t n_byte = 0;
     FILE *to = open_memstream(&bytes, &n_byte);
-    if (!to) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    if (!to) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a page", path);
     put_page(to, file, svg);
     bool whole = !ferror(to);
     whole = fclose(to) == 0 && whole;
-    pal_err err = whole ? pal_file_write(path, bytes, n_byte, note)
-                        : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a page", path);
+    pal_err err = whole ? pal_file_write(path, bytes, n_byte, diag)
+                        : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a page", path);
     free(bytes);
     return err;
 }
 
-pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_note *note)
+pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_diagnostic *diag)
 {
     char path[PAL_STUDY_PATH + 8], *svg = NULL;
     size_t n_byte = 0;
     snprintf(path, sizeof path, "%s.csv", stem);
-    PAL_TRY(pal_study_file_csv(file, path, note));
-    pal_err err = pal_study_draw(file, &svg, &n_byte, note);
+    PAL_TRY(pal_study_file_csv(file, path, diag));
+    pal_err err = pal_study_draw(file, &svg, &n_byte, diag);
     if (err && err != PAL_ERR_REFUSED) return err;
     snprintf(path, sizeof path, "%s.svg", stem);
-    err = svg ? pal_file_write(path, svg, n_byte, note) : PAL_ERR_OK;
+    err = svg ? pal_file_write(path, svg, n_byte, diag) : PAL_ERR_OK;
     snprintf(path, sizeof path, "%s.html", stem);
-    if (!err) err = write_page(file, svg, path, note);
+    if (!err) err = write_page(file, svg, path, diag);
     free(svg);
     return err;
 }

@@ -1,6 +1,6 @@
 /* The parts of a study (study.h): what its files share. [load] */
-#ifndef PAL_LAB_STUDY_PARTS_H
-#define PAL_LAB_STUDY_PARTS_H
+#ifndef PAL_STUDY_STUDY_PARTS_H
+#define PAL_STUDY_STUDY_PARTS_H
 #include "server/mesh/volume/locate.h"
 #include "server/sim/world/world.h"
 #include "server/study/study.h"
@@ -9,13 +9,13 @@ enum { PAL_STUDY_PROBES = 1000 };
 
 /* a setting that shall be measured */
 typedef struct pal_study_wish {
-    pal_setting setting;
+    pal_configuration setting;
     bool calibrate; /* its springs' constants are fitted first */
 } pal_study_wish;
 
 /* a body in a setting, as a world of its own */
 typedef struct pal_study_world {
-    pal_set_scene *set;
+    pal_configured_scene *set;
     pal_world *world;
     pal_body *body;
     pal_locate *locate;         /* elements around points; NULL: through `surface`           */
@@ -27,10 +27,10 @@ typedef struct pal_study_world {
 /* the rest of the setting that was looked at last: many settings have the same */
 typedef struct pal_study_rest {
     bool known;
-    pal_setting of;
+    pal_configuration of;
     pal_err err;
-    char why[PAL_SETTING_TEXT];
-    double rms_m, most_m;
+    char reason[PAL_CONFIGURATION_TEXT];
+    double rms_m, max_m;
 } pal_study_rest;
 
 typedef struct pal_study_job {
@@ -41,9 +41,9 @@ typedef struct pal_study_job {
     int round[PAL_STUDY_LOADS]; /* how often their strength was chosen anew              */
     const pal_study_options *options;
     const char *law; /* of the reference */
-    bool shell;      /* adaptive_springs: points and loads are those of the coarse surface */
+    bool adaptive;   /* adaptive_springs: points and loads are those of the coarse surface */
     pal_study *out;
-    pal_note *note;
+    pal_diagnostic *diag;
     int n_probe;
     double *probe;                  /* body frame, m [n_probe][3]                       */
     double *still[PAL_STUDY_LOADS]; /* displacement of the reference at rest [n_probe][3] */
@@ -76,28 +76,29 @@ int pal_study_size(const pal_study_job *job, int compact);
 int pal_study_sizes(const pal_study_job *job, int out[16]);
 
 /* study_world.c. still: for statics, without tools, guards and damping. Frees on error */
-pal_err pal_study_open(const pal_study_job *job, const pal_setting *setting, bool still, pal_study_world *out,
-                       pal_note *note);
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool still, pal_study_world *out,
+                       pal_diagnostic *diag);
 void pal_study_close(pal_study_world *world);
 /* forces of a load on the nodes [n_node][3], of pal_study_world's body */
 pal_err pal_study_forces(const pal_study_job *job, const pal_study_world *world, const pal_problem_case *load,
-                         double *force_N, pal_note *note);
+                         double *force_N, pal_diagnostic *diag);
 /* the same put on the world as lasting loads, times share */
 pal_err pal_study_put(const pal_study_job *job, const pal_study_world *world, const pal_problem_case *load,
-                      double share, pal_note *note);
+                      double share, pal_diagnostic *diag);
 /* displacement of the points x (body frame, at rest) [n][3] */
-pal_err pal_study_moved(const pal_study_world *world, const double *x, int n, double *u, pal_note *note);
+pal_err pal_study_moved(const pal_study_world *world, const double *x, int n, double *u, pal_diagnostic *diag);
 
 /* study_rest.c: displacement of the probes [n_probe][3] where the body comes to rest under a load. NUMERIC: it does not
  */
-pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                         int *n_node, pal_note *note);
+pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
+                         int *n_node, pal_diagnostic *diag);
 
 /* study_keep.c: the same, and the way of the tip, as parts of the reference: taken from what was kept where it is there
  */
-pal_err pal_study_kept_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                              int *n_node, pal_note *note);
-pal_err pal_study_kept_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], pal_note *note);
+pal_err pal_study_kept_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
+                              double *u, int *n_node, pal_diagnostic *diag);
+pal_err pal_study_kept_way(pal_study_job *job, const pal_configuration *setting, double (*way)[3],
+                           pal_diagnostic *diag);
 
 /* study_loads.c: three presses and a pull, for a scene that has no load cases */
 pal_err pal_study_presses(pal_study_job *job);
@@ -108,7 +109,7 @@ bool pal_study_press_again(pal_study_job *job, int index, pal_err err);
 /* study.c: false: the user wants it ended, now */
 bool pal_study_goes_on(const pal_study_job *job);
 /* the constants of springs fitted to the reference's rest, into the setting */
-pal_err pal_study_fit(pal_study_job *job, pal_setting *setting, pal_note *note);
+pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagnostic *diag);
 
 /* study_reference.c; the size first, as what is swept depends on it */
 pal_err pal_study_reference_size(pal_study_job *job);
@@ -117,8 +118,8 @@ pal_err pal_study_reference(pal_study_job *job);
 /* study_run.c: one point, whose setting and errors are set; STATE alone is an error */
 pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_study_point *out);
 /* the way of the tip under the first load, every PAL_STUDY_FRAME_S; times of the steps in ms [most] unless NULL */
-pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
-                      pal_study_point *facts, pal_note *note);
+pal_err pal_study_way(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms, int most,
+                      int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
 
 /* study_run.c: milliseconds of every setting once more, at other moments of the machine: the least median counts;
  * STATE: stopped */

@@ -13,7 +13,7 @@
 
 enum { ALONG = 3, FEATURES = 24, GOLDEN = 44 };
 /* weight of "no effect" for each knob, so that one that was never turned has none */
-static const double ridge = 1e-4, least_m = 1e-12;
+static const double ridge = 1e-4, min_m = 1e-12;
 /* a power law is followed closely */
 static const double close_off = 0.05;
 
@@ -26,16 +26,16 @@ static bool measured(const pal_study_point *p)
 /* what was fitted to the one load that judges it says nothing of any other */
 static bool judged(const pal_study_point *p)
 {
-    return measured(p) && !p->why[0];
+    return measured(p) && !p->reason[0];
 }
 
 bool pal_study_trusted(const pal_study *study)
 {
-    return !(study->most_m > 0 && study->reference_m > PAL_STUDY_TRUST * study->most_m);
+    return !(study->max_m > 0 && study->reference_m > PAL_STUDY_TRUST * study->max_m);
 }
 
 /* nearer than the reference is to the truth says nothing */
-static double far_of(const pal_study *study, const pal_priced_setting *p)
+static double far_of(const pal_study *study, const pal_measured_configuration *p)
 {
     return study->reference_m > p->error_m ? study->reference_m : p->error_m;
 }
@@ -43,10 +43,10 @@ static double far_of(const pal_study *study, const pal_priced_setting *p)
 void pal_study_front(pal_study *study)
 {
     for (int i = 0; i < study->n_point; i++) {
-        pal_priced_setting *p = &study->point[i].priced;
+        pal_measured_configuration *p = &study->point[i].priced;
         p->front = pal_study_trusted(study) && judged(&study->point[i]);
         for (int k = 0; k < study->n_point && p->front; k++) {
-            const pal_priced_setting *q = &study->point[k].priced;
+            const pal_measured_configuration *q = &study->point[k].priced;
             if (!judged(&study->point[k]) || k == i) continue;
             double far = far_of(study, p), other = far_of(study, q);
             bool no_worse = q->ms <= p->ms && other <= far, better = q->ms < p->ms || other < far;
@@ -61,12 +61,12 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
     if (!pal_study_trusted(study)) return -1;
     double own = study->reference_m > 0 ? study->reference_m : 0;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_priced_setting *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].priced;
         if (!judged(&study->point[i])) continue;
         if (!isnan(within_m) && !(p->error_m + own <= within_m)) continue;
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
-            const pal_priced_setting *b = &study->point[best].priced;
+            const pal_measured_configuration *b = &study->point[best].priced;
             double far = far_of(study, p), least = far_of(study, b);
             bool cheaper = p->ms < b->ms || (p->ms == b->ms && p->error_m < b->error_m);
             bool nearer = far < least || (far == least && p->ms < b->ms);
@@ -79,20 +79,20 @@ int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
 
 /* ---- along the sizes ---- */
 
-static double edges(const pal_setting *s)
+static double edges(const pal_configuration *s)
 {
     if (pal_study_is(s->model, "subdivision_fem")) return exp2(s->size > 0 ? s->size : 0);
     if (pal_study_is(s->model, "adaptive_springs")) return exp2(s->size);
     return s->size;
 }
 
-static bool same_but_size(const pal_setting *a, const pal_setting *b)
+static bool same_but_size(const pal_configuration *a, const pal_configuration *b)
 {
-    pal_setting p = *a, q = *b;
+    pal_configuration p = *a, q = *b;
     if ((p.k_distance_J > 0) != (q.k_distance_J > 0)) return false;
     p.size = q.size = 1;
     p.k_distance_J = p.k_area_J = p.k_volume_J = q.k_distance_J = q.k_area_J = q.k_volume_J = 0;
-    return pal_setting_same(&p, &q);
+    return pal_configuration_equal(&p, &q);
 }
 
 /* y = a + slope x by least squares */
@@ -205,7 +205,7 @@ static along law_along(const double *x, const double *y, int n, double at, bool 
     return out;
 }
 
-static void look_along(const pal_study *study, const pal_setting *s, int leave_out, along out[2])
+static void look_along(const pal_study *study, const pal_configuration *s, int leave_out, along out[2])
 {
     double x[PAL_STUDY_POINTS], y[2][PAL_STUDY_POINTS], at = log(edges(s));
     int n = 0;
@@ -214,7 +214,7 @@ static void look_along(const pal_study *study, const pal_setting *s, int leave_o
         if (i == leave_out || !measured(p) || !same_but_size(&p->priced.setting, s)) continue;
         x[n] = log(edges(&p->priced.setting));
         y[0][n] = log(p->priced.ms);
-        y[1][n++] = log(fmax(p->priced.error_m, least_m));
+        y[1][n++] = log(fmax(p->priced.error_m, min_m));
     }
     for (int v = 0; v < 2; v++) out[v] = law_along(x, y[v], n, at, v == 0);
 }
@@ -226,7 +226,7 @@ static void add(double *f, const char *const *words, int n, int from, const char
     for (int i = 0; i < n; i++) f[from + i] = pal_study_is(words[i], word);
 }
 
-static void features(const pal_setting *s, double f[FEATURES])
+static void features(const pal_configuration *s, double f[FEATURES])
 {
     static const char *const element[] = {"hex8", "tet4", "tet10", "refined"};
     static const char *const law[] = {"linear", "neo_hookean"};
@@ -261,11 +261,11 @@ static void solve_knobs(double A[FEATURES][FEATURES + 2], double w[2][FEATURES])
 }
 
 /* knobs of which the others say nothing: a word that none of them has, a step or tolerance that none of them is near */
-static bool is_strange(const pal_study *study, const pal_setting *s, int leave_out)
+static bool is_strange(const pal_study *study, const pal_configuration *s, int leave_out)
 {
     bool element = false, law = false, solver = false, fitted = false, step = false, tolerance = false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_setting *q = &study->point[i].priced.setting;
+        const pal_configuration *q = &study->point[i].priced.setting;
         if (i == leave_out || !measured(&study->point[i]) || !pal_study_is(q->model, s->model)) continue;
         element |= pal_study_is(q->element, s->element), law |= pal_study_is(q->law, s->law);
         solver |= pal_study_is(q->solver, s->solver), fitted |= (q->k_distance_J > 0) == (s->k_distance_J > 0);
@@ -283,30 +283,30 @@ static double sum_of(const double w[FEATURES], const double f[FEATURES])
 }
 
 /* knobs that stand otherwise */
-static int differences(const pal_setting *a, const pal_setting *b)
+static int differences(const pal_configuration *a, const pal_configuration *b)
 {
     return !pal_study_is(a->element, b->element) + !pal_study_is(a->law, b->law) + !pal_study_is(a->solver, b->solver) +
            (a->step_s != b->step_s) + (a->tolerance != b->tolerance) + ((a->k_distance_J > 0) != (b->k_distance_J > 0));
 }
 
-static bool is_mate(const pal_study *study, int i, const pal_setting *s, int leave_out)
+static bool is_mate(const pal_study *study, int i, const pal_configuration *s, int leave_out)
 {
     const pal_study_point *p = &study->point[i];
     return i != leave_out && measured(p) && pal_study_is(p->priced.setting.model, s->model);
 }
 
 /* logarithms of ms and error; *mates: other settings of the same size there are */
-static bool look_at_knobs(const pal_study *study, const pal_setting *s, int leave_out, double out[2], int *mates)
+static bool look_at_knobs(const pal_study *study, const pal_configuration *s, int leave_out, double out[2], int *mates)
 {
     double A[FEATURES][FEATURES + 2] = {{0}}, w[2][FEATURES], f[FEATURES], g[FEATURES], off[2] = {0, 0}, weight = 0;
     int n = 0;
     *mates = 0;
     if (is_strange(study, s, leave_out)) return false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_priced_setting *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].priced;
         if (!is_mate(study, i, s, leave_out)) continue;
         features(&p->setting, f);
-        double y[2] = {log(p->ms), log(fmax(p->error_m, least_m))};
+        double y[2] = {log(p->ms), log(fmax(p->error_m, min_m))};
         for (int r = 0; r < FEATURES; r++) {
             for (int c = 0; c < FEATURES; c++) A[r][c] += f[r] * f[c];
             for (int v = 0; v < 2; v++) A[r][FEATURES + v] += f[r] * y[v];
@@ -317,12 +317,12 @@ static bool look_at_knobs(const pal_study *study, const pal_setting *s, int leav
     solve_knobs(A, w);
     features(s, f);
     for (int i = 0; i < study->n_point; i++) {
-        const pal_priced_setting *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].priced;
         if (!is_mate(study, i, s, leave_out) || p->setting.size != s->size) continue;
         double near = exp2(-2 * differences(&p->setting, s));
         features(&p->setting, g);
         off[0] += near * (log(p->ms) - sum_of(w[0], g));
-        off[1] += near * (log(fmax(p->error_m, least_m)) - sum_of(w[1], g));
+        off[1] += near * (log(fmax(p->error_m, min_m)) - sum_of(w[1], g));
         weight += near;
         (*mates)++;
     }
@@ -330,7 +330,8 @@ static bool look_at_knobs(const pal_study *study, const pal_setting *s, int leav
     return true;
 }
 
-bool pal_study_foresee(const pal_study *study, const pal_setting *setting, int leave_out, double *ms, double *error_m)
+bool pal_study_foresee(const pal_study *study, const pal_configuration *setting, int leave_out, double *ms,
+                       double *error_m)
 {
     along line_of[2];
     double knobs[2], *out[2] = {ms, error_m};

@@ -16,17 +16,17 @@ static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_sh
 /* a quick reference that is farther off than this share of what moves is made finer, by so much */
 static const double quick_enough = 0.15, finer = 1.42;
 
-static pal_setting reference_setting(const pal_study_job *job, int size)
+static pal_configuration reference_setting(const pal_study_job *job, int size)
 {
     bool quick = job->options->quick;
-    pal_setting s = {.size = size};
+    pal_configuration s = {.size = size};
     s.step_s = fmin(quick ? quick_step_s : whole_step_s, job->scene->step_s * (quick ? quick_share : whole_share));
-    bool shell = job->shell;
-    snprintf(s.model, PAL_NAME, "%s", shell ? "adaptive_springs" : "fem");
-    snprintf(s.element, PAL_NAME, "%s", shell ? "refined" : "hex8_bbar");
-    snprintf(s.law, PAL_NAME, "%s", shell ? "" : job->law);
-    snprintf(s.solver, PAL_NAME, "%s", shell ? "rk4" : "sdirk2");
-    s.tolerance = shell ? 0 : reference_tolerance;
+    bool adaptive = job->adaptive;
+    snprintf(s.model, PAL_NAME, "%s", adaptive ? "adaptive_springs" : "fem");
+    snprintf(s.element, PAL_NAME, "%s", adaptive ? "refined" : "hex8_bbar");
+    snprintf(s.law, PAL_NAME, "%s", adaptive ? "" : job->law);
+    snprintf(s.solver, PAL_NAME, "%s", adaptive ? "rk4" : "sdirk2");
+    s.tolerance = adaptive ? 0 : reference_tolerance;
     return s;
 }
 
@@ -52,13 +52,13 @@ pal_err pal_study_reference_size(pal_study_job *job)
     int n = job->options->quick ? 6 : 11;
     double most = job->options->quick ? QUICK_NODES : WHOLE_NODES;
     pal_study_world w;
-    if (job->shell) {
+    if (job->adaptive) {
         job->reference = job->options->quick ? 3 : 4;
         return PAL_ERR_OK;
     }
     take_sides(job, &job->scene->body[0].mesh->surface);
-    pal_setting s = reference_setting(job, pal_study_size(job, COUNTED));
-    PAL_TRY(pal_study_open(job, &s, true, &w, job->note));
+    pal_configuration s = reference_setting(job, pal_study_size(job, COUNTED));
+    PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     double count = w.body->n_node;
     pal_study_close(&w);
     for (int i = 0; i < n; i++) {
@@ -89,10 +89,10 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     double h[3];
     for (int k = 0; k < 2; k++) {
         int n_node;
-        pal_setting s = reference_setting(job, size[k]);
-        PAL_TRY(pal_study_kept_static(job, &s, job->load[load], u[k], &n_node, job->note));
+        pal_configuration s = reference_setting(job, size[k]);
+        PAL_TRY(pal_study_kept_static(job, &s, job->load[load], u[k], &n_node, job->diag));
     }
-    for (int k = 0; k < 3; k++) h[k] = job->shell ? exp2(-size[k]) : 1.0 / size[k];
+    for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
     double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
     double order = pal_richardson_order(h, first, last);
     /* changes that do not shrink as first order does are scatter of cut voxels: as far as they reach, and a margin */
@@ -105,7 +105,7 @@ static pal_err estimate(pal_study_job *job, double *out)
 {
     int size[3] = {pal_study_fit_size(job, job->reference / 2.0), pal_study_fit_size(job, job->reference / 1.42),
                    job->reference};
-    if (job->shell) size[0] = job->reference - 2, size[1] = job->reference - 1;
+    if (job->adaptive) size[0] = job->reference - 2, size[1] = job->reference - 1;
     if (size[1] >= size[2]) size[1] = size[2] - 1;
     if (size[0] >= size[1]) size[0] = size[1] - 1;
     const int nearer[3] = {pal_study_fit_size(job, job->reference / 1.5), pal_study_fit_size(job, job->reference / 1.2),
@@ -118,7 +118,7 @@ static pal_err estimate(pal_study_job *job, double *out)
         double left = 0;
         err = estimate_load(job, k, size, u, &left);
         /* coarse voxels that hold too little of it, or fold: nearer to the reference's own */
-        if ((err == PAL_ERR_REFUSED || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN) && !job->shell)
+        if ((err == PAL_ERR_REFUSED || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN) && !job->adaptive)
             err = estimate_load(job, k, nearer, u, &left);
         *out = fmax(*out, left);
     }
@@ -142,49 +142,48 @@ static pal_err given(pal_study_job *job)
 
 static pal_err made(pal_study_job *job)
 {
-    pal_setting s = reference_setting(job, job->reference);
-    char name[PAL_SETTING_TEXT];
+    pal_configuration s = reference_setting(job, job->reference);
+    char name[PAL_CONFIGURATION_TEXT];
     int n_node = 0;
     for (int k = 0; k < job->n_load; k++) {
         if (!say(job, "reference at rest", (double)k / (job->n_load + 2)))
-            return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
         pal_err err;
-        do err = pal_study_kept_static(job, &s, job->load[k], job->still[k], &n_node, job->note);
+        do err = pal_study_kept_static(job, &s, job->load[k], job->still[k], &n_node, job->diag);
         while (pal_study_press_again(job, k, err));
         PAL_TRY(err);
     }
     job->n_reference = n_node;
     if (!say(job, "reference, its own error", (double)job->n_load / (job->n_load + 2)))
-        return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
+        return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
     PAL_TRY(estimate(job, &job->out->reference_m));
     s.tolerance = 0;
-    snprintf(job->out->reference, sizeof job->out->reference, "%s, %d nodes", pal_setting_text(&s, name), n_node);
+    snprintf(job->out->reference, sizeof job->out->reference, "%s, %d nodes", pal_configuration_text(&s, name), n_node);
     return PAL_ERR_OK;
 }
 
 static pal_err at_rest(pal_study_job *job)
 {
     PAL_TRY(job->options->samples ? given(job) : made(job));
-    job->out->most_m = 0;
-    for (int k = 0; k < job->n_load; k++)
-        job->out->most_m = fmax(job->out->most_m, most_of(job->still[k], job->n_probe));
+    job->out->max_m = 0;
+    for (int k = 0; k < job->n_load; k++) job->out->max_m = fmax(job->out->max_m, most_of(job->still[k], job->n_probe));
     return PAL_ERR_OK;
 }
 
 pal_err pal_study_reference(pal_study_job *job)
 {
     PAL_TRY(at_rest(job));
-    while (job->options->quick && !job->shell && !job->options->samples &&
-           job->out->reference_m > quick_enough * job->out->most_m && job->n_reference * pow(finer, 3) <= QUICK_MOST) {
+    while (job->options->quick && !job->adaptive && !job->options->samples &&
+           job->out->reference_m > quick_enough * job->out->max_m && job->n_reference * pow(finer, 3) <= QUICK_MOST) {
         job->reference = pal_study_fit_size(job, finer * job->reference);
         PAL_TRY(at_rest(job));
     }
-    if (!(job->out->most_m > 0))
-        return pal_note_set(job->note, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
+    if (!(job->out->max_m > 0))
+        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
     for (int i = 0; i < job->n_probe; i++)
         if (pal_norm3(job->still[0] + 3 * i) > pal_norm3(job->still[0] + 3 * job->tip)) job->tip = i;
     if (!say(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
-        return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the reference");
-    pal_setting s = reference_setting(job, job->reference);
-    return pal_study_kept_way(job, &s, job->way, job->note);
+        return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
+    pal_configuration s = reference_setting(job, job->reference);
+    return pal_study_kept_way(job, &s, job->way, job->diag);
 }

@@ -17,45 +17,45 @@ static const double rescue_work = 1e6;
 
 /* ---- finite elements ---- */
 
-static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_note *note)
+static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagnostic *diag)
 {
     int n_newton = 0;
     for (;;) {
         pal_solve_report report;
-        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
+        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, PAL_STUDY_FRAME_S);
         pal_world_solve_report(w->world, 0, &report);
         n_newton += report.n_newton;
         if (err || w->body->frozen)
-            return pal_note_set(note, PAL_ERR_NUMERIC, "no rest: it froze after %d Newton iterations", n_newton);
+            return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "no rest: it froze after %d Newton iterations", n_newton);
         if (report.converged) return PAL_ERR_OK;
         if (n_newton >= MOST_NEWTON || report.n_newton == 0)
-            return pal_note_set(note, PAL_ERR_NUMERIC, "no rest after %d Newton iterations (residual %.2g)", n_newton,
-                                report.residual);
+            return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "no rest after %d Newton iterations (residual %.2g)",
+                                      n_newton, report.residual);
     }
 }
 
 /* the whole load at once, or in parts where that leads nowhere */
-static pal_err newton(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                      int *n_node, pal_note *note)
+static pal_err newton(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
+                      int *n_node, pal_diagnostic *diag)
 {
-    pal_setting still = *setting;
+    pal_configuration still = *setting;
     pal_study_world w;
     snprintf(still.solver, sizeof still.solver, "static_newton");
     still.tolerance = rest_tolerance, still.step_s = PAL_STUDY_FRAME_S;
-    PAL_TRY(pal_study_open(job, &still, true, &w, note));
+    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = w.body->n_node;
-    pal_err err = pal_study_put(job, &w, load, 1, note);
-    if (!err) err = converge(job, &w, note);
+    pal_err err = pal_study_put(job, &w, load, 1, diag);
+    if (!err) err = converge(job, &w, diag);
     if (err == PAL_ERR_NUMERIC) {
         pal_world_reset(w.world);
         err = PAL_ERR_OK;
         for (int k = 1; k <= RAMPS && !err; k++) {
-            err = pal_study_put(job, &w, load, (double)k / RAMPS, note);
-            if (!err) err = converge(job, &w, note);
+            err = pal_study_put(job, &w, load, (double)k / RAMPS, diag);
+            if (!err) err = converge(job, &w, diag);
         }
     }
-    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, note);
+    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, diag);
     pal_study_close(&w);
     return err;
 }
@@ -78,10 +78,11 @@ static void free_springs(springs *s)
 }
 
 /* as the live rows have them: given, or from the material (spring_law.h) */
-static void constants_of(const pal_setting *setting, const pal_body_def *def, double h_m, double out[PAL_SPRING_KINDS])
+static void constants_of(const pal_configuration *setting, const pal_body_def *def, double edge_m,
+                         double out[PAL_SPRING_KINDS])
 {
     pal_spring_factors(def->material.poisson, setting->k_area_J == 0, out);
-    for (int k = 0; k < PAL_SPRING_KINDS; k++) out[k] *= def->material.young_Pa * h_m * h_m * h_m;
+    for (int k = 0; k < PAL_SPRING_KINDS; k++) out[k] *= def->material.young_Pa * edge_m * edge_m * edge_m;
     if (setting->k_distance_J > 0) {
         out[PAL_SPRING_DISTANCE] = setting->k_distance_J;
         out[PAL_SPRING_VOLUME] = setting->k_volume_J;
@@ -90,11 +91,12 @@ static void constants_of(const pal_setting *setting, const pal_body_def *def, do
 }
 
 /* weights of the scene's own; nothing but gravity pulls at nodes */
-static pal_err take_springs(const pal_setting *setting, const pal_study_world *w, springs *s, pal_note *note)
+static pal_err take_springs(const pal_configuration *setting, const pal_study_world *w, springs *s,
+                            pal_diagnostic *diag)
 {
     double constant[PAL_SPRING_KINDS];
-    PAL_TRY(pal_lattice_take(w->world, 0, &s->lattice, note));
-    constants_of(setting, &w->set->scene.body[0], s->lattice.h_m, constant);
+    PAL_TRY(pal_lattice_take(w->world, 0, &s->lattice, diag));
+    constants_of(setting, &w->set->scene.body[0], s->lattice.edge_m, constant);
     bool made = true;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         s->k[k] = malloc(sizeof(double) * ((size_t)s->lattice.kind[k].n_item + 1));
@@ -104,7 +106,7 @@ static pal_err take_springs(const pal_setting *setting, const pal_study_world *w
     size_t n = 3 * (size_t)s->lattice.n_node;
     s->force = calloc(n, sizeof(double)), s->part = calloc(n, sizeof(double));
     if (!made || !s->force || !s->part || pal_seat_create(&s->lattice, &s->seat))
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory for the rest of springs");
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the rest of springs");
     return PAL_ERR_OK;
 }
 
@@ -117,7 +119,7 @@ static void add_gravity(const pal_study_world *w, double *f)
         pal_axpy3(f + 3 * i, -scene->gravity_m_s2 * w->body->mass_kg[i], scene->up);
 }
 
-static pal_err balance(springs *s, double *x, pal_note *note)
+static pal_err balance(springs *s, double *x, pal_diagnostic *diag)
 {
     pal_equilibrium_options options;
     pal_equilibrium_report report;
@@ -126,32 +128,32 @@ static pal_err balance(springs *s, double *x, pal_note *note)
     pal_equilibrium_default(&options);
     options.tolerance = rest_tolerance;
     memcpy(x, s->lattice.x_rest, n * sizeof *x);
-    pal_err err = pal_equilibrium(s->seat, k, s->force, &options, x, &report, note);
+    pal_err err = pal_equilibrium(s->seat, k, s->force, &options, x, &report, diag);
     if (err != PAL_ERR_NUMERIC) return err;
     err = PAL_ERR_OK;
     memcpy(x, s->lattice.x_rest, n * sizeof *x);
     for (int part = 1; part <= RAMPS && !err; part++) {
         for (size_t i = 0; i < n; i++) s->part[i] = s->force[i] * part / RAMPS;
-        err = pal_equilibrium(s->seat, k, s->part, &options, x, &report, note);
+        err = pal_equilibrium(s->seat, k, s->part, &options, x, &report, diag);
     }
     return err;
 }
 
-static pal_err lattice(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                       int *n_node, pal_note *note)
+static pal_err lattice(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
+                       int *n_node, pal_diagnostic *diag)
 {
     pal_study_world w;
     springs s = {.seat = NULL};
-    pal_setting still = *setting;
+    pal_configuration still = *setting;
     /* the shortest step: a body of stiff springs shall come to rest whatever it costs to run it */
     still.step_s = 1e-4, still.solver[0] = 0;
-    PAL_TRY(pal_study_open(job, &still, true, &w, note));
+    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = w.body->n_node;
-    pal_err err = take_springs(setting, &w, &s, note);
-    if (!err) err = pal_study_forces(job, &w, load, s.force, note);
+    pal_err err = take_springs(setting, &w, &s, diag);
+    if (!err) err = pal_study_forces(job, &w, load, s.force, diag);
     if (!err) add_gravity(&w, s.force);
-    if (!err) err = balance(&s, w.body->x, note);
-    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, note);
+    if (!err) err = balance(&s, w.body->x, diag);
+    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, diag);
     free_springs(&s);
     pal_study_close(&w);
     return err;
@@ -173,44 +175,44 @@ static double change(double *before, const double *u, int n, double *most)
 
 /* steps until a few peaks in a row have moved nothing to speak of */
 static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step, double *before, double *u,
-                           pal_note *note)
+                           pal_diagnostic *diag)
 {
     double last = 0, most = 0;
     int quiet = 0;
     for (int step = 1; step <= most_step; step++) {
-        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
+        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, w->set->scene.step_s);
         if (err || w->body->frozen)
-            return pal_note_set(note, err ? err : PAL_ERR_FROZEN, "%s after %d steps on its way to rest",
-                                err == PAL_ERR_BUDGET ? "needs too many sub-steps" : "froze", step);
+            return pal_diagnostic_set(diag, err ? err : PAL_ERR_FROZEN, "%s after %d steps on its way to rest",
+                                      err == PAL_ERR_BUDGET ? "needs too many sub-steps" : "froze", step);
         double now = pal_body_kinetic_J(w->body);
         bool peak = now < last;
         last = now;
         if (!peak) continue;
         memset(w->body->v, 0, 3 * sizeof(double) * (size_t)w->body->n_dof);
         last = 0;
-        PAL_TRY(pal_study_moved(w, job->probe, job->n_probe, u, note));
+        PAL_TRY(pal_study_moved(w, job->probe, job->n_probe, u, diag));
         quiet = change(before, u, job->n_probe, &most) <= relax_change * most ? quiet + 1 : 0;
         if (quiet == QUIET) return PAL_ERR_OK;
     }
-    return pal_note_set(note, PAL_ERR_NUMERIC, "not at rest after %d steps", most_step);
+    return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", most_step);
 }
 
 /* most_work: steps times nodes; 0: any */
-static pal_err relax(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                     int *n_node, double most_work, pal_note *note)
+static pal_err relax(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
+                     int *n_node, double most_work, pal_diagnostic *diag)
 {
     pal_study_world w;
-    pal_setting still = *setting;
+    pal_configuration still = *setting;
     /* quiet means little where a step is but a part of a swing */
     still.step_s = PAL_STUDY_FRAME_S;
-    PAL_TRY(pal_study_open(job, &still, true, &w, note));
+    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = pal_body_nodes(w.body);
     double *before = calloc(3 * (size_t)job->n_probe, sizeof *before);
-    pal_err err = before ? pal_study_put(job, &w, load, 1, note) : PAL_ERR_MEMORY;
+    pal_err err = before ? pal_study_put(job, &w, load, 1, diag) : PAL_ERR_MEMORY;
     if (!err)
         err = relax_world(job, &w, most_work > 0 ? (int)fmin(MOST_RELAX, most_work / *n_node) : MOST_RELAX, before, u,
-                          note);
+                          diag);
     if (!err) *n_node = pal_body_nodes(w.body);
     free(before);
     pal_study_close(&w);
@@ -228,17 +230,17 @@ static bool only_gravity(const pal_body_def *body)
     return true;
 }
 
-pal_err pal_study_static(pal_study_job *job, const pal_setting *setting, const pal_problem_case *load, double *u,
-                         int *n_node, pal_note *note)
+pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
+                         int *n_node, pal_diagnostic *diag)
 {
     *n_node = 0;
     if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem")) {
-        pal_err err = newton(job, setting, load, u, n_node, note);
-        pal_note other = {{0}};
+        pal_err err = newton(job, setting, load, u, n_node, diag);
+        pal_diagnostic other = {{0}};
         if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, rescue_work, &other)) return err;
         return PAL_ERR_OK;
     }
     if (pal_study_is(setting->model, "tet_springs") && only_gravity(&job->scene->body[0]))
-        return lattice(job, setting, load, u, n_node, note);
-    return relax(job, setting, load, u, n_node, 0, note);
+        return lattice(job, setting, load, u, n_node, diag);
+    return relax(job, setting, load, u, n_node, 0, diag);
 }

@@ -19,30 +19,30 @@ static const double way_share = 0.5;
 
 /* ---- at rest ---- */
 
-static bool same_rest(const pal_setting *a, const pal_setting *b)
+static bool same_rest(const pal_configuration *a, const pal_configuration *b)
 {
-    pal_setting p = *a, q = *b;
+    pal_configuration p = *a, q = *b;
     p.step_s = q.step_s = p.tolerance = q.tolerance = 0;
     p.solver[0] = q.solver[0] = 0;
-    return pal_setting_same(&p, &q);
+    return pal_configuration_equal(&p, &q);
 }
 
-static void find_rest(pal_study_job *job, const pal_setting *setting, int *n_node)
+static void find_rest(pal_study_job *job, const pal_configuration *setting, int *n_node)
 {
     pal_study_rest *r = &job->rest;
-    pal_note why = {{0}};
+    pal_diagnostic reason = {{0}};
     double sum = 0;
     *r = (pal_study_rest){.known = true, .of = *setting};
     for (int k = 0; k < job->n_load && !r->err; k++) {
-        r->err = pal_study_static(job, setting, job->load[k], job->now, n_node, &why);
+        r->err = pal_study_static(job, setting, job->load[k], job->now, n_node, &reason);
         for (int i = 0; i < job->n_probe && !r->err; i++) {
             double off = pal_dist3(job->now + 3 * i, job->still[k] + 3 * i);
             sum += off * off;
-            r->most_m = fmax(r->most_m, off);
+            r->max_m = fmax(r->max_m, off);
         }
     }
     r->rms_m = sqrt(sum / (job->n_probe * job->n_load));
-    if (r->err) snprintf(r->why, sizeof r->why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+    if (r->err) snprintf(r->reason, sizeof r->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
 }
 
 /* ---- in motion ---- */
@@ -59,38 +59,38 @@ static int compare(const void *a, const void *b)
 }
 
 /* one step on the clock; false: it cannot go on */
-static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
 {
     pal_world_wake(w->world);
     uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(w->world, w->set->scene.step_s);
-    if (err == PAL_ERR_BUDGET) return pal_note_set(note, err, "needs more sub-steps than the scene allows");
+    if (err == PAL_ERR_BUDGET) return pal_diagnostic_set(diag, err, "needs more sub-steps than the scene allows");
     if (err || w->body->frozen || !pal_body_finite(w->body))
-        return pal_note_set(note, err ? err : PAL_ERR_FROZEN, "diverged and froze");
+        return pal_diagnostic_set(diag, err ? err : PAL_ERR_FROZEN, "diverged and froze");
     if (ms && *n_ms < most) ms[(*n_ms)++] = 1e-6 * (double)(pal_clock_thread_ns() - before);
     return PAL_ERR_OK;
 }
 
 /* steps for the clock alone, until there are enough */
-static pal_err only_time(pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+static pal_err only_time(pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
 {
     double start = pal_clock_s();
     while (*n_ms < LEAST_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < timed_s))
-        PAL_TRY(timed_step(w, ms, most, n_ms, note));
+        PAL_TRY(timed_step(w, ms, most, n_ms, diag));
     return PAL_ERR_OK;
 }
 
 /* frames lie between steps: linear from the one before to the one after; way NULL: for the clock alone */
 static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int most, int *n_ms,
-                      pal_note *note)
+                      pal_diagnostic *diag)
 {
     double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
     for (int frame = 0; frame < job->n_way;) {
-        if (!pal_study_goes_on(job)) return pal_note_set(note, PAL_ERR_STATE, "stopped");
-        pal_err err = timed_step(w, ms, most, n_ms, note);
-        if (err == PAL_ERR_FROZEN) return pal_note_set(note, err, "diverged and froze after %.2f s", time);
+        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
+        pal_err err = timed_step(w, ms, most, n_ms, diag);
+        if (err == PAL_ERR_FROZEN) return pal_diagnostic_set(diag, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
-        if (way) PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, note));
+        if (way) PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, diag));
         time += step_s;
         for (; frame < job->n_way && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
             double share = fmin(fmax(1 - (time - (frame + 1) * PAL_STUDY_FRAME_S) / step_s, 0), 1);
@@ -102,7 +102,7 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
 }
 
 /* the same way from rest as often as it takes, so that short steps are timed as well as long ones */
-static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int most, int *n_ms, pal_note *note)
+static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
 {
     pal_err err = PAL_ERR_OK;
     for (;;) {
@@ -110,8 +110,8 @@ static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int mo
         for (int i = 0; i < *n_ms; i++) sum += ms[i];
         if (err || sum >= least_ms || *n_ms >= most) return err;
         pal_world_reset(w->world);
-        err = pal_study_put(job, w, job->load[0], way_share, note);
-        if (!err) err = follow(job, w, NULL, ms, most, n_ms, note);
+        err = pal_study_put(job, w, job->load[0], way_share, diag);
+        if (!err) err = follow(job, w, NULL, ms, most, n_ms, diag);
     }
 }
 
@@ -124,27 +124,27 @@ static double read_ms(const pal_world *world)
     return pal_machine_read_ms(all) * 2 * factor / all;
 }
 
-pal_err pal_study_way(pal_study_job *job, const pal_setting *setting, double (*way)[3], double *ms, int most, int *n_ms,
-                      pal_study_point *facts, pal_note *note)
+pal_err pal_study_way(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms, int most,
+                      int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
 {
     pal_study_world w;
-    PAL_TRY(pal_study_open(job, setting, false, &w, note));
+    PAL_TRY(pal_study_open(job, setting, false, &w, diag));
     int n_substep = pal_world_substeps(w.world);
     double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
-    pal_err err = pal_study_put(job, &w, job->load[0], way_share, note);
+    pal_err err = pal_study_put(job, &w, job->load[0], way_share, diag);
     /* the reference is followed whatever it takes */
     if (!err && facts && work > most_work) {
-        err = only_time(&w, ms, most, n_ms, note);
-        if (!err) err = pal_note_set(note, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
+        err = only_time(&w, ms, most, n_ms, diag);
+        if (!err) err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
     } else if (!err) {
-        err = follow(job, &w, way, ms, most, n_ms, note);
+        err = follow(job, &w, way, ms, most, n_ms, diag);
         if (facts) facts->n_node = pal_body_nodes(w.body);
-        if (!err && ms) err = only_time(&w, ms, most, n_ms, note);
-        if (!err && ms) err = repeat(job, &w, ms, most, n_ms, note);
+        if (!err && ms) err = only_time(&w, ms, most, n_ms, diag);
+        if (!err && ms) err = repeat(job, &w, ms, most, n_ms, diag);
     }
     if (facts) {
         /* what adapts takes the sub-steps of the finest level that it came to use */
-        facts->n_substep = w.body->shell ? pal_world_substeps(w.world) : n_substep;
+        facts->n_substep = w.body->adaptive ? pal_world_substeps(w.world) : n_substep;
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
         facts->read_ms = read_ms(w.world);
@@ -169,13 +169,13 @@ static void compare_ways(const pal_study_job *job, pal_study_point *out)
 /* ---- both ---- */
 
 /* the way on the clock; counts when it is the first, or quicker than those before it */
-static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_note *note)
+static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_diagnostic *diag)
 {
     double *ms = calloc(MOST_TIMES, sizeof *ms);
     int n_ms = 0;
     pal_study_point facts = *out;
     pal_err err =
-        !ms ? PAL_ERR_MEMORY : pal_study_way(job, &out->priced.setting, way, ms, MOST_TIMES, &n_ms, &facts, note);
+        !ms ? PAL_ERR_MEMORY : pal_study_way(job, &out->priced.setting, way, ms, MOST_TIMES, &n_ms, &facts, diag);
     /* how fast it reads is a matter of other work as well */
     double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
     if (way) *out = facts;
@@ -201,12 +201,12 @@ pal_err pal_study_time_again(pal_study_job *job)
     for (int i = 0; i < n * n_round; i++) {
         pal_study_point *p = &job->out->point[i % n];
         bool go = !o->progress || o->progress("timed again", (double)i / (n * n_round), o->user);
-        pal_note why = {{0}};
+        pal_diagnostic reason = {{0}};
         if (go && !(p->priced.ms > 0)) continue;
         /* what went once goes again, or is stopped */
-        if (go) (void)time_way(job, p, NULL, &why);
+        if (go) (void)time_way(job, p, NULL, &reason);
         if (!go || !pal_study_goes_on(job))
-            return pal_note_set(job->note, PAL_ERR_STATE, "stopped while settings were timed again");
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while settings were timed again");
     }
     pal_study_front(job->out);
     return PAL_ERR_OK;
@@ -214,22 +214,22 @@ pal_err pal_study_time_again(pal_study_job *job)
 
 static void run(pal_study_job *job, pal_study_point *out)
 {
-    pal_note why = {{0}};
-    pal_err err = time_way(job, out, job->own, &why);
+    pal_diagnostic reason = {{0}};
+    pal_err err = time_way(job, out, job->own, &reason);
     if (!err) compare_ways(job, out);
     if (err && !out->err) {
         out->err = err;
-        snprintf(out->why, sizeof out->why, "%.*s", PAL_SETTING_TEXT - 1, why.text);
+        snprintf(out->reason, sizeof out->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
     }
 }
 
 static pal_err fit(pal_study_job *job, pal_study_point *out)
 {
-    pal_note why = {{0}};
-    pal_err err = pal_study_fit(job, &out->priced.setting, &why);
+    pal_diagnostic reason = {{0}};
+    pal_err err = pal_study_fit(job, &out->priced.setting, &reason);
     if (!err) return PAL_ERR_OK;
     out->err = err;
-    snprintf(out->why, sizeof out->why, "calibration: %.*s", PAL_SETTING_TEXT - 16, why.text);
+    snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
     return err;
 }
 
@@ -240,17 +240,18 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_st
     out->ms_p95 = out->static_rms_m = out->static_most_m = out->way_rms_m = out->way_most_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
     if (wish->calibrate && fit(job, out) && pal_study_goes_on(job)) return PAL_ERR_OK;
-    if (wish->calibrate && job->n_load == 1) snprintf(out->why, sizeof out->why, "fitted to the load it is judged by");
+    if (wish->calibrate && job->n_load == 1)
+        snprintf(out->reason, sizeof out->reason, "fitted to the load it is judged by");
     if (!job->rest.known || !same_rest(&job->rest.of, &out->priced.setting))
         find_rest(job, &out->priced.setting, &n_node);
     out->n_node = n_node;
     out->err = job->rest.err;
     if (out->err)
-        memcpy(out->why, job->rest.why, sizeof out->why);
+        memcpy(out->reason, job->rest.reason, sizeof out->reason);
     else
-        out->static_rms_m = job->rest.rms_m, out->static_most_m = job->rest.most_m;
+        out->static_rms_m = job->rest.rms_m, out->static_most_m = job->rest.max_m;
     if (pal_study_goes_on(job)) run(job, out);
-    if (!pal_study_goes_on(job)) return pal_note_set(job->note, PAL_ERR_STATE, "stopped in a setting");
+    if (!pal_study_goes_on(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a setting");
     if (!out->err) out->priced.error_m = fmax(out->static_most_m, out->way_most_m);
     return PAL_ERR_OK;
 }

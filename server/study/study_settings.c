@@ -22,7 +22,7 @@ static void put(char to[PAL_NAME], const char *word)
     snprintf(to, PAL_NAME, "%s", word);
 }
 
-static void add(list *l, const pal_setting *setting, bool calibrate)
+static void add(list *l, const pal_configuration *setting, bool calibrate)
 {
     if (l->n < PAL_STUDY_POINTS) l->out[l->n++] = (pal_study_wish){*setting, calibrate};
 }
@@ -32,7 +32,7 @@ static bool wants(const list *l, const char *model)
     const pal_study_options *o = l->job->options;
     bool named = o->n_method == 0;
     for (int i = 0; i < o->n_method; i++) named |= pal_study_is(o->method[i], model);
-    return named && !pal_setting_fits(&l->job->scene->body[0], model, NULL);
+    return named && !pal_configuration_check_model(&l->job->scene->body[0], model, NULL);
 }
 
 int pal_study_fit_size(const pal_study_job *job, double wanted)
@@ -59,17 +59,17 @@ int pal_study_sizes(const pal_study_job *job, int out[16])
 {
     static const int whole[] = {8, 11, 16, 22, 30, 40}, quick[] = {6, 8, 12};
     const int *size = job->options->quick ? quick : whole;
-    int n = 0, n_all = job->options->quick ? 3 : 6;
-    for (int i = 0; i < n_all; i++) {
+    int n = 0, n_finest = job->options->quick ? 3 : 6;
+    for (int i = 0; i < n_finest; i++) {
         int fitted = pal_study_size(job, size[i]);
         if (fitted * below_reference <= job->reference && (n == 0 || fitted > out[n - 1])) out[n++] = fitted;
     }
     return n;
 }
 
-static pal_setting fem_base(const pal_study_job *job, int size)
+static pal_configuration fem_base(const pal_study_job *job, int size)
 {
-    pal_setting s = {.size = size, .step_s = job->scene->step_s, .tolerance = base_tolerance};
+    pal_configuration s = {.size = size, .step_s = job->scene->step_s, .tolerance = base_tolerance};
     put(s.model, "fem"), put(s.element, "hex8_bbar"), put(s.law, job->law), put(s.solver, "implicit_euler");
     return s;
 }
@@ -86,12 +86,12 @@ static int other_steps(double own_s, double out[4])
 }
 
 /* solver, step and tolerance turned at one size: the rest is the base's */
-static void add_times(list *l, const pal_setting *base, bool whole)
+static void add_times(list *l, const pal_configuration *base, bool whole)
 {
     static const double tolerance[] = {1e-1, 1e-4};
     double step_s[4];
     int n_step = other_steps(base->step_s, step_s);
-    pal_setting s = *base;
+    pal_configuration s = *base;
     put(s.solver, "sdirk2");
     add(l, &s, false);
     for (int k = 0; k < (whole ? n_step : 1); k++) {
@@ -111,7 +111,7 @@ static void add_fem(list *l)
     int size[16], n = pal_study_sizes(l->job, size);
     for (int i = 0; i < n; i++) {
         bool quick = l->job->options->quick, star = quick ? i == n - 2 || n == 1 : i < 4;
-        pal_setting base = fem_base(l->job, size[i]), s;
+        pal_configuration base = fem_base(l->job, size[i]), s;
         add(l, &base, false);
         if (star || !quick) add_times(l, &base, star && !quick);
         for (int k = 0; k < (star ? (quick ? 1 : 3) : quick ? 0 : 1); k++) {
@@ -132,7 +132,7 @@ static void add_springs(list *l)
     bool quick = l->job->options->quick;
     for (int i = quick && n > 1 ? n - 2 : 0; i < n && i < (quick ? (n > 1 ? n - 1 : 1) : 4); i++)
         for (int calibrate = 0; calibrate < 2; calibrate++) {
-            pal_setting s = {.size = size[i], .step_s = l->job->scene->step_s};
+            pal_configuration s = {.size = size[i], .step_s = l->job->scene->step_s};
             put(s.model, "tet_springs"), put(s.solver, "verlet");
             add(l, &s, calibrate);
             s.step_s /= 4;
@@ -145,7 +145,7 @@ static void add_shells(list *l)
     int finest = l->job->options->quick ? BASE_LEVELS - 1 : BASE_LEVELS;
     for (int levels = 1; levels <= finest && levels < l->job->reference; levels++)
         for (int refined = 0; refined < (levels > 1 ? 2 : 1); refined++) {
-            pal_setting s = {.size = levels, .step_s = l->job->scene->step_s};
+            pal_configuration s = {.size = levels, .step_s = l->job->scene->step_s};
             put(s.model, "adaptive_springs"), put(s.solver, "rk4"), put(s.element, refined ? "refined" : "");
             add(l, &s, false);
         }
@@ -157,7 +157,7 @@ static void add_solids(list *l)
     static const char *const solver[] = {"central_cg", "implicit_euler"};
     for (int i = 0; i < (l->job->options->quick ? 2 : 3); i++)
         for (int k = 0; k < 2; k++) {
-            pal_setting s = {.size = levels[i], .step_s = l->job->scene->step_s};
+            pal_configuration s = {.size = levels[i], .step_s = l->job->scene->step_s};
             put(s.model, "subdivision_fem"), put(s.solver, solver[k]);
             if (k == 1) s.tolerance = base_tolerance;
             add(l, &s, false);

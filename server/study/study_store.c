@@ -48,9 +48,11 @@ typedef struct text_key {
     bool may_be_empty;
 } text_key;
 static const text_key text[] = {
-    {"model", AT(priced.setting.model), PAL_NAME, false},      {"element", AT(priced.setting.element), PAL_NAME, true},
-    {"law", AT(priced.setting.law), PAL_NAME, true},           {"solver", AT(priced.setting.solver), PAL_NAME, true},
-    {"why", AT(why), sizeof((pal_study_point *)0)->why, true},
+    {"model", AT(priced.setting.model), PAL_NAME, false},
+    {"element", AT(priced.setting.element), PAL_NAME, true},
+    {"law", AT(priced.setting.law), PAL_NAME, true},
+    {"solver", AT(priced.setting.solver), PAL_NAME, true},
+    {"why", AT(reason), sizeof((pal_study_point *)0)->reason, true},
 };
 enum { N_NUMBER = sizeof number / sizeof *number, N_TEXT = sizeof text / sizeof *text };
 
@@ -95,14 +97,14 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
 }
 
 /* effects that move a body which nobody touches: gravity, inflate, penalty */
-static uint64_t add_effect(uint64_t sum, const pal_item *item)
+static uint64_t add_effect(uint64_t sum, const pal_config_entry *item)
 {
-    static const char *const quiet[] = {"tool_push", "tool_grab", "finite_guard", "sleep"};
+    static const char *const quiet[] = {"tool_push", "tool_grasp", "finite_guard", "sleep"};
     for (size_t k = 0; k < sizeof quiet / sizeof *quiet; k++)
         if (!strcmp(item->name, quiet[k])) return sum;
     sum = pal_study_sum(sum, item->name, strlen(item->name));
     for (int k = 0; k < item->n_value; k++) {
-        const pal_value *v = &item->value[k];
+        const pal_config_value *v = &item->value[k];
         sum = pal_study_sum(pal_study_sum(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
         sum = add_numbers(sum, v->number, (size_t)(v->kind == PAL_VALUE_NUMBER ? 1 : v->n_number));
         sum = add_numbers(sum, &(double){v->flag}, 1);
@@ -123,7 +125,7 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
     if (body->cells) sum = add_numbers(sum, body->cells->x, 3 * (size_t)body->cells->n_vertex);
     for (int k = 0; k < body->n_region; k++) sum = add_region(sum, &body->region[k]);
     for (int k = 0; k < body->n_support; k++) {
-        const pal_support *p = &body->support[k];
+        const pal_support_def *p = &body->support[k];
         const double kind[] = {p->lowest, p->rim, p->lowest ? p->fraction : 0};
         sum = add_numbers(sum, kind, 3);
         if (!p->lowest && !p->rim) sum = add_numbers(add_numbers(sum, p->low_m, 3), p->high_m, 3);
@@ -138,7 +140,7 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
     return out;
 }
 
-pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_note *note)
+pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_diagnostic *diag)
 {
     struct stat facts;
     const char *slash = strrchr(word, '/'), *name = slash ? slash + 1 : word, *dot = strchr(name, '.');
@@ -154,7 +156,7 @@ pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_
         n = snprintf(out, PAL_STUDY_PATH, "%.*s_study", stem, word);
     /* room for an ending */
     if (n < 0 || n + 8 >= PAL_STUDY_PATH)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%.80s...: the path is too long", folder ? folder : word);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", folder ? folder : word);
     return PAL_ERR_OK;
 }
 
@@ -187,8 +189,8 @@ cJSON *pal_study_file_tree(const pal_study_file *file)
     cJSON_AddStringToObject(root, "machine", s->machine);
     cJSON_AddStringToObject(root, "reference", s->reference);
     put_number(root, "reference_m", s->reference_m);
-    put_number(root, "most_m", s->most_m);
-    put_number(root, "size_m", s->size_m);
+    put_number(root, "most_m", s->max_m);
+    put_number(root, "size_m", s->length_scale_m);
     put_number(root, "step_s", s->step_s);
     of = cJSON_AddObjectToObject(root, "of");
     cJSON_AddStringToObject(of, "body", file->body);
@@ -198,23 +200,24 @@ cJSON *pal_study_file_tree(const pal_study_file *file)
     cJSON_AddStringToObject(of, "digest", file->digest);
     cJSON_AddStringToObject(of, "methods", file->methods);
     cJSON_AddStringToObject(root, "command", file->command);
-    put_number(root, "n_all", file->n_all);
+    put_number(root, "n_all", file->n_finest);
     cJSON_AddBoolToObject(root, "whole", file->whole);
     cJSON *points = cJSON_AddArrayToObject(root, "points");
     for (int k = 0; k < s->n_point; k++) put_point(points, &s->point[k]);
     return root;
 }
 
-pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_note *note)
+pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_diagnostic *diag)
 {
     cJSON *root = pal_study_file_tree(file);
     char *json = root ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
-    if (!json) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for its text", path);
+    if (!json) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     size_t n = strlen(json);
-    pal_err err = n > PAL_JSON_MOST ? pal_note_set(note, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d",
-                                                   path, n, PAL_JSON_MOST)
-                                    : pal_file_write(path, json, n, note);
+    pal_err err = n > PAL_JSON_MOST
+                      ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, n,
+                                           PAL_JSON_MOST)
+                      : pal_file_write(path, json, n, diag);
     cJSON_free(json);
     return err;
 }
@@ -248,13 +251,13 @@ static void put_row(FILE *to, const pal_study_point *p)
     fputc('\n', to);
 }
 
-pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_note *note)
+pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_diagnostic *diag)
 {
     char *bytes = NULL;
     size_t n_byte = 0;
     int order[PAL_STUDY_POINTS];
     FILE *to = open_memstream(&bytes, &n_byte);
-    if (!to) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a table", path);
+    if (!to) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a table", path);
     for (int k = 0; k < N_TEXT; k++) fprintf(to, "%s,", text[k].key);
     fputs("err,size,nodes,substeps,front", to);
     for (int k = 0; k < N_NUMBER; k++) fprintf(to, ",%s", number[k].key);
@@ -263,8 +266,8 @@ pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_not
     for (int k = 0; k < file->study.n_point; k++) put_row(to, &file->study.point[order[k]]);
     bool whole = !ferror(to);
     whole = fclose(to) == 0 && whole;
-    pal_err err = whole ? pal_file_write(path, bytes, n_byte, note)
-                        : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a table", path);
+    pal_err err = whole ? pal_file_write(path, bytes, n_byte, diag)
+                        : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a table", path);
     free(bytes);
     return err;
 }
@@ -373,8 +376,8 @@ static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file 
     static const char *const known[] = {"format", "name", "machine", "reference", "reference_m", "most_m", "size_m",
                                         "step_s", "of",   "command", "n_all",     "whole",       "points", NULL};
     static const number_key own[] = {{"reference_m", offsetof(pal_study, reference_m), 0, 1e300, true, false},
-                                     {"most_m", offsetof(pal_study, most_m), 0, 1e300, true, false},
-                                     {"size_m", offsetof(pal_study, size_m), 0, 1e300, true, false},
+                                     {"most_m", offsetof(pal_study, max_m), 0, 1e300, true, false},
+                                     {"size_m", offsetof(pal_study, length_scale_m), 0, 1e300, true, false},
                                      {"step_s", offsetof(pal_study, step_s), 0, 0.1, false, false}};
     pal_study *s = &file->study;
     char word[32] = "";
@@ -388,18 +391,19 @@ static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file 
         PAL_TRY(get_number(json, root, "", &own[k], (char *)s + own[k].at));
     PAL_TRY(get_of(json, root, file));
     PAL_TRY(get_text(json, root, "", "command", true, file->command, sizeof file->command));
-    PAL_TRY(get_count(json, root, "", "n_all", 0, PAL_STUDY_POINTS, &file->n_all));
+    PAL_TRY(get_count(json, root, "", "n_all", 0, PAL_STUDY_POINTS, &file->n_finest));
     PAL_TRY(get_bool(json, root, "", "whole", &file->whole));
     return get_points(json, root, s);
 }
 
-pal_err pal_study_file_parse(const char *name, const char *bytes, size_t n_byte, pal_study_file **out, pal_note *note)
+pal_err pal_study_file_parse(const char *name, const char *bytes, size_t n_byte, pal_study_file **out,
+                             pal_diagnostic *diag)
 {
-    pal_json json = {name, note};
+    pal_json json = {name, diag};
     cJSON *root;
     PAL_TRY(pal_json_parse(&json, bytes, n_byte, &root));
     pal_study_file *file = calloc(1, sizeof *file);
-    pal_err err = file ? get_file(&json, root, file) : pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory", name);
+    pal_err err = file ? get_file(&json, root, file) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", name);
     cJSON_Delete(root);
     if (err)
         free(file);
@@ -408,12 +412,12 @@ pal_err pal_study_file_parse(const char *name, const char *bytes, size_t n_byte,
     return err;
 }
 
-pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_note *note)
+pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, note));
-    pal_err err = pal_study_file_parse(path, (const char *)bytes, n_byte, out, note);
+    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    pal_err err = pal_study_file_parse(path, (const char *)bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }
@@ -436,7 +440,7 @@ void pal_study_order(const pal_study *study, int *out)
     }
 }
 
-int pal_study_settings(const pal_study *study, pal_priced_setting *out)
+int pal_study_settings(const pal_study *study, pal_measured_configuration *out)
 {
     int order[PAL_STUDY_POINTS], n = 0;
     pal_study_order(study, order);

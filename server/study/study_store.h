@@ -3,11 +3,12 @@
  *
  * {
  *   "format": "palpate-study-1",
- *   "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "most_m": .., "size_m": .., "step_s":
+ *   "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "max_m": .., "length_scale_m": ..,
+ * "step_s":
  * .., "of": {"body": "liver", "index": 0, "shape": "16 hex digits", "loads": "three presses and a pull, 0.5 s",
  *     "digest": "16 hex digits", "methods": "fem"},
  *   "command": "palpate study liver/scene.json",
- *   "n_all": 48, "whole": true,                    whole: every setting of these methods is there
+ *   "n_finest": 48, "whole": true,                    whole: every setting of these methods is there
  *   "points": [{"model": "fem", "element": .., "law": .., "solver": .., "size": 16, "step_s": .., "tolerance": ..,
  *     "k_distance_J": .., "k_area_J": .., "k_volume_J": .., "ms": .., "error_m": .., "front": true, "err": "OK",
  *     "why": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_most_m": .., "way_rms_m": ..,
@@ -17,8 +18,8 @@
  * what is not a number. Beside the file NAME.json of a scene it is NAME_study.json, beside scene.json study.json; a
  * table (.csv), a drawing
  * (.svg) and a page (.html) of the same name may stand beside it. Thread: [load]. */
-#ifndef PAL_COMMANDS_STUDY_STORE_H
-#define PAL_COMMANDS_STUDY_STORE_H
+#ifndef PAL_STUDY_STUDY_STORE_H
+#define PAL_STUDY_STUDY_STORE_H
 #include "server/study/study.h"
 
 #include <cjson/cJSON.h>
@@ -36,7 +37,7 @@ typedef struct pal_study_file {
     char digest[PAL_STUDY_SHAPE];    /* of the loads' numbers and of samples in place of the own reference; may be "" */
     char methods[200];               /* words of --methods with commas; "": all that fit                  */
     char command[PAL_STUDY_COMMAND]; /* as it was typed                                                    */
-    int n_all;                       /* settings that the study has when it is whole                       */
+    int n_finest;                    /* settings that the study has when it is whole                       */
     bool whole;
 } pal_study_file;
 
@@ -47,23 +48,24 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
 uint64_t pal_study_sum(uint64_t before, const void *bytes, size_t n_byte);
 /* "liver/scene.json", "liver" or "liver.stl" -> "liver/study", "liver_study": where the files of its study are, without
  * ending; folder not NULL: there, always "study". REFUSED: too long */
-pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_note *note);
+pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_diagnostic *diag);
 
 /* *out: heap, free(). REFUSED names file, entry and number; IO, MEMORY */
-pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_note *note);
+pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_diagnostic *diag);
 /* the same from memory; name is used in messages only */
-pal_err pal_study_file_parse(const char *name, const char *json, size_t n_byte, pal_study_file **out, pal_note *note);
+pal_err pal_study_file_parse(const char *name, const char *json, size_t n_byte, pal_study_file **out,
+                             pal_diagnostic *diag);
 /* whole or not at all; IO, MEMORY, REFUSED: longer than what is read */
-pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_note *note);
+pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_diagnostic *diag);
 /* the same as a tree, which the caller deletes; NULL: no memory */
 cJSON *pal_study_file_tree(const pal_study_file *file);
 /* one row a point, in the order of ascending ms, those not measured last; IO, MEMORY */
-pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_note *note);
+pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_diagnostic *diag);
 
 /* indices of the points by ascending ms, those not measured (NaN) last; out [n_point] */
 void pal_study_order(const pal_study *study, int *out);
 /* the measured points by ascending ms, their step_s given; out [PAL_STUDY_POINTS]; returns how many */
-int pal_study_settings(const pal_study *study, pal_priced_setting *out);
+int pal_study_settings(const pal_study *study, pal_measured_configuration *out);
 /* is the method among words with commas ("": all)? */
 bool pal_study_method_in(const char *methods, const char *model);
 #endif

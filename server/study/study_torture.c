@@ -17,14 +17,14 @@ static bool keeps_on(const char *what, double fraction, void *user)
 }
 
 /* the first insult that it fails; NULL: none that was decided */
-static const char *failed(pal_study_job *job, const pal_setting *setting)
+static const char *failed(pal_study_job *job, const pal_configuration *setting)
 {
     static const char *const insult[] = {"meganewton", "flat"};
-    pal_set_scene *set = NULL;
-    pal_note why = {{0}};
+    pal_configured_scene *set = NULL;
+    pal_diagnostic reason = {{0}};
     const char *found = NULL;
     pal_torture_report *report = malloc(sizeof *report);
-    if (!report || pal_setting_make(job->scene, 0, setting, &why, &set)) {
+    if (!report || pal_configuration_make(job->scene, 0, setting, &reason, &set)) {
         free(report);
         return NULL;
     }
@@ -32,10 +32,10 @@ static const char *failed(pal_study_job *job, const pal_setting *setting)
         pal_torture_options o;
         pal_torture_default(&o);
         o.only = insult[k], o.most_s = most_s, o.progress = keeps_on, o.user = job;
-        if (!pal_torture(&set->scene, &o, report, &why) && report->n_failed > 0 && !report->result[0].frozen)
+        if (!pal_torture(&set->scene, &o, report, &reason) && report->n_failed > 0 && !report->result[0].frozen)
             found = insult[k];
     }
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     free(report);
     return found;
 }
@@ -51,11 +51,11 @@ pal_err pal_study_torture(pal_study_job *job)
             continue;
         }
         bool go = !o->progress || o->progress("what is on the front, tortured", (double)i / job->out->n_point, o->user);
-        if (!go || !pal_study_goes_on(job)) return pal_note_set(job->note, PAL_ERR_STATE, "stopped at the front");
+        if (!go || !pal_study_goes_on(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the front");
         looked[i] = true;
         const char *insult = failed(job, &p->priced.setting);
         if (!insult) continue;
-        snprintf(p->why, sizeof p->why, "fails %s of palpate torture: not named", insult);
+        snprintf(p->reason, sizeof p->reason, "fails %s of palpate torture: not named", insult);
         /* what it stood before may be on the front now, also cheaper ones */
         pal_study_front(job->out);
         i = 0;

@@ -15,17 +15,17 @@ void pal_study_close(pal_study_world *w)
 {
     pal_locate_destroy(w->locate);
     pal_world_destroy(w->world);
-    pal_set_scene_free(w->set);
+    pal_configured_scene_free(w->set);
     *w = (pal_study_world){.set = NULL};
 }
 
 static bool is_tool(const char *name)
 {
-    return pal_study_is(name, "tool_push") || pal_study_is(name, "tool_grab") || pal_study_is(name, "finite_guard");
+    return pal_study_is(name, "tool_push") || pal_study_is(name, "tool_grasp") || pal_study_is(name, "finite_guard");
 }
 
 /* what statics have no use for; few Newton iterations a step, so that one may look on */
-static pal_err make_still(pal_body_def *body, pal_note *note)
+static pal_err make_still(pal_body_def *body, pal_diagnostic *diag)
 {
     int kept = 0;
     for (int k = 0; k < body->n_effect; k++)
@@ -33,32 +33,32 @@ static pal_err make_still(pal_body_def *body, pal_note *note)
     body->n_effect = kept;
     body->material.damping_1_s = 0;
     if (!pal_study_is(body->solver.name, "static_newton")) return PAL_ERR_OK;
-    return pal_item_put_number(&body->solver, "newton", 4, note);
+    return pal_entry_put_number(&body->solver, "newton", 4, diag);
 }
 
 static pal_err find_points(const pal_study_job *job, pal_study_world *w)
 {
     const pal_body *b = w->body;
-    if (b->tets && !b->embed) return pal_locate_create(b->tets, b->n_corner == 8 ? b->hexes : NULL, &w->locate);
-    w->surface = job->shell ? &job->scene->body[0].mesh->surface : b->surface;
-    w->node = job->shell ? NULL : b->shown_node;
+    if (b->tets && !b->interpolation) return pal_locate_create(b->tets, b->n_corner == 8 ? b->hexes : NULL, &w->locate);
+    w->surface = job->adaptive ? &job->scene->body[0].mesh->surface : b->surface;
+    w->node = job->adaptive ? NULL : b->shown_node;
     return w->surface ? PAL_ERR_OK : PAL_ERR_INTERNAL;
 }
 
-pal_err pal_study_open(const pal_study_job *job, const pal_setting *setting, bool still, pal_study_world *out,
-                       pal_note *note)
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool still, pal_study_world *out,
+                       pal_diagnostic *diag)
 {
     *out = (pal_study_world){.set = NULL};
     double start = pal_clock_s();
-    pal_err err = pal_setting_make(job->scene, 0, setting, note, &out->set);
-    if (!err && still) err = make_still(&out->set->scene.body[0], note);
-    if (!err) err = pal_world_create(&out->set->scene, note, &out->world);
+    pal_err err = pal_configuration_make(job->scene, 0, setting, diag, &out->set);
+    if (!err && still) err = make_still(&out->set->scene.body[0], diag);
+    if (!err) err = pal_world_create(&out->set->scene, diag, &out->world);
     if (!err) {
         out->prepare_s = pal_clock_s() - start;
         out->body = pal_world_body(out->world, 0);
         out->body->load_cap_N = INFINITY;
         err = find_points(job, out);
-        if (err) pal_note_set(note, err, "no memory to find points in the mesh");
+        if (err) pal_diagnostic_set(diag, err, "no memory to find points in the mesh");
     }
     if (err) pal_study_close(out);
     return err;
@@ -109,11 +109,11 @@ static void triangle_shares(const double *x[3], const double low[3], const doubl
 
 /* a traction on the vertices of a surface; forces are of the whole area, as much as it may be */
 static pal_err surface_traction(const pal_study_world *w, const pal_problem_load *load, const char *name, double *f,
-                                pal_note *note)
+                                pal_diagnostic *diag)
 {
     const pal_surface *s = w->surface;
     double low[3], high[3], area = 0, *share = calloc((size_t)s->n_vertex, sizeof *share);
-    if (!share) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for loads");
+    if (!share) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for loads");
     pal_sub3(low, load->region.low_m, s->origin_m);
     pal_sub3(high, load->region.high_m, s->origin_m);
     for (int t = 0; t < s->n_tri; t++) {
@@ -129,16 +129,16 @@ static pal_err surface_traction(const pal_study_world *w, const pal_problem_load
             f[3 * node_of(w, i) + c] +=
                 share[i] * (load->has_traction ? load->traction_Pa[c] : load->total_N[c] / area);
     free(share);
-    return area > 0 ? PAL_ERR_OK : pal_note_set(note, PAL_ERR_REFUSED, "load \"%s\" meets no surface", name);
+    return area > 0 ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load \"%s\" meets no surface", name);
 }
 
-static pal_err surface_forces(const pal_study_world *w, const pal_problem_case *load, double *f, pal_note *note)
+static pal_err surface_forces(const pal_study_world *w, const pal_problem_case *load, double *f, pal_diagnostic *diag)
 {
     for (int k = 0; k < load->n_load; k++) {
         const pal_problem_load *l = &load->load[k];
-        if (l->kind == PAL_LOAD_TRACTION) PAL_TRY(surface_traction(w, l, load->id, f, note));
+        if (l->kind == PAL_LOAD_TRACTION) PAL_TRY(surface_traction(w, l, load->id, f, diag));
         if (l->kind == PAL_LOAD_POINT)
-            return pal_note_set(note, PAL_ERR_REFUSED, "load \"%s\": stands on a point", load->id);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load \"%s\": stands on a point", load->id);
         for (int i = 0; i < w->body->n_node && l->kind == PAL_LOAD_GRAVITY; i++)
             pal_axpy3(f + 3 * i, w->body->node_mass_kg[i], l->gravity_m_s2);
     }
@@ -146,21 +146,21 @@ static pal_err surface_forces(const pal_study_world *w, const pal_problem_case *
 }
 
 pal_err pal_study_forces(const pal_study_job *job, const pal_study_world *w, const pal_problem_case *load,
-                         double *force_N, pal_note *note)
+                         double *force_N, pal_diagnostic *diag)
 {
     memset(force_N, 0, 3 * sizeof *force_N * (size_t)w->body->n_node);
-    if (!w->locate) return surface_forces(w, load, force_N, note);
+    if (!w->locate) return surface_forces(w, load, force_N, diag);
     return pal_case_forces(job->problem, load, w->body, w->locate, &w->set->scene.body[0].mesh->surface, force_N, NULL,
-                           note);
+                           diag);
 }
 
 pal_err pal_study_put(const pal_study_job *job, const pal_study_world *w, const pal_problem_case *load, double share,
-                      pal_note *note)
+                      pal_diagnostic *diag)
 {
     size_t n = (size_t)w->body->n_node;
     double *f = calloc(3 * n, sizeof *f);
-    if (!f) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for loads");
-    pal_err err = pal_study_forces(job, w, load, f, note);
+    if (!f) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for loads");
+    pal_err err = pal_study_forces(job, w, load, f, diag);
     for (size_t i = 0; i < n && !err; i++) {
         pal_scale3(f + 3 * i, share, f + 3 * i);
         if (pal_norm3(f + 3 * i) > 0) err = pal_world_load(w->world, 0, (int)i, f + 3 * i);
@@ -171,7 +171,7 @@ pal_err pal_study_put(const pal_study_job *job, const pal_study_world *w, const 
 
 /* ---- points ---- */
 
-static void node_moved(const pal_body *b, int node, double share, double u[3])
+static void node_displacement_m(const pal_body *b, int node, double share, double u[3])
 {
     pal_axpy3(u, share, b->d + 3 * (size_t)node);
     pal_axpy3(u, -share, b->node_rest + 3 * (size_t)node);
@@ -214,14 +214,15 @@ static void surface_point(const pal_study_world *w, const double at[3], double u
         pal_copy3(best, share);
     }
     pal_set3(u, 0, 0, 0);
-    for (int c = 0; c < 3 && found >= 0; c++) node_moved(w->body, node_of(w, s->tri[3 * found + c]), best[c], u);
-    if (found < 0) node_moved(w->body, node_of(w, nearest), 1, u);
+    for (int c = 0; c < 3 && found >= 0; c++)
+        node_displacement_m(w->body, node_of(w, s->tri[3 * found + c]), best[c], u);
+    if (found < 0) node_displacement_m(w->body, node_of(w, nearest), 1, u);
 }
 
-pal_err pal_study_moved(const pal_study_world *w, const double *x, int n, double *u, pal_note *note)
+pal_err pal_study_moved(const pal_study_world *w, const double *x, int n, double *u, pal_diagnostic *diag)
 {
-    if (!pal_body_finite(w->body)) return pal_note_set(note, PAL_ERR_NUMERIC, "numbers that are not finite");
-    pal_body_place(w->body);
+    if (!pal_body_finite(w->body)) return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "numbers that are not finite");
+    pal_body_update_nodes(w->body);
     for (int i = 0; i < n; i++) {
         double local[4], shape[10], *to = u + 3 * (size_t)i;
         const int32_t *node;
@@ -232,7 +233,7 @@ pal_err pal_study_moved(const pal_study_world *w, const double *x, int n, double
         int element = pal_locate_point(w->locate, x + 3 * (size_t)i, local, NULL);
         int n_corner = pal_case_shape(w->body, element, local, shape, &node);
         pal_set3(to, 0, 0, 0);
-        for (int k = 0; k < n_corner; k++) node_moved(w->body, node[k], shape[k], to);
+        for (int k = 0; k < n_corner; k++) node_displacement_m(w->body, node[k], shape[k], to);
     }
     return PAL_ERR_OK;
 }

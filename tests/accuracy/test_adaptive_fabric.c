@@ -2,7 +2,7 @@
  * second. With the membrane law both move alike; with the paper's law (erratum C4) the refined one is too soft. And the
  * two halves of that statement on their own: how far a sheet is stretched by a force on its border, how deep it is
  * pressed. */
-#include "tests/fixtures/shells.h"
+#include "tests/fixtures/adaptive_worlds.h"
 
 enum { STEPS_A_SECOND = 60, STEPS = 2 * STEPS_A_SECOND };
 
@@ -19,7 +19,7 @@ static bool take_sheet(shell_scene *s, int n, int levels, int level, const char 
     shell_scene_number(s, "k_shape_N_m", 0);
     shell_scene_number(s, "thickness_m", 1e-3);
     shell_scene_text(s, "law", law);
-    pal_item_put_bool(shell_scene_model(s), "refine", false, NULL);
+    pal_entry_put_bool(shell_scene_model(s), "refine", false, NULL);
     s->scene->body[0].material.young_Pa = 2e5;
     s->scene->body[0].material.damping_1_s = 30;
     return true;

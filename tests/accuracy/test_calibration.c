@@ -34,36 +34,36 @@ static void add_case(experiment *e, int index, const char *id, bool fit)
 
 static bool open_problem(experiment *e, const char *path)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_surface_report report;
     *e = (experiment){0};
-    pal_err err = pal_problem_read(path, &e->problem, &note);
+    pal_err err = pal_problem_read(path, &e->problem, &diag);
     pal_mesh_file_options file = {.unit_m = 1, .weld = PAL_MESH_WELD};
-    if (!err) err = pal_mesh_file_read(e->problem->surface, &file, &e->surface, &report, NULL, NULL, &note);
-    if (err) CHECK_FAIL("%s: %s", path, note.text);
+    if (!err) err = pal_mesh_file_read(e->problem->surface, &file, &e->surface, &report, NULL, NULL, &diag);
+    if (err) CHECK_FAIL("%s: %s", path, diag.text);
     return !err;
 }
 
-/* calibrates from the default start by the adjoint; grid NULL: homogeneous; most_evaluation 0: until it converges */
-static bool calibrate(experiment *e, int n_case, int resolution, const int *grid, int most_evaluation)
+/* calibrates from the default start by the adjoint; grid NULL: homogeneous; max_evaluation 0: until it converges */
+static bool calibrate(experiment *e, int n_case, int resolution, const int *grid, int max_evaluation)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_calibrate_options o;
-    pal_fit_options fit = {.most_evaluation = most_evaluation};
+    pal_fit_options fit = {.max_evaluation = max_evaluation};
     pal_calibrate_default(&o);
     o.voxel.resolution = resolution;
     for (int a = 0; a < 3 && grid; a++) o.grid[a] = grid[a];
     pal_calibration_destroy(e->calibration);
     e->calibration = NULL;
-    pal_err err = pal_calibration_create(e->problem, &e->surface, e->cases, n_case, &o, &e->calibration, &note);
+    pal_err err = pal_calibration_create(e->problem, &e->surface, e->cases, n_case, &o, &e->calibration, &diag);
     if (!err) {
         pal_calibration_info_of(e->calibration, &e->info);
         free(e->theta);
         e->theta = malloc(sizeof(double) * (size_t)e->info.n_parameter);
         memcpy(e->theta, e->info.start, sizeof(double) * (size_t)e->info.n_parameter);
-        err = pal_fit_adjoint(e->calibration, &fit, e->theta, &e->result, &note);
+        err = pal_fit_adjoint(e->calibration, &fit, e->theta, &e->result, &diag);
     }
-    if (err) CHECK_FAIL("%s", note.text);
+    if (err) CHECK_FAIL("%s", diag.text);
     if (!err)
         printf("  %d nodes, %d constants: %.2f -> %.3f %% (%.3f, %.3f) in %d evaluations, %d rejected\n",
                e->info.n_node, e->info.n_parameter, e->result.start_percent, e->result.value.error_percent,
@@ -87,12 +87,12 @@ static void one_set_of_constants_serves_the_gear_on_a_load_it_never_saw(void)
 {
     const char *csv = all ? check_shared("reference/gear/u_twist_nh.csv") : NULL;
     experiment e;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(open_problem(&e, "deploy/problems/gear.json"));
     add_case(&e, 0, "twist", true);
     add_case(&e, 1, "push", false);
     if (csv) {
-        REQUIRE(!pal_samples_read(csv, &e.samples, &note));
+        REQUIRE(!pal_samples_read(csv, &e.samples, &diag));
         add_case(&e, 2, "twist", false);
         e.cases[2].samples = &e.samples;
     }

@@ -9,7 +9,7 @@
  * finer gear too. */
 #include "server/estimate/estimate_work.h"
 #include "server/mesh/files/mesh_file.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/scene/problem_file.h"
 #include "server/solve/load_case.h"
 #include "server/solve/sample_points.h"
@@ -81,10 +81,10 @@ static bool make_scene(const subject *s, solved *to, const char *solver)
         }
     }
     body->n_support = p->n_support;
-    pal_item_init(&body->solver, "solver", solver);
-    pal_item_init(&body->model, "model", "fem");
-    return !pal_item_put_text(&body->model, "element", s->row->element, NULL) &&
-           !pal_item_put_text(&body->model, "law", s->row->law, NULL) &&
+    pal_entry_init(&body->solver, "solver", solver);
+    pal_entry_init(&body->model, "model", "fem");
+    return !pal_entry_put_text(&body->model, "element", s->row->element, NULL) &&
+           !pal_entry_put_text(&body->model, "law", s->row->law, NULL) &&
            !pal_case_supports(p, &to->mesh.tets, body->support, NULL);
 }
 
@@ -92,11 +92,11 @@ static bool make_scene(const subject *s, solved *to, const char *solver)
 static bool prepare(const subject *s, int resolution, const char *solver, solved *to)
 {
     pal_voxel_wish wish = {resolution, true, 0, true};
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(to, 0, sizeof *to);
-    bool good = !pal_case_voxels(s->problem, s->surface, &wish, &to->mesh, &note) && make_scene(s, to, solver) &&
-                !pal_world_create(to->scene, &note, &to->world);
-    if (!good) printf("  %s\n", note.text);
+    bool good = !pal_case_voxels(s->problem, s->surface, &wish, &to->mesh, &diag) && make_scene(s, to, solver) &&
+                !pal_world_create(to->scene, &diag, &to->world);
+    if (!good) printf("  %s\n", diag.text);
     if (!good) return false;
     to->body = pal_world_body(to->world, 0);
     to->body->load_cap_N = INFINITY;
@@ -199,18 +199,18 @@ static void compare_stress(void *user, const pal_stress_point *p)
     t->solution2 += p->volume_m3 * complementary(p->stress, p->mu_Pa, p->lambda_Pa);
 }
 
-static const pal_row *stress_row(const solved *s)
+static const pal_component *stress_row(const solved *s)
 {
     int i = 0;
-    while (!pal_world_effect(s->world, i)->effect->stress) i++;
-    return pal_world_effect(s->world, i);
+    while (!pal_world_component(s->world, i)->effect->stress) i++;
+    return pal_world_component(s->world, i);
 }
 
 /* per cent */
 static double stress_off(const solved *coarse, const solved *fine)
 {
     stress_truth t = {.coarse = coarse, .fine = fine};
-    const pal_row *a = stress_row(coarse), *b = stress_row(fine);
+    const pal_component *a = stress_row(coarse), *b = stress_row(fine);
     t.coarse_stress = calloc((size_t)coarse->body->n_element, sizeof *t.coarse_stress);
     if (!t.coarse_stress) return NAN;
     a->effect->stress(a->self, coarse->body, keep_stress, &t);
@@ -226,9 +226,9 @@ static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
 {
     solved at;
     pal_estimate_work *work = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     bool good = prepare(s, s->row->resolution, "implicit_euler", &at) &&
-                !pal_estimate_work_open(at.scene, 0, NULL, &note, &work);
+                !pal_estimate_work_open(at.scene, 0, NULL, &diag, &work);
     if (good) {
         pal_estimate_state *state = pal_estimate_work_state(work);
         good = pal_estimate_copy(state, at.world, 0);
@@ -236,7 +236,7 @@ static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
         memcpy(state->load, at.load, 3 * sizeof *at.load * (size_t)at.body->n_node);
         good = good && pal_estimate_work_run(work, out);
     }
-    if (note.text[0]) printf("  %s\n", note.text);
+    if (diag.text[0]) printf("  %s\n", diag.text);
     pal_estimate_work_close(work);
     solved_free(&at);
     return good;
@@ -269,7 +269,7 @@ static void compare(const subject *s, const pal_samples *samples)
         /* references are neo-Hookean where bodies bend far: what another law makes of it is part of the error */
         double said_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
         tell(r, &e, said_m, true_m, percent);
-        CHECK(e.locking == r->locks && (strstr(e.note, "voxels are cut") != NULL) == r->cut);
+        CHECK(e.locking == r->locks && (strstr(e.diag, "voxels are cut") != NULL) == r->cut);
         CHECK(r->locks || (said_m >= true_m / 2 && said_m <= 2 * true_m));
         CHECK(percent == 0 || r->locks || (e.zz_percent >= 0.5 * percent && e.zz_percent <= 2 * percent));
         CHECK(isfinite(e.time_m) && isfinite(e.algebraic_m) && e.error_m >= e.discretisation_m);
@@ -298,14 +298,14 @@ static void check_rows(const char *file, const row *r, int n)
 {
     pal_surface surface = {0};
     pal_problem *problem = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     check_count++; /* an absent reference is no failure */
     if (!file) return;
     pal_mesh_file_options options = {.unit_m = 1, .weld = PAL_MESH_WELD};
     pal_surface_report report;
-    pal_err err = pal_problem_read(file, &problem, &note);
-    if (!err) err = pal_mesh_file_read(problem->surface, &options, &surface, &report, NULL, NULL, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_problem_read(file, &problem, &diag);
+    if (!err) err = pal_mesh_file_read(problem->surface, &options, &surface, &report, NULL, NULL, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     for (int i = 0; i < n && !err; i++) check_row(problem, &surface, &r[i]);
     pal_surface_free(&surface);
     free(problem);

@@ -4,7 +4,7 @@
  * a body turned ten thousand times has no energy. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/fem_beam.h"
@@ -25,7 +25,7 @@ static void make_irregular(fem_beam *b)
     for (int i = 0; i < t->n_node; i++)
         for (int c = 0; c < 3 && !t->on_surface[i]; c++) {
             seed = seed * 6364136223846793005u + 1442695040888963407u;
-            t->x[3 * i + c] += 0.2 * t->h_m * (double)(int64_t)seed / 9223372036854775808.0;
+            t->x[3 * i + c] += 0.2 * t->edge_m * (double)(int64_t)seed / 9223372036854775808.0;
         }
 }
 
@@ -33,7 +33,7 @@ static void make_irregular(fem_beam *b)
 static void set_free(fem_beam *b)
 {
     b->def->n_support = 0;
-    pal_item_put_text(&b->def->solver, "free", "inertia_relief", NULL);
+    pal_entry_put_text(&b->def->solver, "free", "inertia_relief", NULL);
 }
 
 /* the whole boundary held */
@@ -42,8 +42,8 @@ static void hold_boundary(fem_beam *b)
     double high[3] = {b->length_m, b->width_m, b->width_m};
     b->def->n_support = 6;
     for (int k = 0; k < 6; k++) {
-        pal_support *s = &b->def->support[k];
-        *s = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
+        pal_support_def *s = &b->def->support[k];
+        *s = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
         if (k & 1)
             s->low_m[k / 2] = high[k / 2] - 1e-9;
         else
@@ -99,7 +99,7 @@ static void load_triangles(const fem_beam *b, const double stress[9], double *f)
 static void load_squares(const fem_beam *b, const double stress[9], double *f)
 {
     const pal_hexes *hexes = &b->mesh.hexes;
-    double h = b->mesh.tets.h_m, end[3] = {b->length_m, b->width_m, b->width_m};
+    double h = b->mesh.tets.edge_m, end[3] = {b->length_m, b->width_m, b->width_m};
     for (int e = 0; e < hexes->n_hex; e++)
         for (int c = 0; c < 8; c++) {
             int node = hexes->node[8 * e + c];
@@ -164,24 +164,24 @@ static double fit_linear(const pal_body *b, double gradient[9])
 static void check_led_patch(const char *element, const char *law, bool irregular, const double g[9])
 {
     fem_beam b;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     beam_make(&b, 4, 3, 3, 0.02, true);
     if (irregular) make_irregular(&b);
     hold_boundary(&b);
     beam_solver(&b, "static_newton");
     beam_key(&b, "tolerance", 3e-11);
     beam_element(&b, element, law);
-    pal_err err = beam_open(&b, &note);
+    pal_err err = beam_open(&b, &diag);
     CHECK_INT(err, 0);
     int n_inner = 0;
     double far = 0;
     for (int i = 0; i < b.body->n_node && !err; i++)
-        if (b.body->held[i])
+        if (b.body->fixed[i])
             pal_mul33(b.body->x + 3 * i, g, b.body->x_rest + 3 * i);
         else
             n_inner++;
     CHECK(n_inner > 8);
-    pal_world_moved(b.world, 0);
+    pal_world_invalidate_limits(b.world, 0);
     if (!err && settle(&b)) {
         for (int i = 0; i < b.body->n_node; i++) {
             double want[3];
@@ -218,7 +218,7 @@ static bool strain_under(const char *element, bool irregular, const double stres
                          double *off)
 {
     fem_beam b;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     bool good = false;
     double gradient[9];
     beam_make(&b, 4, 2, 2, 0.025, true);
@@ -228,7 +228,7 @@ static bool strain_under(const char *element, bool irregular, const double stres
     beam_key(&b, "tolerance", 3e-11);
     set_free(&b);
     beam_element(&b, element, "linear");
-    if (!beam_open(&b, &note)) {
+    if (!beam_open(&b, &diag)) {
         load_stress(&b, stress);
         good = settle(&b);
         *off = fit_linear(b.body, gradient) / b.length_m;
@@ -280,7 +280,7 @@ static void bend(const double x[3], double nu, double u[3])
 static double bending_error(const char *element, bool irregular)
 {
     fem_beam b;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double most = 0, far = 0, u[3], nu = 0.45;
     beam_make(&b, 4, 3, 3, 0.02, true);
     if (irregular) make_irregular(&b);
@@ -288,13 +288,13 @@ static double bending_error(const char *element, bool irregular)
     beam_solver(&b, "static_newton");
     beam_key(&b, "tolerance", 3e-11);
     beam_element(&b, element, "linear");
-    if (beam_open(&b, &note)) return INFINITY;
+    if (beam_open(&b, &diag)) return INFINITY;
     for (int i = 0; i < b.body->n_node; i++) {
         bend(b.body->x_rest + 3 * i, nu, u);
         most = fmax(most, pal_norm3(u));
-        if (b.body->held[i]) pal_add3(b.body->x + 3 * i, b.body->x_rest + 3 * i, u);
+        if (b.body->fixed[i]) pal_add3(b.body->x + 3 * i, b.body->x_rest + 3 * i, u);
     }
-    pal_world_moved(b.world, 0);
+    pal_world_invalidate_limits(b.world, 0);
     if (!settle(&b)) return INFINITY;
     for (int i = 0; i < b.body->n_node; i++) {
         double moved[3];
@@ -328,13 +328,13 @@ static double timoshenko_tip(double length, double side, double nu)
 static double tip_share(int n, const char *element, const char *law, double nu, double traction_Pa)
 {
     fem_beam b;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double mean[3], share = NAN;
     beam_make(&b, 8 * n, n, n, 0.05 / n, true);
     b.def->material.poisson = nu;
     beam_solver(&b, "static_newton");
     beam_element(&b, element, law);
-    if (!beam_open(&b, &note)) {
+    if (!beam_open(&b, &diag)) {
         if (b.body->n_corner == 10) {
             /* shear traction on the end face by its triangles: the stress on all of it, taken off elsewhere */
             const pal_tets *t = &b.mesh.tets;
@@ -342,7 +342,7 @@ static double tip_share(int n, const char *element, const char *law, double nu, 
             for (int k = 0; k < t->n_face && f; k++) {
                 const int32_t *c = t->face + 3 * k;
                 if (t->x[3 * c[0]] + t->x[3 * c[1]] + t->x[3 * c[2]] < 3 * b.length_m - 1e-9) continue;
-                double area = 0.5 * b.mesh.tets.h_m * b.mesh.tets.h_m;
+                double area = 0.5 * b.mesh.tets.edge_m * b.mesh.tets.edge_m;
                 for (int m = 0; m < 3; m++)
                     f[3 * middle_of(b.body, c[m], c[(m + 1) % 3]) + 2] += traction_Pa * area / 3;
             }
@@ -401,10 +401,10 @@ static void laws_agree_where_strain_is_small(void)
 
 /* ---- turning ---- */
 
-static const pal_row *elastic_row(const fem_beam *b)
+static const pal_component *elastic_row(const fem_beam *b)
 {
-    for (int r = 0; r < pal_world_rows(b->world); r++) {
-        const pal_row *row = pal_world_effect(b->world, r);
+    for (int r = 0; r < pal_world_component_count(b->world); r++) {
+        const pal_component *row = pal_world_component(b->world, r);
         if (row->effect->stage == PAL_STAGE_FORCE && row->effect->internal) return row;
     }
     abort();
@@ -412,7 +412,7 @@ static const pal_row *elastic_row(const fem_beam *b)
 
 static double energy_now(const fem_beam *b)
 {
-    const pal_row *row = elastic_row(b);
+    const pal_component *row = elastic_row(b);
     return row->effect->energy(row->self, b->body);
 }
 
@@ -434,14 +434,14 @@ static void ten_thousand_turns_leave_no_energy(void)
     for (int e = 0; e < 4; e++)
         for (int l = 1; l < 3; l++) {
             fem_beam b;
-            pal_note note = {""};
+            pal_diagnostic diag = {""};
             beam_make(&b, 2, 1, 1, 0.02, false);
             beam_element(&b, elements[e], laws[l]);
-            REQUIRE(!beam_open(&b, &note));
+            REQUIRE(!beam_open(&b, &diag));
             for (int i = 0; i < b.body->n_node; i++) b.body->x[3 * i] *= 1.01;
             double stretched = energy_now(&b), most = 0;
             memcpy(b.body->x, b.body->x_rest, 3 * sizeof(double) * (size_t)b.body->n_node);
-            const pal_row *row = elastic_row(&b);
+            const pal_component *row = elastic_row(&b);
             for (int k = 1; k <= n_step; k++) {
                 turn_all(b.body, r);
                 row->effect->tangent->linearise(row->self, b.body);

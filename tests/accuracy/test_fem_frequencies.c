@@ -9,10 +9,10 @@
 
 static const double young_Pa = 1e5;
 
-static const pal_row *elastic_row(const fem_beam *b)
+static const pal_component *elastic_row(const fem_beam *b)
 {
-    for (int r = 0; r < pal_world_rows(b->world); r++) {
-        const pal_row *row = pal_world_effect(b->world, r);
+    for (int r = 0; r < pal_world_component_count(b->world); r++) {
+        const pal_component *row = pal_world_component(b->world, r);
         if (row->effect->stage == PAL_STAGE_FORCE && row->effect->internal) return row;
     }
     abort();
@@ -47,7 +47,7 @@ static double times_mass(const pal_body *b, const double *x, const double *y)
 {
     double sum = 0;
     for (int i = 0; i < b->n_node; i++)
-        if (!b->held[i]) sum += b->mass_kg[i] * pal_dot3(x + 3 * i, y + 3 * i);
+        if (!b->fixed[i]) sum += b->mass_kg[i] * pal_dot3(x + 3 * i, y + 3 * i);
     return sum;
 }
 
@@ -59,7 +59,7 @@ static void iterate_modes(const pal_body *b, pal_cholesky *factor, double *mode[
     for (int m = 0; m < MODES; m++) {
         old[m] = calloc(n3, sizeof(double));
         if (!old[m]) abort();
-        for (size_t i = 0; i < n3; i++) old[m][i] = b->held[i / 3] ? 0 : b->mass_kg[i / 3] * mode[m][i];
+        for (size_t i = 0; i < n3; i++) old[m][i] = b->fixed[i / 3] ? 0 : b->mass_kg[i / 3] * mode[m][i];
         CHECK_INT(pal_cholesky_solve(factor, old[m], mode[m]), 0);
         /* Gram and Schmidt, of the right sides K x too */
         for (int pass = 0; pass < 2; pass++)
@@ -95,27 +95,27 @@ static void iterate_modes(const pal_body *b, pal_cholesky *factor, double *mode[
 /* lowest frequencies of the held beam, Hz, by subspace iteration on K (assembled by the row's tangent) and lumped M */
 static bool find_frequencies(const fem_beam *b, int n, double hz[])
 {
-    const pal_row *row = elastic_row(b);
+    const pal_component *row = elastic_row(b);
     const pal_body *body = b->body;
     pal_arena *arena = pal_arena_create(1 << 20, true);
     pal_cholesky *factor = NULL;
     pal_cliques clique;
-    pal_blocks k;
+    pal_block_matrix k;
     double *mode[MODES], eigenvalue[MODES] = {0}, before = 0;
     uint64_t seed = 5;
     bool good = arena && row->effect->tangent->couple(row->self, &clique) &&
-                !pal_blocks_make(body->n_node, &clique, 1, arena, &k);
+                !pal_block_matrix_make(body->n_node, &clique, 1, arena, &k);
     if (!good) return false;
     row->effect->tangent->linearise(row->self, body);
-    pal_blocks_zero(&k);
+    pal_block_matrix_zero(&k);
     row->effect->tangent->assemble(row->self, body, 1, 0, &k);
-    good = !pal_cholesky_create(&k, body->held, &factor) && !pal_cholesky_factor(factor, &k, false);
+    good = !pal_cholesky_create(&k, body->fixed, &factor) && !pal_cholesky_factor(factor, &k, false);
     for (int m = 0; m < MODES; m++) {
         mode[m] = calloc(3 * (size_t)body->n_node, sizeof(double));
         if (!mode[m]) abort();
         for (int i = 0; i < 3 * body->n_node; i++) {
             seed = seed * 6364136223846793005u + 1442695040888963407u;
-            mode[m][i] = body->held[i / 3] ? 0 : (double)(int64_t)seed;
+            mode[m][i] = body->fixed[i / 3] ? 0 : (double)(int64_t)seed;
         }
     }
     for (int it = 0; it < 60 && good; it++) {
@@ -206,11 +206,11 @@ static bool read_frequencies(const char *nu, double hz[8])
 static bool beam_frequencies(int n, const char *element, double nu, double hz[8])
 {
     fem_beam b;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     beam_reference(&b, n);
     b.def->material.poisson = nu;
     beam_element(&b, element, "linear");
-    bool good = !beam_open(&b, &note) && find_frequencies(&b, 8, hz);
+    bool good = !beam_open(&b, &diag) && find_frequencies(&b, 8, hz);
     beam_free(&b);
     return good;
 }

@@ -19,17 +19,17 @@ static pal_problem *open_problem(const char *folder, pal_surface *surface)
 {
     char path[64];
     pal_problem *problem = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     snprintf(path, sizeof path, "reference/%s/problem.json", folder);
     const char *file = check_shared(path);
     check_count++; /* an absent reference is no failure */
     if (!file) return NULL;
-    pal_err err = pal_problem_read(file, &problem, &note);
+    pal_err err = pal_problem_read(file, &problem, &diag);
     pal_mesh_file_options options = {.unit_m = 1, .weld = PAL_MESH_WELD};
     pal_surface_report report;
-    if (!err) err = pal_mesh_file_read(problem->surface, &options, surface, &report, NULL, NULL, &note);
+    if (!err) err = pal_mesh_file_read(problem->surface, &options, surface, &report, NULL, NULL, &diag);
     if (!err) return problem;
-    CHECK_FAIL("%s", note.text);
+    CHECK_FAIL("%s", diag.text);
     free(problem);
     return NULL;
 }
@@ -52,13 +52,13 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     pal_samples samples = {0};
     pal_solution *solution = NULL;
     pal_solve_result result;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double rms = NAN, most = NAN;
-    pal_err err = pal_samples_read(reference->file, &samples, &note);
+    pal_err err = pal_samples_read(reference->file, &samples, &diag);
     if (!err)
         err = pal_solve(problem, pal_problem_case_find(problem, reference->load_case), surface, &options, &solution,
-                        &result, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+                        &result, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     double *u = malloc(3 * sizeof *u * (size_t)samples.n);
     REQUIRE(u);

@@ -22,19 +22,19 @@ static double *solve(const char *path, const char *load_case, const pal_samples 
                                  .young_Pa = NAN,
                                  .poisson = NAN};
     pal_solution *solution = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double *u = malloc(3 * sizeof *u * (size_t)(samples->n > 0 ? samples->n : 1));
-    pal_err err = u ? pal_problem_read(path, &problem, &note) : PAL_ERR_MEMORY;
-    if (!err) err = pal_mesh_file_read(problem->surface, &file, &surface, &report, NULL, NULL, &note);
+    pal_err err = u ? pal_problem_read(path, &problem, &diag) : PAL_ERR_MEMORY;
+    if (!err) err = pal_mesh_file_read(problem->surface, &file, &surface, &report, NULL, NULL, &diag);
     if (!err)
         err =
-            pal_solve(problem, pal_problem_case_find(problem, load_case), &surface, &options, &solution, result, &note);
+            pal_solve(problem, pal_problem_case_find(problem, load_case), &surface, &options, &solution, result, &diag);
     for (int i = 0; i < samples->n && !err; i++) pal_solution_at(solution, samples->x + 3 * i, u + 3 * i);
     pal_solution_free(solution);
     pal_surface_free(&surface);
     free(problem);
     if (!err) return u;
-    CHECK_FAIL("%s: %s", path, note.text);
+    CHECK_FAIL("%s: %s", path, diag.text);
     free(u);
     return NULL;
 }
@@ -46,9 +46,9 @@ static void own_gear_moves_as_the_gear_of_the_reference(void)
     check_count++; /* an absent reference is no failure */
     if (!theirs || !csv) return;
     pal_samples samples = {0}, of_theirs;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_solve_result result, their_result;
-    REQUIRE(!pal_samples_read(csv, &samples, &note));
+    REQUIRE(!pal_samples_read(csv, &samples, &diag));
     double *own = solve("deploy/problems/gear.json", "twist", &samples, &result);
     double *their = solve(theirs, "twist", &samples, &their_result);
     REQUIRE(own && their);
@@ -76,7 +76,7 @@ static void push_moves_the_gear_across_the_twist(void)
     pal_solve_result result;
     double *u = solve("deploy/problems/gear.json", "push", &samples, &result);
     REQUIRE(u);
-    double share = result.most_m / (2 * cos(6 * M_PI / 180));
+    double share = result.max_m / (2 * cos(6 * M_PI / 180));
     CHECK(share > 0.1 && share < 0.25);
     for (int i = 0; i < 2; i++) {
         CHECK(u[3 * i] > 0.1);

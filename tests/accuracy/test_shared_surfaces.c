@@ -46,9 +46,9 @@ static void mesh_one(const struct known *k, const pal_surface *surface, int reso
     pal_voxels voxels;
     pal_voxel_report report;
     pal_tets tets;
-    pal_note note;
-    if (pal_voxels_fill(surface, &options, &voxels, &report, &note)) {
-        CHECK_FAIL("%s at %d: %s", k->file, resolution, note.text);
+    pal_diagnostic diag;
+    if (pal_voxels_fill(surface, &options, &voxels, &report, &diag)) {
+        CHECK_FAIL("%s at %d: %s", k->file, resolution, diag.text);
         return;
     }
     double tolerance = resolution < 60 ? 3 * k->tolerance : k->tolerance;
@@ -60,7 +60,7 @@ static void mesh_one(const struct known *k, const pal_surface *surface, int reso
     if (*k->method && strcmp(k->method, report.method))
         CHECK_FAIL("%s at %d: decided by %s, wanted %s", k->file, resolution, report.method, k->method);
     CHECK(!pal_voxels_split(&voxels, &tets));
-    if (pal_tets_check(&tets, &note)) CHECK_FAIL("%s at %d: %s", k->file, resolution, note.text);
+    if (pal_tets_check(&tets, &diag)) CHECK_FAIL("%s at %d: %s", k->file, resolution, diag.text);
     pal_tets_free(&tets);
     pal_voxels_free(&voxels);
 }
@@ -71,13 +71,12 @@ static void every_surface_becomes_a_sound_mesh_of_its_volume(void)
         char path[128];
         snprintf(path, sizeof path, "data/%s", KNOWN[i].file);
         const char *full = check_shared(path);
-        CHECK(true);
         if (!full) return;
         pal_surface surface;
-        pal_note note;
+        pal_diagnostic diag;
         pal_mesh_file_options options = {.unit_m = 1, .weld = 0};
-        if (pal_mesh_file_read(full, &options, &surface, NULL, NULL, NULL, &note)) {
-            CHECK_FAIL("%s", note.text);
+        if (pal_mesh_file_read(full, &options, &surface, NULL, NULL, NULL, &diag)) {
+            CHECK_FAIL("%s", diag.text);
             continue;
         }
         mesh_one(&KNOWN[i], &surface, 30);

@@ -7,17 +7,17 @@
 static bool without_area; /* tests run with and without the row face_area */
 
 /* a box held by a box of space, weightless unless gravity, small loads so that the answer is linear */
-static bool bench_open(box_bench *b, const int n[3], double h_m, double young_Pa, double poisson, double rate_1_s,
+static bool bench_open(box_bench *b, const int n[3], double edge_m, double young_Pa, double poisson, double rate_1_s,
                        int axis)
 {
-    if (!box_bench_make(b, n, h_m, true, true)) return false;
+    if (!box_bench_make(b, n, edge_m, true, true)) return false;
     b->scene->gravity_m_s2 = 0.01;
     pal_body_def *def = &b->scene->body[0];
     def->material =
         (pal_material){.young_Pa = young_Pa, .poisson = poisson, .density_kg_m3 = 1000, .damping_1_s = rate_1_s};
     def->output.name[0] = 0;
-    if (without_area) pal_item_put_number(&def->model, "k_area_J", 0, NULL);
-    def->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
+    if (without_area) pal_entry_put_number(&def->model, "k_area_J", 0, NULL);
+    def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
     def->support[0].high_m[axis] = 1e-9;
     for (int c = 0; c < 3; c++) b->scene->up[c] = c == axis;
     return box_bench_start(b);
@@ -83,7 +83,7 @@ static void a_bar_shows_its_poisson_ratio(void)
 static double beam_error(box_bench *b, const int n[3], FILE *csv, double load_part)
 {
     char line[256];
-    double sum = 0, most = 0, h = b->body->h_m;
+    double sum = 0, most = 0, h = b->body->edge_m;
     int count = 0;
     while (fgets(line, sizeof line, csv)) {
         double p[3], u[3];

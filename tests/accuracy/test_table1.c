@@ -12,13 +12,13 @@ static bool read_model(const char *file, pal_surface *out)
     snprintf(path, sizeof path, "data/%s", file);
     const char *full = check_shared(path);
     if (!full) return false;
-    pal_note note;
+    pal_diagnostic diag;
     pal_mesh_file_options options = {.unit_m = 1, .weld = 0};
     pal_surface_report report = {0};
     double unit_m;
     const char *unit_name;
-    if (!pal_mesh_file_read(full, &options, out, &report, &unit_m, &unit_name, &note)) return true;
-    CHECK_FAIL("%s", note.text);
+    if (!pal_mesh_file_read(full, &options, out, &report, &unit_m, &unit_name, &diag)) return true;
+    CHECK_FAIL("%s", diag.text);
     return false;
 }
 
@@ -26,15 +26,14 @@ static bool read_model(const char *file, pal_surface *out)
 static void compare(const char *file, const int paper[4])
 {
     pal_surface surface;
-    CHECK(true);
     if (!read_model(file, &surface)) return;
     for (int k = 0; k < 4; k++) {
         pal_voxel_options options = {.resolution = RESOLUTION[k], .border = true, .largest_only = true};
         pal_voxels voxels;
         pal_voxel_report report;
-        pal_note note;
-        if (pal_voxels_fill(&surface, &options, &voxels, &report, &note)) {
-            CHECK_FAIL("%s", note.text);
+        pal_diagnostic diag;
+        if (pal_voxels_fill(&surface, &options, &voxels, &report, &diag)) {
+            CHECK_FAIL("%s", diag.text);
             break;
         }
         long long n_tet = 5 * (voxels.n_inside + voxels.n_border);

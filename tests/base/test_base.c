@@ -1,10 +1,10 @@
 /* The base room: arenas, mailbox, queue, error table. */
 #include "server/base/arena.h"
 #include "server/base/clock.h"
+#include "server/base/command_queue.h"
 #include "server/base/err.h"
 #include "server/base/machine.h"
-#include "server/base/ring.h"
-#include "server/base/trio.h"
+#include "server/base/triple_buffer.h"
 #include "server/base/vec3.h"
 #include "tests/check.h"
 
@@ -20,13 +20,13 @@ static void every_error_has_name_and_text(void)
 
 static void note_is_cut_at_its_end(void)
 {
-    pal_note note;
+    pal_diagnostic diag;
     char longer[2000];
     memset(longer, 'x', sizeof longer - 1);
     longer[sizeof longer - 1] = 0;
-    CHECK_INT(pal_note_set(&note, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
-    CHECK_INT(strlen(note.text), sizeof note.text - 1);
-    CHECK_INT(pal_note_set(NULL, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
+    CHECK_INT(pal_diagnostic_set(&diag, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
+    CHECK_INT(strlen(diag.text), sizeof diag.text - 1);
+    CHECK_INT(pal_diagnostic_set(NULL, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
 }
 
 static void arena_gives_zeroed_aligned_bytes_and_refuses_overflow(void)
@@ -34,7 +34,7 @@ static void arena_gives_zeroed_aligned_bytes_and_refuses_overflow(void)
     pal_arena *arena = pal_arena_create(1000, true);
     REQUIRE(arena);
     for (int i = 0; i < 100; i++) {
-        uint8_t *bytes = pal_arena_take(arena, 177);
+        uint8_t *bytes = pal_arena_alloc(arena, 177);
         REQUIRE(bytes && (uintptr_t)bytes % 64 == 0);
         int sum = 0;
         for (int k = 0; k < 177; k++) sum += bytes[k];
@@ -42,7 +42,7 @@ static void arena_gives_zeroed_aligned_bytes_and_refuses_overflow(void)
         memset(bytes, 255, 177);
     }
     CHECK(!pal_arena_array(arena, SIZE_MAX / 2, 3));
-    CHECK(!pal_arena_take(arena, SIZE_MAX));
+    CHECK(!pal_arena_alloc(arena, SIZE_MAX));
     pal_arena_destroy(arena);
 }
 
@@ -50,14 +50,14 @@ static void fixed_arena_refuses_beyond_its_size_and_empties(void)
 {
     pal_arena *arena = pal_arena_create(256, false);
     REQUIRE(arena);
-    CHECK(pal_arena_take(arena, 200));
-    CHECK(!pal_arena_take(arena, 1));
+    CHECK(pal_arena_alloc(arena, 200));
+    CHECK(!pal_arena_alloc(arena, 1));
     pal_arena_reset(arena);
     CHECK_INT(pal_arena_used(arena), 0);
     size_t mark = pal_arena_used(arena);
-    CHECK(pal_arena_take(arena, 64));
-    pal_arena_return(arena, mark);
-    uint8_t *again = pal_arena_take(arena, 256);
+    CHECK(pal_arena_alloc(arena, 64));
+    pal_arena_rewind(arena, mark);
+    uint8_t *again = pal_arena_alloc(arena, 256);
     CHECK(again && again[0] == 0);
     pal_arena_destroy(arena);
 }
@@ -70,26 +70,26 @@ enum { HANDED = 200000 };
 
 static void *write_trio(void *user)
 {
-    pal_trio *trio = user;
+    pal_triple_buffer *triple_buffer = user;
     for (uint64_t i = 1; i <= HANDED; i++) {
-        pair *slot = pal_trio_slot(trio);
+        pair *slot = pal_triple_buffer_slot(triple_buffer);
         slot->a = slot->b = i;
-        pal_trio_publish(trio);
+        pal_triple_buffer_publish(triple_buffer);
     }
     return NULL;
 }
 
 static void trio_hands_over_newest_untorn_in_order(void)
 {
-    pair slots[3] = {{0}};
-    pal_trio trio;
+    pair node_order[3] = {{0}};
+    pal_triple_buffer triple_buffer;
     pthread_t writer;
-    pal_trio_init(&trio, &slots[0], &slots[1], &slots[2]);
-    CHECK(!pal_trio_take(&trio));
-    REQUIRE(pthread_create(&writer, NULL, write_trio, &trio) == 0);
+    pal_triple_buffer_init(&triple_buffer, &node_order[0], &node_order[1], &node_order[2]);
+    CHECK(!pal_triple_buffer_take(&triple_buffer));
+    REQUIRE(pthread_create(&writer, NULL, write_trio, &triple_buffer) == 0);
     uint64_t last = 0, torn = 0, back = 0;
     while (last < HANDED) {
-        pair *p = pal_trio_take(&trio);
+        pair *p = pal_triple_buffer_take(&triple_buffer);
         if (!p) continue;
         torn += p->a != p->b;
         back += p->a <= last;
@@ -98,11 +98,11 @@ static void trio_hands_over_newest_untorn_in_order(void)
     pthread_join(writer, NULL);
     CHECK_INT(torn, 0);
     CHECK_INT(back, 0);
-    CHECK(!pal_trio_take(&trio));
+    CHECK(!pal_triple_buffer_take(&triple_buffer));
 }
 
 typedef struct sender {
-    pal_ring *ring;
+    pal_command_queue *ring;
     uint32_t id;
 } sender;
 
@@ -111,7 +111,7 @@ static void *fill_ring(void *user)
     sender *s = user;
     for (uint32_t i = 0; i < 20000; i++) {
         uint32_t item[2] = {s->id, i};
-        while (pal_ring_put(s->ring, item)) {
+        while (pal_command_queue_put(s->ring, item)) {
         }
     }
     return NULL;
@@ -119,7 +119,7 @@ static void *fill_ring(void *user)
 
 static void ring_keeps_every_item_of_every_writer_in_order(void)
 {
-    pal_ring *ring = pal_ring_create(64, 8);
+    pal_command_queue *ring = pal_command_queue_create(64, 8);
     pthread_t thread[3];
     sender who[3];
     REQUIRE(ring);
@@ -129,26 +129,26 @@ static void ring_keeps_every_item_of_every_writer_in_order(void)
     }
     uint32_t next[3] = {0}, item[2], wrong = 0;
     for (int taken = 0; taken < 60000;) {
-        if (!pal_ring_get(ring, item)) continue;
+        if (!pal_command_queue_get(ring, item)) continue;
         wrong += item[0] > 2 || item[1] != next[item[0]]++;
         taken++;
     }
     for (int i = 0; i < 3; i++) pthread_join(thread[i], NULL);
     CHECK_INT(wrong, 0);
-    CHECK(!pal_ring_get(ring, item));
-    pal_ring_destroy(ring);
+    CHECK(!pal_command_queue_get(ring, item));
+    pal_command_queue_destroy(ring);
 }
 
 static void full_ring_refuses(void)
 {
-    pal_ring *ring = pal_ring_create(4, 4);
+    pal_command_queue *ring = pal_command_queue_create(4, 4);
     uint32_t item = 7;
     REQUIRE(ring);
-    for (int i = 0; i < 4; i++) CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_OK);
-    CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_FULL);
-    CHECK(pal_ring_get(ring, &item));
-    CHECK_INT(pal_ring_put(ring, &item), PAL_ERR_OK);
-    pal_ring_destroy(ring);
+    for (int i = 0; i < 4; i++) CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_OK);
+    CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_FULL);
+    CHECK(pal_command_queue_get(ring, &item));
+    CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_OK);
+    pal_command_queue_destroy(ring);
 }
 
 static void quaternion_turns_like_its_matrix(void)

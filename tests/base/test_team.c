@@ -31,9 +31,9 @@ typedef struct board {
     int size;
     uint8_t taken[MOST_PIECE]; /* plain memory: the thread sanitizer sees whether two pieces meet */
     double value[MOST_PIECE];
-    atomic_int busy[PAL_TEAM_MOST];
+    atomic_int busy[PAL_TEAM_MAX];
     atomic_int wrong;
-    int64_t sum[PAL_TEAM_MOST]; /* of a worker, plain */
+    int64_t sum[PAL_TEAM_MAX]; /* of a worker, plain */
 } board;
 
 static void piece(void *user, int worker, int i)
@@ -173,7 +173,7 @@ static void is_as_large_as_the_cores_that_it_may_use(void)
     REQUIRE(sched_getaffinity(0, sizeof all, &all) == 0);
     pal_team *team = NULL;
     REQUIRE(pal_team_create(0, &team) == PAL_ERR_OK);
-    CHECK_INT(pal_team_size(team), CPU_COUNT(&all) < PAL_TEAM_MOST ? CPU_COUNT(&all) : PAL_TEAM_MOST);
+    CHECK_INT(pal_team_size(team), CPU_COUNT(&all) < PAL_TEAM_MAX ? CPU_COUNT(&all) : PAL_TEAM_MAX);
     pal_team_destroy(team);
     int first = 0;
     while (!CPU_ISSET(first, &all)) first++;
@@ -186,10 +186,10 @@ static void is_as_large_as_the_cores_that_it_may_use(void)
     CHECK_INT(pal_team_size(team), 1);
     pal_team_destroy(team);
     REQUIRE(pal_team_create(100000, &team) == PAL_ERR_OK);
-    CHECK_INT(pal_team_size(team), PAL_TEAM_MOST);
+    CHECK_INT(pal_team_size(team), PAL_TEAM_MAX);
     static board b;
     memset(&b, 0, sizeof b);
-    b.size = PAL_TEAM_MOST;
+    b.size = PAL_TEAM_MAX;
     pal_team_run(team, MOST_PIECE, piece, &b);
     CHECK_INT(atomic_load(&b.wrong), 0);
     pal_team_destroy(team);

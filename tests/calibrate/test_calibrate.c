@@ -11,7 +11,7 @@
 #include <float.h>
 
 enum { MOST = 256 };
-static pal_note note;
+static pal_diagnostic diag;
 
 /* ---- a bar of 4 x 1 x 1 dm, its end at x = 3 held; and the same with a foot ---- */
 
@@ -108,15 +108,15 @@ static void bench_begin(bench *b, int resolution, int n_case)
 
 static pal_err bench_create(bench *b)
 {
-    note.text[0] = 0;
+    diag.text[0] = 0;
     if (!b->surface.x && !make_bar(&b->surface)) return PAL_ERR_MEMORY;
-    return pal_calibration_create(&b->problem, &b->surface, b->cases, b->n_case, &b->options, &b->c, &note);
+    return pal_calibration_create(&b->problem, &b->surface, b->cases, b->n_case, &b->options, &b->c, &diag);
 }
 
 static bool bench_make(bench *b)
 {
     pal_err err = bench_create(b);
-    if (err) printf("  %s\n", note.text);
+    if (err) printf("  %s\n", diag.text);
     if (err || pal_calibration_seat_create(b->c, &b->seat)) return false;
     pal_calibration_info_of(b->c, &b->info);
     if (b->info.n_parameter > MOST) return false;
@@ -134,7 +134,7 @@ static void bench_close(bench *b)
 static pal_calibration_value value_at(bench *b, const double *theta, unsigned ask, double *slope)
 {
     pal_calibration_value v;
-    CHECK_INT(pal_calibration_evaluate(b->c, b->seat, theta, ask, &v, slope, &note), 0);
+    CHECK_INT(pal_calibration_evaluate(b->c, b->seat, theta, ask, &v, slope, &diag), 0);
     return v;
 }
 
@@ -244,7 +244,7 @@ static void errors_are_averaged_and_regularisers_added_as_stated(void)
     double *u = malloc(6 * sizeof(double) * (size_t)b.info.n_node), *truth = u + 3 * b.info.n_node, sum = 0;
     REQUIRE(u && pal_calibration_moved(b.c, b.seat, 1, u) && pal_calibration_truth(b.c, 1, truth));
     for (int i = 0; i < 3 * b.info.n_node; i++) sum += (u[i] - truth[i]) * (u[i] - truth[i]);
-    CHECK_NEAR(v.case_percent[1], 100 * sqrt(sum / b.info.n_node) / b.info.most_m[1], 1e-10 * v.case_percent[1]);
+    CHECK_NEAR(v.case_percent[1], 100 * sqrt(sum / b.info.n_node) / b.info.max_m[1], 1e-10 * v.case_percent[1]);
     free(u);
     /* the other case alone: no word about those that are fitted */
     pal_calibration_value w = value_at(&b, b.theta, PAL_CALIBRATION_VERIFY, NULL);
@@ -266,7 +266,7 @@ static void a_spring_takes_the_mean_of_its_corners_and_those_the_grid(void)
     b.cases[0].linear = true;
     REQUIRE(bench_make(&b));
     const pal_tets *t = &b.info.mesh->tets;
-    const pal_weights *w = b.info.weights;
+    const pal_grid_weights *w = b.info.weights;
     double *k_J = malloc(sizeof(double) * (size_t)t->n_node);
     REQUIRE(k_J && b.info.n_used == 20 && w->n_point == t->n_node);
     /* exp theta = a plane over the grid: a plane over the nodes */
@@ -358,7 +358,7 @@ static void constants_that_were_known_are_found_again(void)
         for (int k = 0; k < 3; k++) b.cases[k].samples = &s[k];
         REQUIRE(bench_make(&b));
         CHECK_INT(b.info.n_parameter, turn ? 2 : 3);
-        CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &note), 0);
+        CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &diag), 0);
         CHECK(r.start_percent > 1);
         CHECK_LE(r.value.error_percent, 0.01);
         for (int i = 0; i < b.info.n_parameter; i++) CHECK_NEAR(b.theta[i], truth.theta[i], 0.01);
@@ -392,7 +392,7 @@ static void volume_stiffness_has_a_floor_where_one_is_asked_for(void)
         b.options.least_volume = floor ? 0.1 : 0;
         for (int k = 0; k < 3; k++) b.cases[k].samples = &s[k];
         REQUIRE(bench_make(&b));
-        CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &note), 0);
+        CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &diag), 0);
         printf("  %s floor: edges %.3g, volumes %.3g of the start\n", floor ? "with a" : "without a",
                exp(b.theta[0] - b.info.start[0]), exp(b.theta[1] - b.info.start[1]));
         CHECK_NEAR(exp(b.theta[1] - b.info.start[1]), floor ? 0.1 : 0.05, floor ? 1e-6 : 1e-3);
@@ -408,7 +408,7 @@ static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(voi
     bench truth;
     pal_samples s[3] = {{0}};
     const pal_study_options options = {.quick = true};
-    pal_setting setting = {.size = 4};
+    pal_configuration setting = {.size = 4};
     bench_begin(&truth, 4, 3);
     truth.options.without_area = true;
     REQUIRE(bench_make(&truth));
@@ -419,13 +419,13 @@ static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(voi
     pal_study_job *job = calloc(1, sizeof *job);
     REQUIRE(scene && job);
     scene->body[0].mesh = &mesh;
-    *job = (pal_study_job){.scene = scene, .problem = &truth.problem, .options = &options, .n_load = 4, .note = &note};
+    *job = (pal_study_job){.scene = scene, .problem = &truth.problem, .options = &options, .n_load = 4, .diag = &diag};
     job->n_probe = s[0].n, job->probe = s[0].x;
     for (int i = 0; i < s[0].n; i++)
         for (int c = 0; c < 3; c++) job->probe[3 * i + c] -= mesh.surface.origin_m[c];
     /* the last one is not fitted to */
     for (int k = 0; k < 4; k++) job->load[k] = &truth.problem.load_case[k % 3], job->still[k] = s[k % 3].u;
-    CHECK_INT(pal_study_fit(job, &setting, &note), 0);
+    CHECK_INT(pal_study_fit(job, &setting, &diag), 0);
     const double start[2] = {exp(truth.info.start[0]), exp(truth.info.start[1])};
     printf("  edges %.3g, volumes %.3g of the material's\n", setting.k_distance_J / start[0],
            setting.k_volume_J / start[1]);
@@ -471,9 +471,9 @@ static void annealing_walks_the_same_way_for_any_team(void)
     REQUIRE(bench_make(&b));
     for (int k = 0; k < 4; k++) {
         pal_fit_options o = {
-            .seed = k < 3 ? 5 : 6, .n_worker = k % 3 + 1, .most_evaluation = 400, .step = follow, .user = &t[k]};
+            .seed = k < 3 ? 5 : 6, .n_worker = k % 3 + 1, .max_evaluation = 400, .step = follow, .user = &t[k]};
         memcpy(theta[k], b.info.start, sizeof theta[k]);
-        CHECK_INT(pal_fit_anneal(b.c, &o, theta[k], &r[k], &note), 0);
+        CHECK_INT(pal_fit_anneal(b.c, &o, theta[k], &r[k], &diag), 0);
         CHECK_TEXT(r[k].ended, "evaluations");
         CHECK_INT(r[k].n_evaluation, 400);
         CHECK_INT(t[k].n, 400);
@@ -492,7 +492,7 @@ static void annealing_walks_the_same_way_for_any_team(void)
     /* as good as the gradient's answer, nearly */
     pal_fit_options o = {0};
     pal_fit_result a;
-    CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &a, &note), 0);
+    CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &a, &diag), 0);
     CHECK_LE(r[0].value.error_percent, 1.2 * a.value.error_percent);
     printf("  %.4f %% at the start, %.4f %% by annealing, %.4f %% by adjoint\n", a.start_percent,
            r[0].value.error_percent, a.value.error_percent);
@@ -509,14 +509,14 @@ static void annealing_ends_as_it_is_told(void)
     for (int turn = 0; turn < 4; turn++) {
         static const char *const ended[4] = {"enough", "stopped", "evaluations", "budget"};
         trail t = {.stop_at = turn == 1 ? 7 : 0};
-        pal_fit_options o = {.n_worker = 1 + turn % 2, .most_evaluation = 2000, .seed = 3, .step = follow, .user = &t};
+        pal_fit_options o = {.n_worker = 1 + turn % 2, .max_evaluation = 2000, .seed = 3, .step = follow, .user = &t};
         pal_fit_result r;
         double theta[3];
         if (turn == 0) o.enough_percent = 0.9 * start;
-        if (turn == 2) o.most_evaluation = 1;
+        if (turn == 2) o.max_evaluation = 1;
         if (turn == 3) o.budget_s = 1e-9;
         memcpy(theta, b.info.start, sizeof theta);
-        CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &note), 0);
+        CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &diag), 0);
         CHECK_TEXT(r.ended, ended[turn]);
         CHECK_NEAR(r.start_percent, start, 0);
         HARD_CASE("calibration", "tet_springs", "error over that of the start, however it ends",
@@ -556,18 +556,18 @@ static void points_may_be_evaluated_elsewhere(void)
     REQUIRE(bench_make(&b));
     memcpy(theta, b.info.start, sizeof theta);
     pal_fit_options o = {.evaluate = flat, .n_batch = 6, .user = &cost};
-    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &note), 0);
+    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &diag), 0);
     CHECK_TEXT(r.ended, "stalled"); /* start, 100 samples, 1500 without a better one */
     CHECK_INT(r.n_evaluation, 1601);
     CHECK(!memcmp(theta, b.info.start, sizeof theta));
     CHECK_NEAR(r.start_percent, 1, 0);
     CHECK_NEAR(r.value.error_percent, value_at(&b, theta, PAL_CALIBRATION_FIT, NULL).error_percent, 0);
     cost = DBL_MAX;
-    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &note), PAL_ERR_NUMERIC);
-    CHECK(strstr(note.text, "none of 1500 sets of constants comes to a stable rest"));
+    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &diag), PAL_ERR_NUMERIC);
+    CHECK(strstr(diag.text, "none of 1500 sets of constants comes to a stable rest"));
     CHECK_INT(r.n_rejected, r.n_evaluation);
     o.evaluate = broken, o.user = &left;
-    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &note), PAL_ERR_IO);
+    CHECK_INT(pal_fit_anneal(b.c, &o, theta, &r, &diag), PAL_ERR_IO);
     bench_close(&b);
 }
 
@@ -575,7 +575,7 @@ static void constants_without_a_rest_are_passed_over(void)
 {
     bench b;
     pal_fit_result r;
-    pal_fit_options o = {.n_worker = 2, .most_evaluation = 160, .seed = 1};
+    pal_fit_options o = {.n_worker = 2, .max_evaluation = 160, .seed = 1};
     double slope[3] = {1, 1, 1};
     bench_begin(&b, 4, 2);
     REQUIRE(bench_make(&b));
@@ -587,20 +587,20 @@ static void constants_without_a_rest_are_passed_over(void)
     for (int i = 0; i < 3; i++) CHECK_NEAR(slope[i], 0, 0);
     CHECK(!pal_calibration_moved(b.c, b.seat, 0, NULL));
     /* there is no slope to follow from here, but samples to take */
-    CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &note), PAL_ERR_NUMERIC);
-    CHECK(strstr(note.text, "the start has no stable rest"));
+    CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &diag), PAL_ERR_NUMERIC);
+    CHECK(strstr(diag.text, "the start has no stable rest"));
     for (int i = 0; i < 3; i++) b.theta[i] = b.info.low[i];
-    CHECK_INT(pal_fit_anneal(b.c, &o, b.theta, &r, &note), 0);
+    CHECK_INT(pal_fit_anneal(b.c, &o, b.theta, &r, &diag), 0);
     CHECK_NEAR(r.start_percent, DBL_MAX, 0);
     CHECK(r.n_rejected > 10 && r.n_rejected < 150);
     HARD_CASE("calibration", "tet_springs",
               "from a start without rest, candidates without rest on the way: error found", r.value.error_percent, 50,
               "%");
-    HARD_CASE("calibration", "tet_springs", "evaluations", r.n_evaluation, o.most_evaluation, "");
+    HARD_CASE("calibration", "tet_springs", "evaluations", r.n_evaluation, o.max_evaluation, "");
     /* what is no constant at all */
     b.theta[1] = NAN;
-    CHECK_INT(pal_calibration_evaluate(b.c, b.seat, b.theta, PAL_CALIBRATION_FIT, &v, slope, &note), PAL_ERR_NUMERIC);
-    CHECK(strstr(note.text, "parameter 1 is nan"));
+    CHECK_INT(pal_calibration_evaluate(b.c, b.seat, b.theta, PAL_CALIBRATION_FIT, &v, slope, &diag), PAL_ERR_NUMERIC);
+    CHECK(strstr(diag.text, "parameter 1 is nan"));
     CHECK_NEAR(v.error_percent, DBL_MAX, 0);
     bench_close(&b);
 }
@@ -654,7 +654,7 @@ static void problems_that_cannot_be_calibrated_are_refused_in_a_sentence(void)
         if (k == 12) b.options.progress = stop;
         CHECK_INT(bench_create(&b), want[k].err);
         CHECK(b.c == NULL);
-        if (!strstr(note.text, want[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, want[k].sentence);
+        if (!strstr(diag.text, want[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, want[k].sentence);
         bench_close(&b);
     }
 }

@@ -10,7 +10,7 @@
 enum { ROWS = 8 };
 static const char *const k_key[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
 static const double length_m = 0.04, given_J = 1e-3;
-static pal_note note;
+static pal_diagnostic diag;
 
 /* a body of springs with a seat, constants of every spring, loads, and a place for its rest */
 typedef struct bench {
@@ -43,17 +43,17 @@ static bool bench_world(bench *b, const double k_J[PAL_SPRING_KINDS], const char
     pal_body_def *def = &b->scene->body[0];
     def->n_effect = 0;
     def->material.damping_1_s = 0;
-    for (int k = 0; k < PAL_SPRING_KINDS; k++) pal_item_put_number(&def->model, k_key[k], k_J[k], NULL);
-    pal_item_put_text(&def->model, "weights", weights, NULL);
-    if (!pal_world_create(b->scene, &note, &b->world)) return true;
-    printf("  %s\n", note.text);
+    for (int k = 0; k < PAL_SPRING_KINDS; k++) pal_entry_put_number(&def->model, k_key[k], k_J[k], NULL);
+    pal_entry_put_text(&def->model, "weights", weights, NULL);
+    if (!pal_world_create(b->scene, &diag, &b->world)) return true;
+    printf("  %s\n", diag.text);
     return false;
 }
 
 /* seat and constants: those of the scene */
 static bool bench_take(bench *b, const double k_J[PAL_SPRING_KINDS])
 {
-    if (pal_lattice_take(b->world, 0, &b->lattice, &note) || pal_seat_create(&b->lattice, &b->seat)) return false;
+    if (pal_lattice_take(b->world, 0, &b->lattice, &diag) || pal_seat_create(&b->lattice, &b->seat)) return false;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         int n = b->lattice.kind[k].n_item;
         b->k[k] = calloc((size_t)n + 1, sizeof(double));
@@ -72,7 +72,7 @@ static bool bench_bar(bench *b, const char *weights)
     memset(b, 0, sizeof *b);
     if (box_make(4, 2, 2, length_m / 4, &b->box)) return false;
     b->scene = box_scene(&b->box, true, false);
-    b->scene->body[0].support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
+    b->scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
     return bench_world(b, k_J, weights) && bench_take(b, k_J);
 }
 
@@ -111,8 +111,8 @@ static pal_err rest(bench *b, bool linear, double tolerance, double *x, pal_equi
     pal_equilibrium_default(&o);
     o.linear = linear;
     if (tolerance > 0) o.tolerance = tolerance;
-    note.text[0] = 0;
-    return pal_equilibrium(b->seat, constants(b), b->f, &o, x, report, &note);
+    diag.text[0] = 0;
+    return pal_equilibrium(b->seat, constants(b), b->f, &o, x, report, &diag);
 }
 
 /* ---- against sums by hand ---- */
@@ -149,7 +149,7 @@ static void one_tetrahedron_bears_what_its_springs_do(void)
     pal_equilibrium_report r;
     REQUIRE(!box_one_tet(h, &b.box));
     b.scene = box_scene(&b.box, true, false);
-    b.scene->body[0].support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 0.5 * h}};
+    b.scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 0.5 * h}};
     REQUIRE(bench_world(&b, k_J, "equal") && bench_take(&b, k_J));
     CHECK_INT(b.lattice.n_free, 1);
     CHECK_INT(b.lattice.kind[PAL_SPRING_DISTANCE].n_item, 6);
@@ -188,7 +188,7 @@ static void the_corner_of_a_cube_gives_way_as_its_edges_let_it(void)
     b.scene = box_scene(&b.box, true, false);
     b.scene->body[0].n_support = 3;
     for (int a = 0; a < 3; a++) {
-        b.scene->body[0].support[a] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
+        b.scene->body[0].support[a] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
         b.scene->body[0].support[a].high_m[a] = 0.5 * h;
     }
     REQUIRE(bench_world(&b, k_J, "equal") && bench_take(&b, k_J));
@@ -219,8 +219,8 @@ static void at_rest_no_free_node_is_pushed(void)
         for (int i = 0; i < b.lattice.n_node; i++) {
             double sum[3];
             pal_add3(sum, f + 3 * i, b.f + 3 * i);
-            if (!b.lattice.held[i]) most = fmax(most, pal_norm3(sum));
-            if (b.lattice.held[i]) pal_axpy3(reaction, 1, f + 3 * i);
+            if (!b.lattice.fixed[i]) most = fmax(most, pal_norm3(sum));
+            if (b.lattice.fixed[i]) pal_axpy3(reaction, 1, f + 3 * i);
             pal_axpy3(load, 1, b.f + 3 * i);
             moved = fmax(moved, pal_dist3(b.x + 3 * i, b.lattice.x_rest + 3 * i));
         }
@@ -236,17 +236,17 @@ static void forces_are_those_of_the_live_rows(void)
 {
     for (int turn = 0; turn < 2; turn++) {
         bench b;
-        pal_row row[ROWS];
+        pal_component row[ROWS];
         pal_step step = {.force = row};
         REQUIRE(bench_bar(&b, turn ? "volume" : "equal"));
         pal_body *body = step.body = pal_world_body(b.world, 0);
-        for (int r = 0; r < pal_world_rows(b.world) && step.n_force < ROWS; r++)
-            if (pal_world_effect(b.world, r)->effect->stage == PAL_STAGE_FORCE)
-                row[step.n_force++] = *pal_world_effect(b.world, r);
+        for (int r = 0; r < pal_world_component_count(b.world) && step.n_force < ROWS; r++)
+            if (pal_world_component(b.world, r)->effect->stage == PAL_STAGE_FORCE)
+                row[step.n_force++] = *pal_world_component(b.world, r);
         CHECK_INT(step.n_force, 3);
         for (int i = 0; i < 3 * b.lattice.n_node; i++)
             body->x[i] = b.x[i] += 0.2 * 0.25 * length_m * uniform(9, (uint64_t)i);
-        REQUIRE(!pal_gather(&step));
+        REQUIRE(!pal_assemble_forces(&step));
         double energy = 0, most = 0, worst = 0;
         for (int r = 0; r < 3; r++) energy += row[r].effect->energy(row[r].self, body);
         CHECK_NEAR(pal_lattice_force(&b.lattice, constants(&b), b.x, b.f), energy, 1e-13 * energy);
@@ -316,7 +316,7 @@ static void slopes_are_those_of_differences(void)
         for (int k = 0; k < PAL_SPRING_KINDS; k++)
             slope[k] = calloc((size_t)b.lattice.kind[k].n_item + 1, sizeof(double));
         REQUIRE(slope[0] && slope[1] && slope[2] && isfinite(functional(&b, o.linear, dJ_du)));
-        CHECK_INT(pal_equilibrium_adjoint(b.seat, constants(&b), b.x, &o, dJ_du, slope, &note), 0);
+        CHECK_INT(pal_equilibrium_adjoint(b.seat, constants(&b), b.x, &o, dJ_du, slope, &diag), 0);
         for (int k = 0; k < PAL_SPRING_KINDS; k++) {
             int n = b.lattice.kind[k].n_item;
             double most = 0, worst = 0;
@@ -385,7 +385,7 @@ static void what_is_not_finite_is_said_to_be_so(void)
             b.f[3 * 44 + 1] = bad[k];
             memcpy(x, b.x, bytes(&b));
             CHECK_INT(rest(&b, linear, 0, b.x, NULL), PAL_ERR_NUMERIC);
-            CHECK(strstr(note.text, "node 44: its load"));
+            CHECK(strstr(diag.text, "node 44: its load"));
             CHECK(!memcmp(x, b.x, bytes(&b)));
             load_end(&b, 0.01);
             for (int kind = 0; kind < PAL_SPRING_KINDS; kind++) {
@@ -398,7 +398,7 @@ static void what_is_not_finite_is_said_to_be_so(void)
             if (linear) continue;
             b.x[70] = bad[k];
             CHECK_INT(rest(&b, linear, 0, b.x, NULL), PAL_ERR_NUMERIC);
-            CHECK(strstr(note.text, "node 23: its load or position"));
+            CHECK(strstr(diag.text, "node 23: its load or position"));
         }
     bench_close(&b);
 }
@@ -413,7 +413,7 @@ static void loads_beyond_all_measure_end_the_search(void)
         load_end(&b, load_N[turn]);
         memcpy(b.x, b.lattice.x_rest, bytes(&b));
         CHECK_INT(rest(&b, false, 0, b.x, &r), PAL_ERR_NUMERIC);
-        CHECK(!strncmp(note.text, "no rest", 7));
+        CHECK(!strncmp(diag.text, "no rest", 7));
         CHECK_LE(r.n_newton, 60);
         CHECK(!memcmp(b.x, b.lattice.x_rest, bytes(&b)));
     }
@@ -481,10 +481,10 @@ static void bodies_that_nothing_holds_or_that_cannot_move_are_refused(void)
         bench b = {0};
         REQUIRE(!box_make(1, 1, 1, 0.01, &b.box));
         b.scene = box_scene(&b.box, turn > 0, false);
-        if (turn == 1) b.scene->body[0].support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
+        if (turn == 1) b.scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
         REQUIRE(bench_world(&b, k_J, "equal"));
-        CHECK_INT(pal_lattice_take(b.world, 0, &b.lattice, &note), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, sentence[turn]));
+        CHECK_INT(pal_lattice_take(b.world, 0, &b.lattice, &diag), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, sentence[turn]));
         CHECK(b.lattice.arena == NULL);
         bench_close(&b);
     }

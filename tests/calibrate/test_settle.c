@@ -23,7 +23,7 @@ typedef struct beam {
 
 static bool make_mesh(pal_prepared *out)
 {
-    pal_voxels voxels = {.n = {NX, NY, NZ}, .h_m = h, .n_inside = NX * NY * NZ};
+    pal_voxels voxels = {.n = {NX, NY, NZ}, .edge_m = h, .n_inside = NX * NY * NZ};
     voxels.kind = malloc((size_t)NX * NY * NZ);
     if (!voxels.kind) return false;
     memset(voxels.kind, 2, (size_t)NX * NY * NZ);
@@ -67,7 +67,7 @@ static void close_beam(beam *b)
 /* load_N: sum over the nodes of the far end, along -z */
 static bool open_beam(beam *b, double load_N)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(b, 0, sizeof *b);
     if (!make_mesh(&b->mesh)) return false;
     pal_scene_default(&b->scene);
@@ -77,15 +77,15 @@ static bool open_beam(beam *b, double load_N)
     body->n_effect = 0;
     body->output.name[0] = 0;
     body->material = (pal_material){.young_Pa = young, .poisson = 0.3, .density_kg_m3 = density, .damping_1_s = 4};
-    body->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
-    pal_item_init(&body->model, "model", "tet_springs");
-    pal_err err = pal_item_put_text(&body->model, "weights", "volume", &note);
-    if (!err) err = pal_item_put_number(&body->model, "k_distance_J", 0.5 * young * h * h * h, &note);
-    if (!err) err = pal_item_put_number(&body->model, "k_area_J", young * h * h * h, &note);
-    if (!err) err = pal_item_put_number(&body->model, "k_volume_J", young * h * h * h, &note);
-    if (!err) err = pal_world_create(&b->scene, &note, &b->world);
-    if (!err) err = pal_lattice_take(b->world, 0, &b->lattice, &note);
-    if (err) printf("  %s\n", note.text);
+    body->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
+    pal_entry_init(&body->model, "model", "tet_springs");
+    pal_err err = pal_entry_put_text(&body->model, "weights", "volume", &diag);
+    if (!err) err = pal_entry_put_number(&body->model, "k_distance_J", 0.5 * young * h * h * h, &diag);
+    if (!err) err = pal_entry_put_number(&body->model, "k_area_J", young * h * h * h, &diag);
+    if (!err) err = pal_entry_put_number(&body->model, "k_volume_J", young * h * h * h, &diag);
+    if (!err) err = pal_world_create(&b->scene, &diag, &b->world);
+    if (!err) err = pal_lattice_take(b->world, 0, &b->lattice, &diag);
+    if (err) printf("  %s\n", diag.text);
     b->n = b->mesh.tets.n_node;
     b->force = calloc(3 * (size_t)b->n, sizeof(double));
     b->u = calloc(3 * (size_t)b->n, sizeof(double));
@@ -119,7 +119,7 @@ static void comes_to_rest_where_newton_does(void)
     CHECK_INT(pal_settle(b.world, b.scene.step_s, &load, &options, &work, &run, NULL), PAL_ERR_OK);
     CHECK(run.steady);
     CHECK_LE(run.difference_percent, 0.1);
-    CHECK_NEAR(run.most_m, largest(&b), 1e-3 * largest(&b));
+    CHECK_NEAR(run.max_m, largest(&b), 1e-3 * largest(&b));
     CHECK(work < options.most_work);
     /* the same again from the state it was left in: nothing of the first run is left over */
     pal_settle_run again;
@@ -193,7 +193,7 @@ static void several_loads_share_one_rate(void)
     CHECK(report.steady);
     CHECK_NEAR(report.seconds, 0.5 * (report.load[0].seconds + report.load[1].seconds), 1e-9);
     CHECK(isnan(report.load[1].difference_percent));
-    CHECK(report.load[1].most_m > 0);
+    CHECK(report.load[1].max_m > 0);
     free(pull);
     close_beam(&b);
 }

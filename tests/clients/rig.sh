@@ -22,11 +22,11 @@ own_network() {
                 PAL_NAMESPACE=yes exec unshare $how sh "$0" "$@"
             fi
         done
-        echo "left out: no network namespace (needs root or user namespaces)"
+        echo "SKIP all: no network namespace (needs root or user namespaces)"
         exit 77
     fi
     ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo || {
-        echo "left out: no multicast on lo"
+        echo "SKIP all: no multicast on lo"
         exit 77
     }
 }
@@ -46,7 +46,7 @@ make_scene() {
     cat >"$work/ball.json" <<'SCENE'
 {"name": "ball", "title": "Ball", "gravity_m_s2": 0,
  "bodies": [{"name": "ball", "surface": "ball.obj", "units": "m", "resolution": 6, "supports": [{"lowest": 0.3}],
-             "effects": [{"name": "tool_push"}, {"name": "tool_grab"}, {"name": "finite_guard"}]}],
+             "effects": [{"name": "tool_push"}, {"name": "tool_grasp"}, {"name": "finite_guard"}]}],
  "tools": [{"name": "probe 1", "radius_m": 0.008}, {"name": "probe 2", "radius_m": 0.008},
            {"name": "probe 3", "radius_m": 0.008}]}
 SCENE

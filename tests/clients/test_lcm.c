@@ -96,7 +96,7 @@ static int all_messages(uint8_t bytes[8][4096], size_t n[8], const lcm_type_info
     const palpate_haptic_config_t config = {.device = text3};
     const palpate_body_frame_t frame = {.size = 100, .payload = payload};
     const palpate_session_status_t session = {
-        .session = text3, .organ = text16, .server = text0, .n_part = 2, .epoch = epoch, .asset = asset, .note = text0};
+        .session = text3, .organ = text16, .server = text0, .n_part = 2, .epoch = epoch, .asset = asset, .diag = text0};
     const void *message[7] = {&state, &model, &event, &status, &config, &frame, &session};
     type[0] = palpate_tool_state_t_get_type_info(), type[1] = palpate_haptic_model_t_get_type_info();
     type[2] = palpate_haptic_event_t_get_type_info(), type[3] = palpate_haptic_status_t_get_type_info();
@@ -296,10 +296,10 @@ static void on_message(void *user, const char *channel, const void *bytes, size_
     heard += pal_lcm_to_pose(bytes, n_byte, &heard_pose) == PAL_ERR_OK;
     snprintf(heard_channel, sizeof heard_channel, "%s", channel);
 }
-static void on_refused(void *user, const char *channel, pal_walk why)
+static void on_refused(void *user, const char *channel, pal_walk reason)
 {
     (void)user, (void)channel;
-    refused += why == PAL_WALK_TYPE;
+    refused += reason == PAL_WALK_TYPE;
 }
 
 static void states_of_many_tools_come_through_the_memory_bus(void)
@@ -361,10 +361,10 @@ static void refuses_addresses_that_are_not_a_bus(void)
 {
     static const pal_lcm_events events = {on_message, NULL};
     pal_lcm_link *link = NULL;
-    pal_note note = {""};
-    CHECK_INT(pal_lcm_link_open(NULL, "tcpq://x", &events, NULL, &note, &link), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "tcpq://x") != NULL);
-    CHECK_INT(pal_lcm_link_open(NULL, "file:///etc/passwd", &events, NULL, &note, &link), PAL_ERR_REFUSED);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_lcm_link_open(NULL, "tcpq://x", &events, NULL, &diag, &link), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "tcpq://x") != NULL);
+    CHECK_INT(pal_lcm_link_open(NULL, "file:///etc/passwd", &events, NULL, &diag, &link), PAL_ERR_REFUSED);
 }
 
 int main(void)

@@ -26,10 +26,10 @@ static void addresses_are_understood_or_refused_by_name(void)
     }
     for (int i = 0; i < 9; i++) {
         pal_link *link = NULL;
-        pal_note note = {""};
-        CHECK_INT(pal_link_open(loop, &(pal_link_options){.url = bad[i], .events = &events}, &note, &link),
+        pal_diagnostic diag = {""};
+        CHECK_INT(pal_link_open(loop, &(pal_link_options){.url = bad[i], .events = &events}, &diag, &link),
                   PAL_ERR_REFUSED);
-        CHECK(link == NULL && strstr(note.text, bad[i]) != NULL);
+        CHECK(link == NULL && strstr(diag.text, bad[i]) != NULL);
     }
     pal_link_loop_destroy(loop);
 }
@@ -38,14 +38,14 @@ typedef struct seen {
     pal_link_loop *loop;
     int connecting, lost, ended, ticks;
 } seen;
-static void on_state(void *user, pal_link *link, pal_link_state state, int code, const char *why)
+static void on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     seen *s = user;
     (void)link, (void)code;
     s->connecting += state == PAL_LINK_CONNECTING;
     s->lost += state == PAL_LINK_LOST;
     s->ended += state == PAL_LINK_ENDED;
-    if (state == PAL_LINK_LOST) CHECK(why[0] != 0);
+    if (state == PAL_LINK_LOST) CHECK(reason[0] != 0);
     if (s->lost == 3 || s->ended) pal_link_stop(s->loop);
 }
 static void on_tick(void *user)
@@ -167,10 +167,10 @@ static void script_files_are_refused_with_their_line(void)
     const char *const where[] = {":2:", ":4:", ":1:", "has no line"};
     for (int i = 0; i < 4; i++) {
         pal_script script;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         CHECK(ftruncate(fd, 0) == 0 && pwrite(fd, text[i], strlen(text[i]), 0) == (ssize_t)strlen(text[i]));
-        CHECK_INT(pal_script_load(&script, path, 0.01, 0.01, &note), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, where[i]) != NULL);
+        CHECK_INT(pal_script_load(&script, path, 0.01, 0.01, &diag), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, where[i]) != NULL);
     }
     close(fd);
     unlink(path);
@@ -211,13 +211,13 @@ static void touched_point_is_the_outermost_along_up(void)
     CHECK(!pal_asset_furthest(&asset, up, point));
 }
 
-static bool orders_of(const char *text, pal_orders *out, pal_note *note)
+static bool orders_of(const char *text, pal_orders *out, pal_diagnostic *diag)
 {
     char path[] = "/tmp/palpate_orders_XXXXXX";
     int fd = mkstemp(path);
     FILE *file = fd < 0 ? NULL : fdopen(fd, "w");
     CHECK(file && fputs(text, file) >= 0 && fclose(file) == 0);
-    pal_err err = pal_orders_load(out, path, note);
+    pal_err err = pal_orders_load(out, path, diag);
     unlink(path);
     return !err;
 }
@@ -240,10 +240,10 @@ static void orders_are_read_or_refused_with_their_line(void)
                {"1 x a=1 b=1 c=1 d=1 e=1 f=1 g=1 h=1 i=1 j=1 k=1 l=1 m=1 n=1 o=1 p=1 q=1\n", "one number too many"},
                {"1 cut nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn=1\n", "too long a name"}};
     pal_orders orders;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(
         orders_of("# all\n 0.5 undo # back\n? 1 extrude at=top distance_m=0.02 target=liver\n1 bridge at=left at2=back",
-                  &orders, &note));
+                  &orders, &diag));
     CHECK_INT(orders.n_line, 3);
     CHECK_TEXT(orders.line[0].order.verb, "undo");
     CHECK(!orders.line[0].may_fail && orders.line[1].may_fail);
@@ -254,11 +254,11 @@ static void orders_are_read_or_refused_with_their_line(void)
     CHECK_NEAR(orders.line[1].order.arg[0].value, 0.02, 0);
     pal_orders_free(&orders);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        CHECK(!orders_of(bad[i].text, &orders, &note));
-        CHECK(strstr(note.text, bad[i].word) != NULL);
+        CHECK(!orders_of(bad[i].text, &orders, &diag));
+        CHECK(strstr(diag.text, bad[i].word) != NULL);
         CHECK(orders.line == NULL);
     }
-    CHECK_INT(pal_orders_load(&orders, "/nowhere/orders", &note), PAL_ERR_IO);
+    CHECK_INT(pal_orders_load(&orders, "/nowhere/orders", &diag), PAL_ERR_IO);
 }
 
 /* corners and face centres of a cube of 2 m: a side's place is in the middle of its face */
@@ -298,9 +298,9 @@ static void what_is_waited_for_is_reached_when_all_of_it_is(void)
     static const char *const bad[] = {"frame=1",  "frames",    "frames=", "frames=x",
                                       "frames=0", "frames=1x", "=1",      "frames=1,,"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        pal_note note = {""};
-        CHECK_INT(pal_until_read(&until, bad[i], &note), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, "until: \"") == note.text);
+        pal_diagnostic diag = {""};
+        CHECK_INT(pal_until_read(&until, bad[i], &diag), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, "until: \"") == diag.text);
     }
 }
 

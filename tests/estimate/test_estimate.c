@@ -53,9 +53,9 @@ static void nothing_exists_while_nobody_looks(void)
 {
     pal_scene *fem = fem_scene();
     pal_session *s = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_estimate estimate;
-    REQUIRE(!pal_session_open(fem, NULL, &note, &s));
+    REQUIRE(!pal_session_open(fem, NULL, &diag, &s));
     int before = threads();
     uint64_t made = pal_estimator_made();
     sleep_ms(60);
@@ -149,7 +149,7 @@ static void looking_changes_nothing(void)
 static void carry(void *user, pal_world *next, const pal_world *before)
 {
     (void)user;
-    pal_world_follow(next, before, -1, NULL, NULL);
+    pal_world_transfer(next, before, -1, NULL, NULL);
 }
 
 static void who_looks_goes_on_looking_at_what_follows(void)
@@ -193,7 +193,7 @@ static void check_age(pal_estimator *e, const pal_world *w, uint64_t tick, int n
     double age_s = (newer ? (double)(pal_world_tick(w) - estimate.tick) : n) * step_s;
     CHECK_NEAR(estimate.age_s, age_s, 1e-12);
     CHECK(estimate.asleep == !newer);
-    CHECK((strstr(estimate.note, "asleep") != NULL) == (!newer && n == 0));
+    CHECK((strstr(estimate.diag, "asleep") != NULL) == (!newer && n == 0));
 }
 
 static void a_sleeping_body_is_looked_at_once(void)
@@ -202,15 +202,15 @@ static void a_sleeping_body_is_looked_at_once(void)
     pal_world *w = NULL;
     pal_estimator *e = NULL;
     pal_estimate estimate;
-    pal_item_init(&fem->body[0].effect[0], "effect", "sleep");
+    pal_entry_init(&fem->body[0].effect[0], "effect", "sleep");
     fem->body[0].n_effect = 1;
     REQUIRE(!pal_world_create(fem, NULL, &w));
-    for (int i = 0; i < 200 && !pal_world_look(w, 0)->asleep; i++) CHECK(!pal_world_step(w, fem->step_s));
-    REQUIRE(pal_world_look(w, 0)->asleep);
+    for (int i = 0; i < 200 && !pal_world_view_body(w, 0)->asleep; i++) CHECK(!pal_world_step(w, fem->step_s));
+    REQUIRE(pal_world_view_body(w, 0)->asleep);
     REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
     CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
     uint64_t tick = pal_estimator_read(e, &estimate) ? estimate.tick : 0;
-    CHECK(strstr(estimate.note, "asleep") && estimate.error_m == 0 && estimate.ms != 1);
+    CHECK(strstr(estimate.diag, "asleep") && estimate.error_m == 0 && estimate.ms != 1);
     CHECK_INT((long long)look_for(e, w, 1, 600000000), 0);
     CHECK(pal_estimator_read(e, &estimate) && estimate.tick == tick && pal_world_tick(w) > tick);
     check_age(e, w, tick, 0, fem->step_s);
@@ -224,7 +224,7 @@ static void a_sleeping_body_is_looked_at_once(void)
     }
     pal_estimator_hold(false);
     CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
-    CHECK(pal_estimator_read(e, &estimate) && estimate.tick > tick && estimate.most_m > 0);
+    CHECK(pal_estimator_read(e, &estimate) && estimate.tick > tick && estimate.max_m > 0);
     pal_estimator_close(e);
     pal_world_destroy(w);
     free(fem);
@@ -243,8 +243,8 @@ static void nothing_is_known_of_a_frozen_body(void)
     pal_world_body(w, 0)->frozen = true;
     pal_estimator_look(e, w, 1);
     REQUIRE(pal_estimator_read(e, &estimate));
-    CHECK(isnan(estimate.error_m) && isnan(estimate.most_m) && estimate.tick == pal_world_tick(w));
-    CHECK(strstr(estimate.note, "frozen") != NULL);
+    CHECK(isnan(estimate.error_m) && isnan(estimate.max_m) && estimate.tick == pal_world_tick(w));
+    CHECK(strstr(estimate.diag, "frozen") != NULL);
     /* what was known before is not what is known after */
     CHECK(!pal_world_reset_body(w, 0));
     pal_estimator_look(e, w, NAN);
@@ -266,15 +266,15 @@ static void a_pressed_body_is_estimated_while_it_runs(void)
     REQUIRE(!pal_session_open(fem, NULL, NULL, &s));
     ask(s, true);
     uint64_t until = pal_clock_ns() + patience_ns;
-    while (pal_clock_ns() < until && !(e.most_m > 1e-4 && e.discretisation_m > 0)) {
+    while (pal_clock_ns() < until && !(e.max_m > 1e-4 && e.discretisation_m > 0)) {
         const pal_pose pose = {.position_m = {0.048, 0, 0.01}, .quat = {1, 0, 0, 0}};
         CHECK(!pal_session_put_pose(s, 0, &pose));
         sleep_ms(10);
         (void)pal_session_estimate(s, 0, &e);
     }
     printf("  pressed by %.3g mm: discretisation %.3g mm, all %.3g mm, zz %.3g %%, own %.3g ms, a step %.3g ms\n",
-           1e3 * e.most_m, 1e3 * e.discretisation_m, 1e3 * e.error_m, e.zz_percent, e.own_ms, e.ms);
-    CHECK(e.most_m > 1e-4 && e.discretisation_m > 0 && e.zz_percent > 0);
+           1e3 * e.max_m, 1e3 * e.discretisation_m, 1e3 * e.error_m, e.zz_percent, e.own_ms, e.ms);
+    CHECK(e.max_m > 1e-4 && e.discretisation_m > 0 && e.zz_percent > 0);
     pal_session_close(s);
     CHECK_INT(pal_estimator_threads(), 0);
     free(fem);

@@ -21,8 +21,8 @@ static pal_foresight foresight(int size, bool implicit)
                        .solver_order = 1,
                        .tolerance = 1e-2,
                        .decade = 1.3};
-    f.setting = (pal_setting){.model = "fem", .element = "hex8_bbar", .size = size, .step_s = scene.step_s};
-    if (!implicit) f.setting = (pal_setting){.model = "tet_springs", .size = size, .step_s = scene.step_s};
+    f.setting = (pal_configuration){.model = "fem", .element = "hex8_bbar", .size = size, .step_s = scene.step_s};
+    if (!implicit) f.setting = (pal_configuration){.model = "tet_springs", .size = size, .step_s = scene.step_s};
     return f;
 }
 
@@ -47,15 +47,15 @@ static void what_is_offered_is_taken_and_the_other_way_round(void)
     for (int size = 8; size <= 200; size += 4) {
         pal_foresight f = foresight(size, true);
         pal_estimate e;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_switch *change = NULL;
         foresee(&f, &e);
         for (int i = 0; i < e.n_neighbour; i++, n_offered++)
-            CHECK_INT(pal_setting_check_live(&scene, 0, &e.neighbour[i].setting, &note), PAL_ERR_OK);
+            CHECK_INT(pal_configuration_check_live(&scene, 0, &e.neighbour[i].setting, &diag), PAL_ERR_OK);
         if (offers(&e, 2 * size)) continue;
         f.setting.size = 2 * size;
-        CHECK_INT(pal_switch_prepare(&scene, NULL, 0, &f.setting, &note, &change), PAL_ERR_REFUSED);
-        CHECK(!change && strstr(note.text, "a live switch takes 100000 at most") != NULL);
+        CHECK_INT(pal_switch_prepare(&scene, NULL, 0, &f.setting, &diag, &change), PAL_ERR_REFUSED);
+        CHECK(!change && strstr(diag.text, "a live switch takes 100000 at most") != NULL);
         n_refused++;
     }
     CHECK(n_offered > 60 && n_refused > 20);
@@ -69,9 +69,9 @@ static void what_is_offered_can_be_made(void)
     foresee(&f, &e);
     CHECK_INT(e.n_neighbour, 6);
     for (int i = 0; i < e.n_neighbour; i++) {
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_switch *change = NULL;
-        if (pal_switch_prepare(&scene, NULL, 0, &e.neighbour[i].setting, &note, &change)) CHECK_FAIL("%s", note.text);
+        if (pal_switch_prepare(&scene, NULL, 0, &e.neighbour[i].setting, &diag, &change)) CHECK_FAIL("%s", diag.text);
         pal_switch_free(change);
     }
 }
@@ -82,14 +82,14 @@ static void sub_steps_that_are_not_allowed_are_not_offered(void)
 {
     pal_estimate e;
     pal_foresight springs = foresight(8, false), fem = foresight(8, true);
-    scene.most_substep = 30;
+    scene.max_substep = 30;
     springs.n_substep = fem.n_substep = 16;
     foresee(&springs, &e);
     CHECK(offers(&e, 4) && !offers(&e, 16));
     foresee(&fem, &e);
     CHECK(offers(&e, 4) && offers(&e, 16));
     for (int i = 0; i < e.n_neighbour; i++) CHECK_LE(e.neighbour[i].setting.step_s, scene.step_s);
-    scene.most_substep = 32;
+    scene.max_substep = 32;
     foresee(&springs, &e);
     CHECK(offers(&e, 16));
 }

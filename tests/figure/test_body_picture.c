@@ -18,9 +18,9 @@ static char *draw(const pal_body_picture *picture, int n)
     int fd = mkstemp(path);
     if (fd < 0) return NULL;
     close(fd);
-    pal_note note = {""};
-    pal_err err = pal_body_picture_write(picture, n, path, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_body_picture_write(picture, n, path, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     size_t most = 4 << 20;
     FILE *in = err ? NULL : fopen(path, "rb");
     char *text = in ? calloc(1, most) : NULL;
@@ -258,12 +258,12 @@ static void a_slope_of_values_is_divided(void)
 
 static void held_vertices_and_loads_are_marked(void)
 {
-    static const uint8_t held[8] = {1, 1, 1, 1, 0, 0, 0, 0};
+    static const uint8_t fixed[8] = {1, 1, 1, 1, 0, 0, 0, 0};
     static const double at[3][3] = {{0.5, 0, 1}, {1, 0.5, 0.5}, {0, 0, 1}},
                         force[3][3] = {{0, 0, -2}, {1, 0, 0}, {0, -2, 0}};
     pal_body_picture p = picture_of_cube();
     p.view[0] = 0, p.view[1] = -1, p.view[2] = 0;
-    p.held = held, p.n_load = 3, p.load_at = at[0], p.load_N = force[0], p.rest = p.x;
+    p.fixed = fixed, p.n_load = 3, p.load_at = at[0], p.load_N = force[0], p.rest = p.x;
     char *text = draw(&p, 1);
     REQUIRE(text);
     CHECK(is_well_formed(text));
@@ -363,30 +363,30 @@ static void nothing_to_draw_and_bad_input_are_refused(void)
     REQUIRE(fd >= 0);
     close(fd);
     unlink(path);
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_body_picture p = picture_of_cube();
-    CHECK_INT(pal_body_picture_write(&p, 0, path, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_body_picture_write(&p, 0, path, &diag), PAL_ERR_REFUSED);
     p.n_tri = 0;
-    CHECK_INT(pal_body_picture_write(&p, 1, path, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "picture 1 has nothing to draw") && strstr(note.text, path));
+    CHECK_INT(pal_body_picture_write(&p, 1, path, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "picture 1 has nothing to draw") && strstr(diag.text, path));
     p = picture_of_cube();
     p.n_vertex = 7;
-    CHECK_INT(pal_body_picture_write(&p, 1, path, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "triangle 2: no vertex 7 among 7") != NULL);
+    CHECK_INT(pal_body_picture_write(&p, 1, path, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "triangle 2: no vertex 7 among 7") != NULL);
     double x[8][3];
     memcpy(x, cube_x, sizeof x);
     x[5][1] = NAN;
     p = picture_of_cube();
     p.x = x[0];
-    CHECK_INT(pal_body_picture_write(&p, 1, path, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "vertex 5 is at ") != NULL);
+    CHECK_INT(pal_body_picture_write(&p, 1, path, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "vertex 5 is at ") != NULL);
     p = picture_of_cube();
     p.n_load = 1, p.load_at = cube_x[0], p.load_N = x[5];
-    CHECK_INT(pal_body_picture_write(&p, 1, path, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "load 0") != NULL);
+    CHECK_INT(pal_body_picture_write(&p, 1, path, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "load 0") != NULL);
     CHECK(access(path, F_OK) != 0);
     p = picture_of_cube();
-    CHECK_INT(pal_body_picture_write(&p, 1, "/nowhere/at/all.svg", &note), PAL_ERR_IO);
+    CHECK_INT(pal_body_picture_write(&p, 1, "/nowhere/at/all.svg", &diag), PAL_ERR_IO);
     /* a body without extent, and ones of 1e-9 and 1e9 m, are no reason to fail */
     for (int k = 0; k < 3; k++) {
         for (int v = 0; v < 8; v++)

@@ -12,9 +12,9 @@ static char *draw(const pal_plot *plot)
     int fd = mkstemp(path);
     if (fd < 0) return NULL;
     close(fd);
-    pal_note note = {""};
-    pal_err err = pal_plot_write(plot, path, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_plot_write(plot, path, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     FILE *in = fopen(path, "rb");
     char *text = calloc(1, 1 << 16);
     if (in && text && fread(text, 1, (1 << 16) - 1, in) == 0) CHECK_FAIL("the file is empty");
@@ -218,21 +218,21 @@ static void nothing_to_draw_and_nowhere_to_write_are_refused(void)
 {
     const double x[] = {0, -1, INFINITY}, y[] = {1, 1, 1};
     char path[] = "/tmp/palpate_no_plot_XXXXXX";
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     int fd = mkstemp(path);
     REQUIRE(fd >= 0);
     close(fd);
     unlink(path);
     pal_plot plot = {.title = "t", .x_label = "x", .y_label = "y"};
-    CHECK_INT(pal_plot_write(&plot, path, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_plot_write(&plot, path, &diag), PAL_ERR_REFUSED);
     plot.n_curve = 1, plot.log_x = true;
     plot.curve[0] = (pal_curve){.name = "c", .n = 3, .x = x, .y = y};
-    CHECK_INT(pal_plot_write(&plot, path, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, path) && strstr(note.text, "no point to draw"));
+    CHECK_INT(pal_plot_write(&plot, path, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, path) && strstr(diag.text, "no point to draw"));
     CHECK(access(path, F_OK) != 0);
     plot.log_x = false; /* two of three are drawable now */
-    CHECK_INT(pal_plot_write(&plot, "/nowhere/at/all.svg", &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/nowhere/at/all.svg") != NULL);
+    CHECK_INT(pal_plot_write(&plot, "/nowhere/at/all.svg", &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/nowhere/at/all.svg") != NULL);
 }
 
 int main(void)

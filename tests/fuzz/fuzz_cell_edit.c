@@ -53,7 +53,7 @@ static void check_edit(const pal_cells_edit *e, const pal_cells *from)
     double *x = malloc(3 * (size_t)e->cells.n_vertex * sizeof *x);
     if (!x) return;
     if (pal_cells_check(&e->cells, NULL, NULL) == PAL_ERR_REFUSED) __builtin_trap();
-    pal_cells_edit_place(e, from, from->x, x);
+    pal_cells_edit_positions(e, from, from->x, x);
     for (int32_t i = 0; i < 3 * e->cells.n_vertex; i++)
         if (!(fabs(x[i] - e->cells.x[i]) <= 1e-6)) __builtin_trap();
     for (int32_t i = 0; i < e->cells.n_cell; i++)
@@ -66,18 +66,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_cells c = {0}, same = {0};
     pal_subdivision s;
-    pal_note note;
+    pal_diagnostic diag;
     if (n_byte < 1 || start(bytes[0], &c)) return 0;
     for (size_t i = 0; i < MOST_COMMANDS && 1 + 8 * (i + 1) <= n_byte && c.n_cell <= MOST_CELLS; i++) {
         pal_cells_edit e;
         pal_cells_command k = command_of(bytes + 1 + 8 * i, &c);
         if (pal_cells_copy(&c, &same)) break;
-        note.text[0] = 0;
-        pal_err err = pal_cells_apply(&c, &k, &e, &note);
+        diag.text[0] = 0;
+        pal_err err = pal_cells_apply(&c, &k, &e, &diag);
         if (!pal_cells_equal(&c, &same)) __builtin_trap();
         pal_cells_free(&same);
         if (err) {
-            if (!note.text[0] || e.cells.x || e.rows.start || e.offset || e.cell_from) __builtin_trap();
+            if (!diag.text[0] || e.cells.x || e.rows.start || e.offset || e.cell_from) __builtin_trap();
             continue;
         }
         check_edit(&e, &c);

@@ -13,9 +13,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     pal_surface s = {0};
     pal_surface_report report;
     pal_surface_topology topology;
-    pal_note note;
+    pal_diagnostic diag;
     double unit_m;
-    if (pal_mesh_file_parse(name[bytes[0] % 5], bytes + 1, n_byte - 1, NULL, &s, &report, &unit_m, NULL, &note))
+    if (pal_mesh_file_parse(name[bytes[0] % 5], bytes + 1, n_byte - 1, NULL, &s, &report, &unit_m, NULL, &diag))
         return 0;
     /* what was accepted must be usable */
     (void)pal_surface_check(&s, &topology);

@@ -11,8 +11,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_prepared p;
-    pal_note note;
-    if (!pal_prepared_parse("bytes", bytes, n_byte, &p, &note)) pal_prepared_free(&p);
+    pal_diagnostic diag;
+    if (!pal_prepared_parse("bytes", bytes, n_byte, &p, &diag)) pal_prepared_free(&p);
     if (n_byte < 32) return 0;
     uint8_t *copy = malloc(n_byte);
     if (!copy) return 0;
@@ -21,7 +21,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     memcpy(copy + 16, &size, 8);
     sum = pal_prepared_checksum(copy, n_byte);
     memcpy(copy + 24, &sum, 8);
-    if (!pal_prepared_parse("bytes", copy, n_byte, &p, &note)) {
+    if (!pal_prepared_parse("bytes", copy, n_byte, &p, &diag)) {
         /* what was taken must be fit for use */
         double *x = p.tets.x;
         float *out = malloc((size_t)p.skin.n_vertex * 12 + 1);
@@ -34,7 +34,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         free(frames);
         pal_levels levels;
         const pal_levels_options options = {.n_level = 2, .budget_byte = 16 << 20};
-        if (!pal_levels_make(&p.surface, &options, &levels, &note)) pal_levels_free(&levels);
+        if (!pal_levels_make(&p.surface, &options, &levels, &diag)) pal_levels_free(&levels);
         pal_prepared_free(&p);
     }
     free(copy);

@@ -8,8 +8,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_problem *p = NULL;
-    pal_note note;
-    if (pal_problem_parse("fuzz", (const char *)bytes, n_byte, "/nowhere", &p, &note)) return 0;
+    pal_diagnostic diag;
+    if (pal_problem_parse("fuzz", (const char *)bytes, n_byte, "/nowhere", &p, &diag)) return 0;
     if (p->n_material < 1 || p->n_case < 1) abort();
     for (int k = 0; k < p->n_material; k++)
         if (!(p->material[k].young_Pa > 0 && p->material[k].poisson > -1 && p->material[k].poisson < 0.5)) abort();

@@ -7,7 +7,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_replay_report report;
-    pal_note note;
-    (void)pal_replay_parse("fuzz", bytes, n_byte, NULL, &report, &note);
+    pal_diagnostic diag;
+    (void)pal_replay_parse("fuzz", bytes, n_byte, NULL, &report, &diag);
     return 0;
 }

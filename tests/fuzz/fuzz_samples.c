@@ -8,8 +8,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_samples s = {0};
-    pal_note note;
-    if (pal_samples_parse("fuzz", bytes, n_byte, &s, &note)) return 0;
+    pal_diagnostic diag;
+    if (pal_samples_parse("fuzz", bytes, n_byte, &s, &diag)) return 0;
     if (s.n < 1) abort();
     for (int k = 0; k < 3 * s.n; k++)
         if (!isfinite(s.x[k]) || !isfinite(s.u[k])) abort();

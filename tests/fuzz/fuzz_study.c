@@ -8,11 +8,11 @@
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
-    static pal_priced_setting list[PAL_STUDY_POINTS];
+    static pal_measured_configuration list[PAL_STUDY_POINTS];
     int order[PAL_STUDY_POINTS];
     pal_study_file *f = NULL;
-    pal_note note;
-    if (pal_study_file_parse("fuzz", (const char *)bytes, n_byte, &f, &note)) return 0;
+    pal_diagnostic diag;
+    if (pal_study_file_parse("fuzz", (const char *)bytes, n_byte, &f, &diag)) return 0;
     const pal_study *s = &f->study;
     if (s->n_point < 0 || s->n_point > PAL_STUDY_POINTS || f->index < 0 || f->index >= PAL_BODY_MAX) abort();
     pal_study_order(s, order);

@@ -10,32 +10,33 @@ const tree = process.argv.slice(2).find((a) => !a.startsWith("--")) ?? path.join
 
 // rooms from the lowest floor up; rooms of one line do not see each other
 const floors = [
-  ["server/base", "protocol", "lcmtypes"],
-  ["server/num", "clients/link"],
-  ["server/mesh/geometry", "clients/haptic_bridge", "clients/lcm_bridge", "clients/trainee"],
-  ["server/mesh/files", "server/mesh/voxel"],
-  ["server/mesh/volume", "server/mesh/scan", "server/mesh/cells"],
-  ["server/sim/core"],
-  ["server/sim/springs", "server/sim/elements", "server/sim/surface", "server/sim/recovery"],
-  ["server/sim/subdivision", "server/sim/contact"],
-  ["server/sim/implicit"],
-  ["server/sim/solvers", "server/sim/models", "server/sim/effects"],
-  ["server/sim/plan"],
-  ["server/sim/world"],
-  ["server/sim/transfer"],
-  ["server/figure", "server/cli", "server/scene", "server/solve", "server/estimate"],
-  ["server/calibrate", "server/robustness", "server/session"],
-  ["server/study"],
-  ["server/net"],
-  ["server/bench", "server/commands"],
-  ["server"],
+    ["server/base", "protocol", "lcmtypes"],
+    ["server/num", "clients/link"],
+    ["server/mesh/geometry", "clients/haptic_bridge", "clients/lcm_bridge", "clients/trainee"],
+    ["server/mesh/files", "server/mesh/voxel"],
+    ["server/mesh/scan", "server/mesh/cells"],
+    ["server/mesh/volume"],
+    ["server/sim/core"],
+    ["server/sim/springs", "server/sim/elements", "server/sim/surface", "server/sim/recovery"],
+    ["server/sim/subdivision", "server/sim/contact"],
+    ["server/sim/implicit"],
+    ["server/sim/solvers", "server/sim/models", "server/sim/effects"],
+    ["server/sim/plan"],
+    ["server/sim/world"],
+    ["server/sim/transfer"],
+    ["server/figure", "server/cli", "server/scene", "server/solve", "server/estimate"],
+    ["server/calibrate", "server/robustness", "server/session"],
+    ["server/study"],
+    ["server/net"],
+    ["server/bench", "server/commands"],
+    ["server"],
 ];
 // what a room sees of the floors below it, where that is less than all
 const narrow = {
-  protocol: [],
-  "clients/link": ["protocol", "server/base", "lcmtypes"],
-  "clients/*": ["clients/link", "protocol", "server/base", "lcmtypes"],
-  "server/net": ["server/session", "server/sim/", "server/mesh/", "server/num", "protocol", "server/base"],
+    protocol: [],
+    "clients/link": ["protocol", "server/base", "lcmtypes"],
+    "clients/*": ["clients/link", "protocol", "server/base", "lcmtypes"],
+    "server/net": ["server/session", "server/sim/", "server/mesh/", "server/num", "protocol", "server/base"],
 };
 const level = new Map(floors.flatMap((rooms, i) => rooms.map((room) => [room, i])));
 const faults = [];
@@ -43,105 +44,109 @@ const fault = (file, text) => faults.push(`${file}: ${text}`);
 const ring_fault = (file, text) => rings_count && fault(file, text);
 
 const walk = (folder) =>
-  readdirSync(path.join(tree, folder), { withFileTypes: true }).flatMap((e) => {
-    const name = `${folder}/${e.name}`;
-    if (e.isDirectory()) return e.name === "node_modules" ? [] : walk(name);
-    return /\.[ch]$/.test(e.name) ? [name] : [];
-  });
+    readdirSync(path.join(tree, folder), { withFileTypes: true }).flatMap((e) => {
+        const name = `${folder}/${e.name}`;
+        if (e.isDirectory()) return e.name === "node_modules" ? [] : walk(name);
+        return /\.[ch]$/.test(e.name) ? [name] : [];
+    });
 const present = (folder) => statSync(path.join(tree, folder), { throwIfNoEntry: false });
 const files = ["server", "protocol", "clients"].filter(present).flatMap(walk).sort();
 
 function may(from, to) {
-  if (from === to) return true;
-  if (!level.has(from) || !level.has(to) || level.get(to) >= level.get(from)) return false;
-  const client = from.startsWith("clients/") && from !== "clients/link";
-  const seen = narrow[client ? "clients/*" : from];
-  if (seen) return seen.some((s) => to === s || (s.endsWith("/") && to.startsWith(s)));
-  return (
-    !to.startsWith("clients/") && to !== "lcmtypes" && (to !== "protocol" || level.get(from) >= level.get("server/net"))
-  );
+    if (from === to) return true;
+    if (!level.has(from) || !level.has(to) || level.get(to) >= level.get(from)) return false;
+    const client = from.startsWith("clients/") && from !== "clients/link";
+    const seen = narrow[client ? "clients/*" : from];
+    if (seen) return seen.some((s) => to === s || (s.endsWith("/") && to.startsWith(s)));
+    return (
+        !to.startsWith("clients/") &&
+        to !== "lcmtypes" &&
+        (to !== "protocol" || level.get(from) >= level.get("server/net"))
+    );
 }
 
 const includes = new Map(); // unit (path without extension) -> units it includes
 const unit = (file) => file.replace(/\.[ch]$/, "");
 let seen = 0;
 for (const file of files) {
-  const text = readFileSync(path.join(tree, file), "utf8");
-  const room = path.dirname(file);
-  if (!level.has(room)) fault(file, `the room ${room} has no floor`);
-  if (!includes.has(unit(file))) includes.set(unit(file), new Set());
-  for (const [, target] of text.matchAll(/^[ \t]*#[ \t]*include[ \t]*"([^"]*)"/gm)) {
-    seen++;
-    if (/^palpate_\w+_t\.h$|^lcmtypes\//.test(target)) {
-      if (!may(room, "lcmtypes")) fault(file, `includes "${target}": ${room} may not see lcmtypes`);
-      continue;
+    const text = readFileSync(path.join(tree, file), "utf8");
+    const room = path.dirname(file);
+    if (!level.has(room)) fault(file, `the room ${room} has no floor`);
+    if (!includes.has(unit(file))) includes.set(unit(file), new Set());
+    for (const [, target] of text.matchAll(/^[ \t]*#[ \t]*include[ \t]*"([^"]*)"/gm)) {
+        seen++;
+        if (/^palpate_\w+_t\.h$|^lcmtypes\//.test(target)) {
+            if (!may(room, "lcmtypes")) fault(file, `includes "${target}": ${room} may not see lcmtypes`);
+            continue;
+        }
+        if (!/^(server|protocol|clients)\//.test(target)) {
+            fault(file, `includes "${target}", which is not named from the top of the tree`);
+            continue;
+        }
+        const to = path.dirname(target);
+        if (!may(room, to)) fault(file, `includes "${target}": ${room} may not see ${to}`);
+        if (/^server\/sim\/(effects|solvers|models)$/.test(room) && target.endsWith(".c"))
+            fault(file, `includes "${target}": effects never see each other`);
+        if (unit(target) !== unit(file)) includes.get(unit(file)).add(unit(target));
     }
-    if (!/^(server|protocol|clients)\//.test(target)) {
-      fault(file, `includes "${target}", which is not named from the top of the tree`);
-      continue;
-    }
-    const to = path.dirname(target);
-    if (!may(room, to)) fault(file, `includes "${target}": ${room} may not see ${to}`);
-    if (/^server\/sim\/(effects|solvers|models)$/.test(room) && target.endsWith(".c"))
-      fault(file, `includes "${target}": effects never see each other`);
-    if (unit(target) !== unit(file)) includes.get(unit(file)).add(unit(target));
-  }
-  if (
-    file.startsWith("server/sim/") &&
-    /^[ \t]*#[ \t]*include[ \t]*<(cjson|pthread|threads|sys\/socket|libwebsockets|lcm|fcntl|sys\/stat)/m.test(text)
-  )
-    fault(file, "sim has no JSON, threads, sockets or files");
-  const lines = text.split("\n").length - 1;
-  if (lines > 700) fault(file, `${lines} lines, more than 700`);
+    if (
+        file.startsWith("server/sim/") &&
+        /^[ \t]*#[ \t]*include[ \t]*<(cjson|pthread|threads|sys\/socket|libwebsockets|lcm|fcntl|sys\/stat)/m.test(text)
+    )
+        fault(file, "sim has no JSON, threads, sockets or files");
+    const lines = text.split("\n").length - 1;
+    if (lines > 700) fault(file, `${lines} lines, more than 700`);
 }
 
 // rings: strongly connected units (Tarjan)
 const index = new Map(),
-  low = new Map(),
-  stack = [],
-  open = new Set();
+    low = new Map(),
+    stack = [],
+    open = new Set();
 let rings = 0;
 function visit(u) {
-  index.set(u, index.size);
-  low.set(u, index.get(u));
-  stack.push(u);
-  open.add(u);
-  for (const w of includes.get(u) ?? []) {
-    if (!includes.has(w)) continue;
-    if (!index.has(w)) visit(w);
-    if (open.has(w)) low.set(u, Math.min(low.get(u), low.get(w)));
-  }
-  if (low.get(u) !== index.get(u)) return;
-  const ring = [];
-  for (let w; w !== u; ) {
-    w = stack.pop();
-    open.delete(w);
-    ring.push(w);
-  }
-  if (ring.length < 2) return;
-  rings++;
-  ring_fault(ring.sort()[0], `a ring of ${ring.length} files that include each other: ${ring.join(" ")}`);
+    index.set(u, index.size);
+    low.set(u, index.get(u));
+    stack.push(u);
+    open.add(u);
+    for (const w of includes.get(u) ?? []) {
+        if (!includes.has(w)) continue;
+        if (!index.has(w)) visit(w);
+        if (open.has(w)) low.set(u, Math.min(low.get(u), low.get(w)));
+    }
+    if (low.get(u) !== index.get(u)) return;
+    const ring = [];
+    for (let w; w !== u; ) {
+        w = stack.pop();
+        open.delete(w);
+        ring.push(w);
+    }
+    if (ring.length < 2) return;
+    rings++;
+    ring_fault(ring.sort()[0], `a ring of ${ring.length} files that include each other: ${ring.join(" ")}`);
 }
 for (const u of includes.keys()) if (!index.has(u)) visit(u);
 
 // a name stands once in the tree; a folder has about 20 .c files
 const names = new Map(),
-  folders = new Map();
+    folders = new Map();
 for (const file of files) {
-  const name = path.basename(file);
-  if (name === "main.c") continue;
-  if (names.has(name)) fault(file, `the name stands more than once in the tree: ${names.get(name)}`);
-  names.set(name, file);
-  if (/_parts\.h$/.test(name))
-    ring_fault(file, "a header of parts: a room has a core that knows nobody, and files that know the core");
-  if (name.endsWith(".c")) folders.set(path.dirname(file), (folders.get(path.dirname(file)) ?? 0) + 1);
+    const name = path.basename(file);
+    if (name === "main.c") continue;
+    if (names.has(name)) fault(file, `the name stands more than once in the tree: ${names.get(name)}`);
+    names.set(name, file);
+    if (/_parts\.h$/.test(name))
+        ring_fault(file, "a header of parts: a room has a core that knows nobody, and files that know the core");
+    if (name.endsWith(".c")) folders.set(path.dirname(file), (folders.get(path.dirname(file)) ?? 0) + 1);
 }
 for (const [folder, n] of folders) if (n > 22) fault(folder, `${n} .c files, more than 22`);
 
 // the top level holds what README.md says and nothing else
 for (const entry of readdirSync(tree))
-  if (!/^(\..*|CMakeLists\.txt|LICENSE|README\.md|clients|deploy|lcmtypes|protocol|server|tests|build.*)$/.test(entry))
-    fault(entry, "does not belong on the top level");
+    if (
+        !/^(\..*|CMakeLists\.txt|LICENSE|README\.md|clients|deploy|lcmtypes|protocol|server|tests|build.*)$/.test(entry)
+    )
+        fault(entry, "does not belong on the top level");
 
 for (const line of faults) console.log(line);
 console.log(`floors: ${seen} includes checked, ${rings} rings, ${faults.length} faults`);

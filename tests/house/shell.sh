@@ -1,6 +1,6 @@
 # Shared by the shell tests of commands: a folder of their own, named checks, what a run said. Sourced; the test then
 # defines `run ARGS...`, which leaves out, err (files) and code.
-passed=0 failed=0 bad=0
+passed=0 failed=0 skipped=0 bad=0
 problems=$(realpath "$(dirname "$0")/../../deploy/problems")
 dir=$(mktemp -d) || exit 2
 trap 'rm -rf "$dir"' EXIT
@@ -11,7 +11,7 @@ begin() { name=$1 bad=0; }
 long() {
     name=$1
     [ -n "${PAL_SANITIZED-}" ] || return 0
-    echo "left out under sanitizers: $1"
+    echo "not in this build: $1"
     return 1
 }
 check() { # check SENTENCE CONDITION...: the condition is a command
@@ -31,9 +31,14 @@ end() {
         tail -n 30 err | sed 's/^/    err: /'
     fi
 }
-finish() { # the last line of a test, and its exit code
-    echo "$passed passed, $failed failed"
-    [ "$failed" -eq 0 ]
+skip() { # NAME REASON: data or a program that the test needs is not there
+    skipped=$((skipped + 1))
+    echo "SKIP $1: $2"
+}
+finish() { # the last line of a test, and its exit code: 77 when a part was skipped
+    echo "$passed passed, $failed failed, $skipped skipped"
+    [ "$failed" -eq 0 ] || return 1
+    [ "$skipped" -eq 0 ] || return 77
 }
 code_is() { [ "$code" -eq "$1" ]; }
 lines() { wc -l <"$1" | tr -d ' '; }

@@ -8,7 +8,7 @@
 #include <float.h>
 
 enum { N = 3, POINTS = 700 };
-static pal_note note;
+static pal_diagnostic diag;
 static char path[] = "/tmp/palpate_journal_XXXXXX";
 
 static void point(uint64_t key, double theta[N])
@@ -24,9 +24,9 @@ static double cost_of(int i)
 static pal_journal *open_one(uint64_t problem)
 {
     pal_journal *j = NULL;
-    note.text[0] = 0;
-    if (pal_journal_open(path, &j, &note)) return NULL;
-    if (!pal_journal_begin(j, problem, N, &note)) return j;
+    diag.text[0] = 0;
+    if (pal_journal_open(path, &j, &diag)) return NULL;
+    if (!pal_journal_begin(j, problem, N, &diag)) return j;
     pal_journal_close(j);
     return NULL;
 }
@@ -56,15 +56,15 @@ static void what_was_put_is_found_again(void)
     CHECK(!pal_journal_find(j, theta, &cost));
     for (int i = 0; i < POINTS; i++) {
         point((uint64_t)i, theta);
-        CHECK_INT(pal_journal_put(j, theta, cost_of(i), &note), 0);
-        CHECK_INT(pal_journal_put(j, theta, 1, &note), 0); /* there already */
+        CHECK_INT(pal_journal_put(j, theta, cost_of(i), &diag), 0);
+        CHECK_INT(pal_journal_put(j, theta, 1, &diag), 0); /* there already */
     }
     CHECK_INT(pal_journal_count(j), POINTS);
     /* another problem in the same file, of the same points */
-    CHECK_INT(pal_journal_begin(j, 6, N, &note), 0);
+    CHECK_INT(pal_journal_begin(j, 6, N, &diag), 0);
     CHECK_INT(pal_journal_count(j), 0);
     CHECK(!pal_journal_find(j, theta, &cost));
-    CHECK_INT(pal_journal_put(j, theta, 4, &note), 0);
+    CHECK_INT(pal_journal_put(j, theta, 4, &diag), 0);
     pal_journal_close(j);
     j = open_one(5);
     REQUIRE(j);
@@ -83,8 +83,8 @@ static void only_one_process_writes(void)
 {
     pal_journal *j = open_one(5), *other = NULL;
     REQUIRE(j);
-    CHECK_INT(pal_journal_open(path, &other, &note), PAL_ERR_STATE);
-    CHECK(strstr(note.text, "another calibration is writing there"));
+    CHECK_INT(pal_journal_open(path, &other, &diag), PAL_ERR_STATE);
+    CHECK(strstr(diag.text, "another calibration is writing there"));
     CHECK(other == NULL);
     pal_journal_close(j);
     j = open_one(5);
@@ -106,11 +106,11 @@ static void a_torn_end_is_cut_off(void)
         for (size_t i = 0; i < cut; i++) whole += text[i] == '\n';
         put_contents(text, cut);
         pal_journal *j = open_one(5);
-        if (!j) CHECK_FAIL("cut at byte %zu: %s", cut, note.text);
+        if (!j) CHECK_FAIL("cut at byte %zu: %s", cut, diag.text);
         REQUIRE(j);
         CHECK_INT(pal_journal_count(j), whole > 0 ? whole - 1 : 0);
         point(POINTS + 1, theta);
-        CHECK_INT(pal_journal_put(j, theta, 0.25, &note), 0);
+        CHECK_INT(pal_journal_put(j, theta, 0.25, &diag), 0);
         pal_journal_close(j);
         j = open_one(5);
         REQUIRE(j);
@@ -137,7 +137,7 @@ static void damage_is_named_with_its_line(void)
             put_contents(text, n);
             pal_journal *j = open_one(5);
             CHECK(!j);
-            if (!strstr(note.text, want)) CHECK_FAIL("byte %zu: \"%s\" does not say \"%s\"", at, note.text, want);
+            if (!strstr(diag.text, want)) CHECK_FAIL("byte %zu: \"%s\" does not say \"%s\"", at, diag.text, want);
             still = contents(&after);
             CHECK(after == n && !memcmp(text, still, n));
             free(still);
@@ -167,13 +167,13 @@ static void lines_that_hold_other_things_are_refused(void)
         snprintf(text, sizeof text, "palpate journal 1\n%s%016llx\n", want[k].line, check);
         put_contents(text, strlen(text));
         CHECK(!open_one(5));
-        if (!strstr(note.text, want[k].sentence)) CHECK_FAIL("\"%s\" for \"%s\"", note.text, want[k].line);
+        if (!strstr(diag.text, want[k].sentence)) CHECK_FAIL("\"%s\" for \"%s\"", diag.text, want[k].line);
     }
     put_contents("palpate journal 1\n\n", 19);
     CHECK(!open_one(5));
     pal_journal *j = NULL;
-    CHECK_INT(pal_journal_open("/nowhere/at/all.txt", &j, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/nowhere/at/all.txt: cannot be opened"));
+    CHECK_INT(pal_journal_open("/nowhere/at/all.txt", &j, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/nowhere/at/all.txt: cannot be opened"));
 }
 
 int main(void)

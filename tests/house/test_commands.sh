@@ -67,7 +67,11 @@ check "units given, not guessed" has out '"units":{"name":"mm","m":0.001,"guesse
 end
 
 begin "tetgen finds the mesh consistent"
+end
+
+name="tetgen reads the mesh"
 if command -v tetgen >/dev/null 2>&1; then
+    begin "$name"
     # as a mesh: read back and checked; as a boundary: no facet cuts another
     (cd scene2 && tetgen -rC box.node) >tetgen.out 2>&1
     check "tetgen -rC does not read it as it is" has tetgen.out "Mesh tetrahedra: $(head -1 scene2/box.ele | cut -d' ' -f1)\$"
@@ -77,10 +81,10 @@ if command -v tetgen >/dev/null 2>&1; then
     } >box.smesh
     tetgen -d box.smesh >tetgen.out 2>&1
     check "tetgen -d finds intersections" has tetgen.out "No faces are intersecting"
+    end
 else
-    echo "  left out: tetgen is not there"
+    skip "$name" "the program tetgen is not there"
 fi
-end
 
 begin "the unit is said, guessed or not"
 scaled_by() { awk -v k="$1" '$1 == "v" { $2 *= k; $3 *= k; $4 *= k } { print }' box.obj; }
@@ -108,6 +112,44 @@ run prepare --procedural -o organ --triangles 4000 --no-tetgen --name my-organ -
 check "exit code $code" code_is 0
 check "no title in the scene" has organ/scene.json "My organ"
 check "TetGen files in spite of --no-tetgen" test "$(ls -A organ | wc -l)" -eq 2
+end
+
+# box.obj and a copy of it, scaled and moved up by so many millimetres
+above() { # above SCALE MM
+    cat box.obj
+    awk -v by="$1" -v up="$2" '$1 == "v" { print "v", by * $2, by * $3, by * $4 + up }
+                               $1 == "f" { print "f", $2 + 8, $3 + 8, $4 + 8, $5 + 8 }' box.obj
+}
+
+begin "a component that nothing holds is dropped when small and told, in words and in JSON"
+above 0.1 90 >dust.obj
+run prepare dust.obj -o dust --no-tetgen --units mm --model fem --resolution 10
+check "exit code $code" code_is 0
+check "not told" has out 'body "dust": dropped 1 of 2 components, 1 ml of 481 ml (0.21 %): small and without support'
+check "more than one component" has out ", 1 component, "
+run prepare dust.obj -o dust2 --no-tetgen --units mm --model fem --resolution 10 --json
+check "no figures" has out '"loose_components":1,"loose_m3":9.99'
+check "more than one component" has out '"components":1,'
+run prepare box.obj -o dust3 --no-tetgen --json
+check "something dropped of a box" has out '"loose_components":0,"loose_m3":0'
+end
+
+begin "a large one is refused by a sentence that names file, body and number, and --largest keeps the other"
+above 0.5 90 >stack.obj
+run prepare stack.obj -o stack --no-tetgen --units mm --model fem --resolution 12
+check "exit code $code" code_is 1
+check "not one line" lines_are err 1
+check "no file and body" has err 'stack.obj: line 9: body "stack": 1 of 2 components has no support'
+check "no way out" has err "by a support, or keep only the largest one (--largest"
+check "a folder was left" test ! -e stack
+run prepare stack.obj -o stack --no-tetgen --units mm --model fem --resolution 12 --largest
+check "exit code $code" code_is 0
+check "more than one component" has out ", 1 component, "
+run plan stack.obj
+check "exit code $code of another command" code_is 1
+check "no file and body" has err 'stack.obj: line 9: body "stack": 1 of 2 components has no support'
+run plan dust.obj
+check "exit code $code of another command" code_is 0
 end
 
 begin "the same input gives the same files"
@@ -445,9 +487,9 @@ refused 2 "either a file or --procedural"
 check "a folder was made" no_such x
 end
 
-begin "a stomach and a sphere of the shared models adapt"
 shared=${PAL_SHARED:-$here/../../../shared}/data
 if [ -e "$shared/stomach_188.obj" ] && [ -e "$shared/sphere_114.obj" ]; then
+    begin "a stomach and a sphere of the shared models adapt"
     run prepare "$shared/stomach_188.obj" -o x --model adaptive --json
     check "exit code $code" code_is 0
     check "stomach" has out '"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
@@ -458,10 +500,10 @@ if [ -e "$shared/stomach_188.obj" ] && [ -e "$shared/sphere_114.obj" ]; then
     refused 1 "dragon_11k.ply: byte [0-9]*: levels: 4 triangles"
     check "a folder was made" no_such y
     rm -rf x
+    end
 else
-    echo "  left out: $shared is not there"
+    skip "a stomach and a sphere of the shared models adapt" "$shared is not there"
 fi
-end
 
 # ---- wrong usage ----
 begin "wrong flags are refused by name with exit code 2"

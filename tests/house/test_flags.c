@@ -156,30 +156,30 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
     pal_config_default(&config);
     pal_config before = config;
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
-        pal_note note = {""};
-        CHECK_INT(pal_config_parse(&config, "c.json", bad[k].json, strlen(bad[k].json), &note), PAL_ERR_REFUSED);
-        CHECK_TEXT(note.text, bad[k].sentence);
+        pal_diagnostic diag = {""};
+        CHECK_INT(pal_config_parse(&config, "c.json", bad[k].json, strlen(bad[k].json), &diag), PAL_ERR_REFUSED);
+        CHECK_TEXT(diag.text, bad[k].sentence);
         CHECK(!memcmp(&before, &config, sizeof config));
     }
     char *variable[] = {"HOME=/", "PALPATE_MOST_CLIENTS=5", "PALPATE_PORT=70000", NULL};
-    pal_note note = {""};
-    CHECK_INT(pal_config_environment(&config, variable, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "PALPATE_PORT: 70000 is outside 0 .. 65535");
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_config_environment(&config, variable, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "PALPATE_PORT: 70000 is outside 0 .. 65535");
     CHECK_INT(config.most_clients, 200);
 }
 
 static void long_texts_are_refused(void)
 {
     char long_text[400];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(long_text, 'a', sizeof long_text - 1);
     long_text[sizeof long_text - 1] = 0;
     pal_config_default(&config);
-    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "--viewer: 399 bytes of text, more than 255");
-    CHECK_INT(pal_config_set(&config, "log", long_text, "--log", &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "--viewer: 399 bytes of text, more than 255");
+    CHECK_INT(pal_config_set(&config, "log", long_text, "--log", &diag), PAL_ERR_REFUSED);
     long_text[255] = 0;
-    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &note), 0);
+    CHECK_INT(pal_config_set(&config, "viewer", long_text, "--viewer", &diag), 0);
     CHECK_INT(strlen(config.viewer), 255);
 }
 

@@ -15,7 +15,6 @@ mkdir -p "$PAL_SHARED/reference"
 fresh() { # a clean tree, and a run that recorded what the tree keeps
     rm -rf "$tree" "$run"
     mkdir -p "$tree/tests/stability" "$run"
-    cp "$top/README.md" "$tree"
     cp "$top/tests/stability/make_table.sh" "$top/tests/stability/catalogue.txt" "$top/tests/stability/records.tsv" \
         "$tree/tests/stability"
     {
@@ -65,9 +64,6 @@ fresh
 sed -i '/^contrast/d' "$run/test_all.tsv"
 verdict "a line that no test records is found" 1
 fresh
-sed -i 's/^\(| all nodes on one point |\)[^|]*|/\1 0.01 (1.5) |/' "$tree/README.md"
-verdict "a cell of the first page by hand is found" 1
-fresh
 sed -i '/^| no_density | fem/d' "$tree/tests/stability/README.md"
 verdict "a row that is gone is found" 1
 fresh
@@ -75,6 +71,6 @@ sed -i '/^mirror\tfem/d' "$tree/tests/stability/records.tsv"
 verdict "a case without a record of one model is found" 1
 fresh
 rm "$run/test_all.tsv"
-verdict "records of a run that was not are left out" 0
+verdict "records of a run that was not are skipped" 77
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]

@@ -23,7 +23,7 @@ static pal_err add(pal_study_journal *j, int k)
 {
     double value[100];
     pal_study_answer answer = {.err = k == 3 ? PAL_ERR_NUMERIC : PAL_ERR_OK, .n_node = 100 * k};
-    if (k == 3) snprintf(answer.why, sizeof answer.why, "no rest after 120 Newton iterations");
+    if (k == 3) snprintf(answer.reason, sizeof answer.reason, "no rest after 120 Newton iterations");
     for (int i = 0; i < length(k); i++) value[i] = number(k, i);
     return pal_study_journal_add(j, 1000 + (uint64_t)k, &answer, value, length(k));
 }
@@ -37,15 +37,15 @@ static void check_record(const pal_study_journal *j, int k)
     CHECK(!memcmp(value, should, sizeof *value * (size_t)length(k)));
     CHECK_INT(answer.n_node, 100 * k);
     CHECK(answer.err == (k == 3 ? PAL_ERR_NUMERIC : PAL_ERR_OK));
-    CHECK((strstr(answer.why, "Newton") != NULL) == (k == 3));
+    CHECK((strstr(answer.reason, "Newton") != NULL) == (k == 3));
     CHECK(!pal_study_journal_find(j, 1000 + (uint64_t)k, &answer, value, length(k) + 3));
 }
 
 static pal_study_journal *open_it(uint64_t of, bool again)
 {
     pal_study_journal *j = NULL;
-    pal_note note = {""};
-    if (pal_study_journal_open(path, of, again, &j, &note)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_study_journal_open(path, of, again, &j, &diag)) CHECK_FAIL("%s", diag.text);
     return j;
 }
 
@@ -129,9 +129,9 @@ static void a_byte_that_was_changed_ends_it_there(void)
     }
     /* where nothing can be written it says so */
     pal_study_journal *j = NULL;
-    pal_note note = {""};
-    CHECK(pal_study_journal_open("/nowhere/study.reference", 7, false, &j, &note) == PAL_ERR_IO && !j);
-    CHECK(strstr(note.text, "/nowhere/study.reference") != NULL);
+    pal_diagnostic diag = {""};
+    CHECK(pal_study_journal_open("/nowhere/study.reference", 7, false, &j, &diag) == PAL_ERR_IO && !j);
+    CHECK(strstr(diag.text, "/nowhere/study.reference") != NULL);
 }
 
 int main(void)

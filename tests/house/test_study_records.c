@@ -21,8 +21,8 @@ static const record records[] = {
 static pal_study_file *read_record(const record *r)
 {
     pal_study_file *file = NULL;
-    pal_note why = {{0}};
-    if (pal_study_file_read(r->path, &file, &why)) CHECK_FAIL("%s", why.text);
+    pal_diagnostic reason = {{0}};
+    if (pal_study_file_read(r->path, &file, &reason)) CHECK_FAIL("%s", reason.text);
     return file;
 }
 
@@ -68,11 +68,11 @@ static void the_front_and_what_is_picked_are_of_these_numbers(void)
     }
     int near = pal_study_pick(s, 1e-4, NAN), fast = pal_study_pick(s, NAN, 0.05);
     REQUIRE(near >= 0 && fast >= 0);
-    const pal_priced_setting *p = &s->point[near].priced, *q = &s->point[fast].priced;
+    const pal_measured_configuration *p = &s->point[near].priced, *q = &s->point[fast].priced;
     CHECK(p->front && p->error_m + s->reference_m <= 1e-4 && q->ms <= 0.05);
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *o = &s->point[i];
-        if (o->err || o->why[0]) continue;
+        if (o->err || o->reason[0]) continue;
         CHECK(o->priced.error_m + s->reference_m > 1e-4 || o->priced.ms >= p->ms);
         CHECK(o->priced.ms > 0.05 || o->priced.error_m >= q->error_m);
     }

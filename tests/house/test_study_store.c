@@ -31,14 +31,14 @@ static pal_study_file *random_file(int n)
     snprintf(s->name, sizeof s->name, "liver");
     snprintf(s->machine, sizeof s->machine, "Some processor \"x\", 2 cores");
     snprintf(s->reference, sizeof s->reference, "fem hex8_bbar, 48 voxels \xc2\xb1");
-    s->reference_m = random_size(), s->most_m = random_size(), s->size_m = NAN, s->step_s = 1.0 / 60;
+    s->reference_m = random_size(), s->max_m = random_size(), s->length_scale_m = NAN, s->step_s = 1.0 / 60;
     snprintf(f->body, sizeof f->body, "the liver");
     snprintf(f->shape, sizeof f->shape, "0123456789abcdef");
     snprintf(f->loads, sizeof f->loads, "three presses, 0.5 s");
     snprintf(f->digest, sizeof f->digest, "fedcba9876543210");
     snprintf(f->methods, sizeof f->methods, "fem,tet_springs");
     snprintf(f->command, sizeof f->command, "palpate study 'a b' --quick");
-    f->index = 3, f->n_all = 200, f->whole = false;
+    f->index = 3, f->n_finest = 200, f->whole = false;
     s->n_point = n;
     for (int k = 0; k < n; k++) {
         pal_study_point *p = &s->point[k];
@@ -55,7 +55,7 @@ static pal_study_file *random_file(int n)
         p->priced.error_m = measured ? random_size() : NAN;
         p->priced.front = measured && k % 5 == 0;
         p->err = measured ? PAL_ERR_OK : PAL_ERR_BUDGET;
-        if (!measured) snprintf(p->why, sizeof p->why, "needs 8,000 sub-steps, \"2,000\" are allowed");
+        if (!measured) snprintf(p->reason, sizeof p->reason, "needs 8,000 sub-steps, \"2,000\" are allowed");
         p->n_node = 100 * k, p->n_substep = k % 30;
         p->ms_p95 = random_size() * 1e-12, p->static_rms_m = random_size(), p->static_most_m = random_size();
         p->way_rms_m = random_size(), p->way_most_m = k % 11 ? random_size() : NAN, p->prepare_s = random01();
@@ -75,12 +75,12 @@ static char *slurp(size_t *n)
 
 static void every_number_comes_back_with_its_bits(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_study_file *in = random_file(PAL_STUDY_POINTS), *out = NULL;
     REQUIRE(in);
-    pal_err err = pal_study_file_write(in, path, &note);
-    if (!err) err = pal_study_file_read(path, &out, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_study_file_write(in, path, &diag);
+    if (!err) err = pal_study_file_read(path, &out, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_INT(out->study.n_point, PAL_STUDY_POINTS);
     /* both come from calloc, so that what lies between the fields is zero in both */
@@ -91,7 +91,7 @@ static void every_number_comes_back_with_its_bits(void)
     /* and a second time the same bytes */
     size_t n[2] = {0};
     char *first = slurp(&n[0]);
-    CHECK_INT(pal_study_file_write(out, path, &note), 0);
+    CHECK_INT(pal_study_file_write(out, path, &diag), 0);
     char *second = slurp(&n[1]);
     REQUIRE(first && second);
     CHECK_INT(n[0], n[1]);
@@ -106,9 +106,9 @@ static void every_number_comes_back_with_its_bits(void)
 static char *with(const char *old, const char *new)
 {
     size_t n;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_study_file *f = random_file(2);
-    if (!f || pal_study_file_write(f, path, &note)) return NULL;
+    if (!f || pal_study_file_write(f, path, &diag)) return NULL;
     free(f);
     char *text = slurp(&n), *at = text ? strstr(text, old) : NULL;
     char *out = at ? malloc(n + strlen(new) + 1) : NULL;
@@ -145,12 +145,12 @@ static void what_is_no_study_is_refused_by_its_place(void)
         {"\"points\":\t[", "\"points\": [4, ", "points[0]: is not an object"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_study_file *out = NULL;
         char *text = with(bad[k].old, bad[k].new);
         REQUIRE(text);
-        CHECK_INT(pal_study_file_parse("s.json", text, strlen(text), &out, &note), PAL_ERR_REFUSED);
-        if (!strstr(note.text, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, bad[k].sentence);
+        CHECK_INT(pal_study_file_parse("s.json", text, strlen(text), &out, &diag), PAL_ERR_REFUSED);
+        if (!strstr(diag.text, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, bad[k].sentence);
         CHECK(out == NULL);
         free(text);
     }
@@ -168,9 +168,9 @@ static void what_is_no_study_is_refused_by_its_place(void)
 static void points_are_listed_by_what_they_cost(void)
 {
     pal_study_file *f = random_file(100);
-    static pal_priced_setting list[PAL_STUDY_POINTS];
+    static pal_measured_configuration list[PAL_STUDY_POINTS];
     int order[PAL_STUDY_POINTS], seen[100] = {0}, measured = 0;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(f);
     pal_study_order(&f->study, order);
     for (int k = 0; k < 100; k++) seen[order[k]]++;
@@ -184,7 +184,7 @@ static void points_are_listed_by_what_they_cost(void)
         CHECK_NEAR(list[k].error_m, f->study.point[order[k]].priced.error_m, 0);
     }
     /* the table has a row each, in that order */
-    CHECK_INT(pal_study_file_csv(f, path, &note), 0);
+    CHECK_INT(pal_study_file_csv(f, path, &diag), 0);
     size_t n;
     char *text = slurp(&n), *save = NULL;
     REQUIRE(text);
@@ -212,8 +212,8 @@ static void a_study_is_of_a_body_whatever_its_setting(void)
     char first[PAL_STUDY_SHAPE], other[PAL_STUDY_SHAPE];
     pal_body_default(&body, "it", &mesh);
     CHECK_INT(strlen(pal_study_shape(&body, first)), 16);
-    pal_item_init(&body.model, "model", "fem");
-    pal_item_init(&body.solver, "solver", "sdirk2");
+    pal_entry_init(&body.model, "model", "fem");
+    pal_entry_init(&body.solver, "solver", "sdirk2");
     mesh.tets.n_tet = 7;
     CHECK_TEXT(pal_study_shape(&body, other), first);
     body.material.poisson = nextafter(body.material.poisson, 1);
@@ -248,14 +248,14 @@ static void files_have_their_place_beside_the_scene(void)
         {".hidden", NULL, ".hidden_study"},
     };
     char stem[PAL_STUDY_PATH], far[PAL_STUDY_PATH + 10];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     for (size_t k = 0; k < sizeof good / sizeof *good; k++) {
-        CHECK_INT(pal_study_stem(good[k].word, good[k].folder, stem, &note), 0);
+        CHECK_INT(pal_study_stem(good[k].word, good[k].folder, stem, &diag), 0);
         CHECK_TEXT(stem, good[k].stem);
     }
     memset(far, 'a', sizeof far - 1);
     far[sizeof far - 1] = 0;
-    CHECK_INT(pal_study_stem(far, NULL, stem, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_study_stem(far, NULL, stem, &diag), PAL_ERR_REFUSED);
     CHECK(pal_study_method_in("", "fem") && pal_study_method_in("tet_springs,fem", "fem"));
     CHECK(!pal_study_method_in("tet_springs,femur", "fem") && pal_study_method_in("fem", "fem"));
     CHECK(!pal_study_method_in("tet_springs", "tet"));
@@ -264,7 +264,7 @@ static void files_have_their_place_beside_the_scene(void)
 /* the head of the page has room for 127 bytes: whole parts of a description, never half a word */
 static void a_written_scene_says_how_far_off_it_is_in_whole_words(void)
 {
-    static pal_study study = {.most_m = 0.0078};
+    static pal_study study = {.max_m = 0.0078};
     char text[128];
     snprintf(study.reference, sizeof study.reference,
              "fem hex8_bbar corotational, 40 voxels, static_newton, tolerance 1e-06, 15111 nodes, 2 tries");

@@ -55,7 +55,7 @@ done
 end
 
 begin "springs that may not untangle collapse on a point, which is told apart"
-altered springs tangled 's/"tet_springs"/"tet_springs", "untangle": false/' '"untangle": false'
+altered springs tangled 's/"tet_springs"/"tet_springs", "recover": false/' '"recover": false'
 gives 0 tangled --only point --seconds 12
 check "counts" has out "^0 passed, 1 collapsed, 0 failed, 0 undecided, 0 do not apply"
 check "it is collapsed" has out "point  *collapsed .*a reset brings it back"

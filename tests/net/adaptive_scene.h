@@ -4,7 +4,7 @@
 #ifndef TESTS_NET_ADAPTIVE_SCENE_H
 #define TESTS_NET_ADAPTIVE_SCENE_H
 #include "server/mesh/geometry/stomach.h"
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 #include "tests/check.h"
 
 enum {
@@ -30,20 +30,20 @@ static inline bool adaptive_scene_make(adaptive_scene *s, adaptive_weather weath
     s->scene.n_body = 1;
     pal_body_def *def = &s->scene.body[0];
     pal_body_default(def, "sphere", &s->mesh);
-    pal_item_init(&def->model, "model", "adaptive_springs");
+    pal_entry_init(&def->model, "model", "adaptive_springs");
     def->n_effect = 0;
-    pal_item_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
     pal_tools_default(&s->scene, 1);
-    bool good = !pal_item_put_number(&def->model, "levels", ADAPTIVE_LEVELS, NULL);
+    bool good = !pal_entry_put_number(&def->model, "levels", ADAPTIVE_LEVELS, NULL);
     s->scene.gravity_m_s2 = weather == ADAPTIVE_STORM ? 9.81 : weather == ADAPTIVE_CALM ? 2 : 0;
     if (weather == ADAPTIVE_WEIGHTLESS)
-        good = good && !pal_item_put_number(&def->model, "start_level", ADAPTIVE_LEVELS - 1, NULL);
+        good = good && !pal_entry_put_number(&def->model, "start_level", ADAPTIVE_LEVELS - 1, NULL);
     if (weather == ADAPTIVE_WEIGHTLESS) return good;
-    pal_item *refine = &def->effect[def->n_effect++];
-    pal_item_init(refine, "effects[1]", "refine");
-    return good && !pal_item_put_number(refine, "speed_m_s", weather == ADAPTIVE_STORM ? 0.02 : 0.008, NULL) &&
-           !pal_item_put_number(refine, "curvature_1_m", 0, NULL) &&
-           !pal_item_put_number(refine, "dwell_s", 0.05, NULL);
+    pal_config_entry *refine = &def->effect[def->n_effect++];
+    pal_entry_init(refine, "effects[1]", "refine");
+    return good && !pal_entry_put_number(refine, "speed_m_s", weather == ADAPTIVE_STORM ? 0.02 : 0.008, NULL) &&
+           !pal_entry_put_number(refine, "curvature_1_m", 0, NULL) &&
+           !pal_entry_put_number(refine, "dwell_s", 0.05, NULL);
 }
 
 static inline void adaptive_scene_free(adaptive_scene *s)

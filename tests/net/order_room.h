@@ -5,9 +5,9 @@
 #include "tests/net/served.h"
 
 /* of body 0 */
-static inline void order_begin(const pal_scene *scene, const pal_priced_setting *point, int n_point)
+static inline void order_begin(const pal_scene *scene, const pal_measured_configuration *point, int n_point)
 {
-    static const pal_priced_setting *list[1];
+    static const pal_measured_configuration *list[1];
     static int n[1], body[1];
     list[0] = point, n[0] = n_point, body[0] = 0;
     served_begin(scene, (pal_session_options){0},
@@ -82,9 +82,9 @@ static inline const pal_wire_part_info *part(const mem_client *c)
                                            : &c->last[PAL_CONTROL_HELLO].hello.part[0];
 }
 
-static inline void order_point(pal_priced_setting *to, const char *model, const char *element, int size)
+static inline void order_point(pal_measured_configuration *to, const char *model, const char *element, int size)
 {
-    pal_setting *s = &to->setting;
+    pal_configuration *s = &to->setting;
     snprintf(s->model, sizeof s->model, "%s", model);
     snprintf(s->element, sizeof s->element, "%s", element);
     s->size = size;

@@ -16,18 +16,18 @@ static uint64_t now_ns;
 
 static inline void served_session(const pal_scene *scene, pal_session_options options)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
     options.lease_s = 60, options.wake = pal_server_gate_wake, options.user = gate;
-    if (pal_session_open(scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_session_open(scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
 }
 
 /* the session that is there */
 static inline void served_open(pal_server_options net)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     net.road = "mem";
-    if (pal_server_open(&net, &session, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    if (pal_server_open(&net, &session, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
     pal_server_connect(server, gate);
     road = pal_server_transport(server);
     now_ns = 1000000000ull;

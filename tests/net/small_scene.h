@@ -2,7 +2,7 @@
 #ifndef TESTS_NET_SMALL_SCENE_H
 #define TESTS_NET_SMALL_SCENE_H
 #include "server/mesh/geometry/organ.h"
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 #include "tests/check.h"
 
 typedef struct small_scene {
@@ -15,12 +15,12 @@ static inline bool small_scene_make(small_scene *s, const char *name)
     pal_surface surface;
     pal_voxel_options options = {.resolution = CHECK_REPEATS(6, 4), .border = true};
     pal_prepare_report report;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(s, 0, sizeof *s);
     if (pal_organ_make(CHECK_REPEATS(1500, 600), &surface)) return false;
-    pal_err err = pal_prepared_make(&surface, &options, &s->mesh, &report, &note);
+    pal_err err = pal_prepared_make(&surface, &options, &s->mesh, &report, &diag);
     pal_surface_free(&surface);
-    if (err) printf("  no scene: %s\n", note.text);
+    if (err) printf("  no scene: %s\n", diag.text);
     pal_scene_default(&s->scene);
     snprintf(s->scene.name, sizeof s->scene.name, "%s", name);
     snprintf(s->scene.title, sizeof s->scene.title, "Small \"organ\"");

@@ -5,7 +5,7 @@
 
 static small_scene organ;
 enum { POINTS = 5 };
-static pal_priced_setting setting[POINTS];
+static pal_measured_configuration setting[POINTS];
 
 /* as a study keeps them, by ascending ms; point 2 is what the scene has, point 3 was not measured */
 static void make_points(void)
@@ -15,17 +15,17 @@ static void make_points(void)
     for (int i = 0; i < POINTS; i++) {
         setting[i].ms = ms[i], setting[i].error_m = error_m[i];
         setting[i].front = i != 1 && i != 3;
-        pal_setting_of(&organ.scene, 0, &setting[i].setting);
+        pal_configuration_of(&organ.scene, 0, &setting[i].setting);
         setting[i].setting.size = 7 + 2 * i;
     }
-    pal_setting_of(&organ.scene, 0, &setting[2].setting);
+    pal_configuration_of(&organ.scene, 0, &setting[2].setting);
     snprintf(setting[4].setting.model, sizeof setting[4].setting.model, "fem");
     snprintf(setting[4].setting.element, sizeof setting[4].setting.element, "hex8_bbar");
 }
 
 static void begin(bool with_study)
 {
-    static const pal_priced_setting *list[1];
+    static const pal_measured_configuration *list[1];
     static int n_setting[1] = {POINTS}, body[1] = {0};
     static double reference_m[1] = {3e-4};
     list[0] = setting;
@@ -119,21 +119,21 @@ static void without_a_study_there_is_the_estimate_alone(void)
 static void neighbours_are_priced_once(void)
 {
     pal_body_def *def = &organ.scene.body[0], *was = malloc(sizeof *was);
-    pal_setting now;
+    pal_configuration now;
     mem_client ada;
     int n_step = 0, n_size = 0;
     REQUIRE(was);
     *was = *def;
     def->n_effect = 0;
-    pal_item_init(&def->model, "model", "fem");
-    pal_item_init(&def->solver, "solver", "implicit_euler");
+    pal_entry_init(&def->model, "model", "fem");
+    pal_entry_init(&def->solver, "solver", "implicit_euler");
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     mem_text(&ada, LOOK(1));
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
     UNTIL(e->n_neighbour >= 2 && e->ms > 0, &ada, NULL);
     double step_ms = 1e3 * organ.scene.step_s;
-    pal_setting_of(&organ.scene, 0, &now);
+    pal_configuration_of(&organ.scene, 0, &now);
     for (uint32_t i = 0; i < e->n_neighbour; i++) {
         const pal_wire_neighbour *near = &e->neighbour[i];
         bool step = !strcmp(near->knob, "step"), size = !strcmp(near->knob, "resolution");
@@ -152,13 +152,13 @@ static void neighbours_are_priced_once(void)
 /* their constants hold for the size that they were found for */
 static void calibrated_springs_keep_their_size(void)
 {
-    pal_item *model = &organ.scene.body[0].model, was = *model;
-    pal_setting now;
+    pal_config_entry *model = &organ.scene.body[0].model, was = *model;
+    pal_configuration now;
     mem_client ada;
     char text[160], said[64];
-    CHECK(!pal_item_put_number(model, "k_distance_J", 1e-3, NULL));
-    CHECK(!pal_item_put_text(model, "weights", "volume", NULL));
-    pal_setting_of(&organ.scene, 0, &now);
+    CHECK(!pal_entry_put_number(model, "k_distance_J", 1e-3, NULL));
+    CHECK(!pal_entry_put_text(model, "weights", "volume", NULL));
+    pal_configuration_of(&organ.scene, 0, &now);
     CHECK(now.k_distance_J > 0 && now.size > 0);
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);

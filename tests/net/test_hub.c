@@ -20,14 +20,14 @@ static bool running;
 static void begin(bool paused, int most_clients)
 {
     pal_session *list[1];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
     pal_session_options options = {
         .lease_s = 60, .start_paused = paused, .unpaced = !paused, .wake = pal_server_gate_wake, .user = gate};
     pal_server_options net = {.road = "mem", .most_clients = most_clients};
-    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
+    if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     list[0] = session;
-    if (pal_server_open(&net, list, 1, &note, &server)) CHECK_FAIL("no server: %s", note.text);
+    if (pal_server_open(&net, list, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
     pal_server_connect(server, gate);
     road = pal_server_transport(server);
     now_ns = 1000000000ull;
@@ -174,7 +174,7 @@ static void stalled_client_costs_little_and_is_current_within_two_frames(void)
     mem_join(&slow, road, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(fast.n_tools > 3 && slow.n_tools > 3, &fast, &slow);
     turn(&fast, &slow);
-    size_t held = pal_packet_total(), most = 0;
+    size_t fixed = pal_packet_total(), most = 0;
     int got = fast.n_tools;
     /* 5 s: the slow one reads nothing at all */
     apart_ns = 2 * FRAME_NS;
@@ -183,7 +183,7 @@ static void stalled_client_costs_little_and_is_current_within_two_frames(void)
         if (pal_packet_total() > most) most = pal_packet_total();
     }
     CHECK(fast.n_tools - got > 100);
-    CHECK_LE((double)most, (double)held + 65536); /* a cycle of this organ is 1 to 3 kB */
+    CHECK_LE((double)most, (double)fixed + 65536); /* a cycle of this organ is 1 to 3 kB */
     /* it wakes: the newest cycle is among the first two */
     int before = slow.n_tools;
     for (int i = 0; slow.n_tools < before + 2 && i < 50; i++) mem_pull(&slow, 1);
@@ -295,12 +295,12 @@ static void a_tool_has_one_holder(void)
     mem_text(&c, "{\"type\":\"leave\"}");
     mem_text(&b, "{\"type\":\"take\",\"tool\":1}");
     mem_pull(&b, 1000);
-    bool held = false;
+    bool fixed = false;
     for (int i = 0; i < 2; i++) {
         const pal_wire_member *m = &b.last[PAL_CONTROL_MEMBERS].members.member[i];
-        held |= m->id == b.last[PAL_CONTROL_HELLO].hello.you_id && m->tool == 1;
+        fixed |= m->id == b.last[PAL_CONTROL_HELLO].hello.you_id && m->tool == 1;
     }
-    CHECK(held);
+    CHECK(fixed);
     mem_end(&b);
     mem_end(&c);
     end();
@@ -387,7 +387,7 @@ static void commands_are_checked_and_carried_out(void)
     UNTIL(a.last[PAL_CONTROL_STATUS].status.tick == 0, &a, NULL);
     /* a material that the world refuses is told in the status, and the session lives */
     mem_text(&a, "{\"type\":\"command\",\"verb\":\"material\",\"target\":\"organ\",\"args\":{\"young_Pa\":1e14}}");
-    UNTIL(a.last[PAL_CONTROL_STATUS].status.note[0] || a.n_text[PAL_CONTROL_ERROR] > 4, &a, NULL);
+    UNTIL(a.last[PAL_CONTROL_STATUS].status.diag[0] || a.n_text[PAL_CONTROL_ERROR] > 4, &a, NULL);
     mem_text(&a, "{\"type\":\"command\",\"verb\":\"resume\"}");
     UNTIL(!a.last[PAL_CONTROL_STATUS].status.paused && a.last[PAL_CONTROL_STATUS].status.tick > 0, &a, NULL);
     CHECK_INT(pal_mem_code(a.peer), 0);
@@ -489,12 +489,12 @@ static void answers_that_nobody_reads_close_the_peer(void)
     mem_client a;
     begin(true, 0);
     mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    size_t held = pal_packet_total();
+    size_t fixed = pal_packet_total();
     int n = 0;
     while (!pal_mem_code(a.peer) && n < 100) mem_text(&a, "{\"type\":\"ping\",\"stamp_ms\":1}"), n++;
     CHECK_INT(pal_mem_code(a.peer), PAL_WIRE_CLOSE_POLICY);
     CHECK(n > 16 && n < 64);
-    CHECK_LE((double)pal_packet_total(), (double)held); /* what waited is gone */
+    CHECK_LE((double)pal_packet_total(), (double)fixed); /* what waited is gone */
     mem_end(&a);
     end();
 }
@@ -541,7 +541,7 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     const pal_wire_status *status = &bob.last[PAL_CONTROL_STATUS].status;
     CHECK_INT(status->n_row_name, n_row + 1);
     CHECK_INT(status->n_row, n_row + 1);
-    CHECK_TEXT(status->row[n_row], "field_out");
+    CHECK_TEXT(status->row[n_row], "field_output");
     /* about ten a second of this clock, and of the same motion as the frames */
     mem_text(&bob, "{\"type\":\"command\",\"verb\":\"reset\"}");
     for (int i = 0; i < 100; i++) turn(&ada, &bob);

@@ -183,15 +183,15 @@ static void changed_file_has_another_tag(void)
     REQUIRE(pal_site_open(folder, NULL, &site) == PAL_ERR_OK);
     REQUIRE(pal_site_get(site, "/index.html", &file));
     snprintf(tag, sizeof tag, "%s", file.etag);
-    pal_packet *held = pal_packet_hold(file.bytes);
+    pal_packet *fixed = pal_packet_hold(file.bytes);
     REQUIRE(pal_site_get(site, "/", &file));
     CHECK_TEXT(file.etag, tag);
-    CHECK(file.bytes == held); /* not read again */
+    CHECK(file.bytes == fixed); /* not read again */
     put(folder, "index.html", "<p>three");
     REQUIRE(pal_site_get(site, "/", &file));
     CHECK(strcmp(file.etag, tag) != 0);
-    CHECK(file.bytes->n_byte == 8 && held->n_byte == 6); /* a reply that is under way keeps its bytes */
-    pal_packet_drop(held);
+    CHECK(file.bytes->n_byte == 8 && fixed->n_byte == 6); /* a reply that is under way keeps its bytes */
+    pal_packet_drop(fixed);
     snprintf(path, sizeof path, "%s/index.html", folder);
     unlink(path);
     CHECK(!pal_site_get(site, "/", &file));

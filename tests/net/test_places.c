@@ -59,7 +59,7 @@ static void clients_that_come_and_skip_as_they_like_have_the_newest_table(void)
     uint32_t has[CLIENTS] = {0};
     uint64_t revision = 0; /* of the newest change */
     pal_places *p = NULL;
-    size_t held = pal_packet_total();
+    size_t fixed = pal_packet_total();
     fill();
     pal_shown shown = shown_now();
     REQUIRE(pal_places_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
@@ -76,7 +76,7 @@ static void clients_that_come_and_skip_as_they_like_have_the_newest_table(void)
         }
     }
     pal_places_free(p);
-    CHECK_INT(pal_packet_total(), held);
+    CHECK_INT(pal_packet_total(), fixed);
 }
 
 static void hidden_are_the_vertices_of_no_triangle(void)
@@ -160,9 +160,9 @@ static void a_corner_that_is_no_vertex_empties_its_place(void)
     pal_places_free(p);
     p = NULL;
     shown.n_tri = PAL_PATCH_PLACE_MAX + 1;
-    pal_note note = {""};
-    CHECK_INT(pal_places_make(3, 1, &shown, &note, &p), PAL_ERR_BUDGET);
-    CHECK(!p && strstr(note.text, "part ball: 4194305 triangles"));
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_places_make(3, 1, &shown, &diag, &p), PAL_ERR_BUDGET);
+    CHECK(!p && strstr(diag.text, "part ball: 4194305 triangles"));
 }
 
 int main(void)

@@ -14,9 +14,9 @@ static void hurt(void *user, pal_world *next, const pal_world *before)
 static void begin_hurt(void)
 {
     pal_session *first = session;
-    pal_note note = {""};
-    if (pal_session_open_after(first, &organ.scene, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_session_follow(session, first, hurt, NULL, &note)) CHECK_FAIL("does not follow: %s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_session_open_after(first, &organ.scene, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
+    if (pal_session_follow(session, first, hurt, NULL, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
     pal_session_close(first);
 }
 
@@ -53,8 +53,8 @@ static void rows_say_whose_they_are_and_what_called_for_them(void)
     CHECK(h->n_row > 3 && h->n_row_part == h->n_row && h->n_row_why == h->n_row);
     for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->row_part[r] == 0 && h->row_why[r][0]);
     /* what moves and shows the body stays, elastic rows may go while there is another */
-    static const char *const stays[] = {"verlet", "skin_out"}, *const goes[] = {"tet_volume", "edge_distance",
-                                                                                "gravity"};
+    static const char *const stays[] = {"verlet", "skin_output"}, *const goes[] = {"tet_volume", "edge_distance",
+                                                                                   "gravity"};
     CHECK_INT(h->n_row_fixed, h->n_row);
     for (int i = 0; i < 2; i++) {
         int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, stays[i]);
@@ -100,12 +100,12 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     uint64_t n_refused = a->n_refused;
     int n_error = ada.n_text[PAL_CONTROL_ERROR], n_other = bo.n_text[PAL_CONTROL_ERROR];
     mem_text(&ada, ROW("no_such_row", 0));
-    UNTIL(a->n_refused == n_refused + 1 && a->note[0], &ada, &bo);
-    CHECK(strstr(a->note, "no_such_row"));
+    UNTIL(a->n_refused == n_refused + 1 && a->diag[0], &ada, &bo);
+    CHECK(strstr(a->diag, "no_such_row"));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 1, &ada, &bo);
     CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].problem.code, "refused");
     CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "no_such_row"));
-    mem_text(&ada, ROW("skin_out", 0));
+    mem_text(&ada, ROW("skin_output", 0));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 2, &ada, &bo);
     CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "cannot be switched off"));
     CHECK_INT(bo.n_text[PAL_CONTROL_ERROR], n_other);
@@ -147,7 +147,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
     CHECK(s->state[0].frozen && s->state[0].n_rescue == 1);
-    CHECK(strstr(s->state[0].why, "is no number"));
+    CHECK(strstr(s->state[0].reason, "is no number"));
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(!s->frozen && s->n_state == 0, &cy, NULL);
     CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);
@@ -176,8 +176,8 @@ static double counter(const char *name)
 static void a_body_asleep_is_neither_stepped_nor_encoded(void)
 {
     static mem_client ada;
-    pal_item gravity = organ.scene.body[0].effect[0];
-    pal_item_init(&organ.scene.body[0].effect[0], "effects[0]", "sleep");
+    pal_config_entry gravity = organ.scene.body[0].effect[0];
+    pal_entry_init(&organ.scene.body[0].effect[0], "effects[0]", "sleep");
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;

@@ -11,7 +11,7 @@ static const double press_m[3] = {0, 0, 0.055};
 enum { POINTS = 3, STEPS = 100, FINE = 11 };
 static pal_scene scene;
 static pal_prepared mesh;
-static pal_priced_setting point[POINTS];
+static pal_measured_configuration point[POINTS];
 static double estimate_m[POINTS];
 
 /* ---- a study of the ball as it is pressed ---- */
@@ -28,15 +28,15 @@ static double estimate_of(const pal_scene *at, const pal_world *w)
 }
 
 /* shown places at rest under the press, heap [n][3], and the estimate of its error; error_m NULL: not wanted */
-static float *find_rest(const pal_setting *s, int *n, double *error_m)
+static float *find_rest(const pal_configuration *s, int *n, double *error_m)
 {
-    pal_note note = {""};
-    pal_set_scene *set = NULL;
+    pal_diagnostic diag = {""};
+    pal_configured_scene *set = NULL;
     pal_world *w = NULL;
     pal_pose p = {.quat = {1, 0, 0, 0}};
     memcpy(p.position_m, press_m, sizeof press_m);
-    if (s && pal_setting_make(&scene, 0, s, &note, &set)) CHECK_FAIL("%s", note.text);
-    if (pal_world_create(set ? &set->scene : &scene, &note, &w)) CHECK_FAIL("%s", note.text);
+    if (s && pal_configuration_make(&scene, 0, s, &diag, &set)) CHECK_FAIL("%s", diag.text);
+    if (pal_world_create(set ? &set->scene : &scene, &diag, &w)) CHECK_FAIL("%s", diag.text);
     pal_world_pose(w, 0, &p);
     for (int k = 0; k < STEPS; k++) CHECK(!pal_world_step(w, scene.step_s));
     const pal_body *b = pal_world_body(w, 0);
@@ -46,13 +46,13 @@ static float *find_rest(const pal_setting *s, int *n, double *error_m)
     *n = b->n_shown;
     if (error_m) *error_m = estimate_of(set ? &set->scene : &scene, w);
     pal_world_destroy(w);
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     return x;
 }
 
 static void make_study(void)
 {
-    const pal_setting right = {.model = "fem", .element = "hex8_bbar", .size = FINE};
+    const pal_configuration right = {.model = "fem", .element = "hex8_bbar", .size = FINE};
     int n, n_right;
     REQUIRE(small_scene(&scene, &mesh, 8));
     scene.body[0].material.damping_1_s = 10;

@@ -6,7 +6,7 @@
 
 static clay_scene clay;
 enum { POINTS = 3 };
-static pal_priced_setting point[POINTS];
+static pal_measured_configuration point[POINTS];
 
 /* places of a block of 0.1 m, on its top and beside it */
 #define TOP "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"

@@ -33,13 +33,13 @@ static pal_err net_err;
 
 static void begin(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
     pal_session_options options = {.wake = pal_server_gate_wake, .user = gate};
     pal_server_options net_options = {.port = 0, .viewer_folder = folder};
-    if (pal_session_open(&organ.scene, &options, &note, &session)) CHECK_FAIL("no session: %s", note.text);
-    if (pal_server_open(&net_options, &session, 1, &note, &server)) {
-        CHECK_FAIL("no server: %s", note.text);
+    if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
+    if (pal_server_open(&net_options, &session, 1, &diag, &server)) {
+        CHECK_FAIL("no server: %s", diag.text);
         exit(1);
     }
     pal_server_connect(server, gate);
@@ -385,26 +385,26 @@ static void half_open_connections_are_closed_by_the_server(void)
 
 static void address_and_port_are_refused_with_a_sentence(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_server *second = NULL;
     pal_server_options options = {.port = port};
-    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "in use") && strstr(note.text, "--port"));
+    CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "in use") && strstr(diag.text, "--port"));
     options = (pal_server_options){.listen = "0.0.0.0"};
-    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "--allow-remote"));
+    CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "--allow-remote"));
     options = (pal_server_options){.listen = "not an address", .allow_remote = true};
-    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
+    CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_REFUSED);
     /* what is no address is told so, and where a port goes */
     static const char *const no_address[] = {"127.0.0.1:19011", "localhost:80", "[::1]", "not an address"};
     for (int i = 0; i < 4; i++) {
         options = (pal_server_options){.listen = no_address[i]};
-        CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, "--listen") == note.text && strstr(note.text, no_address[i]));
-        CHECK(strstr(note.text, "--port") && !strstr(note.text, "other machines"));
+        CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, "--listen") == diag.text && strstr(diag.text, no_address[i]));
+        CHECK(strstr(diag.text, "--port") && !strstr(diag.text, "other machines"));
     }
     options = (pal_server_options){.viewer_folder = "/no/such/folder"};
-    CHECK_INT(pal_server_open(&options, &session, 1, &note, &second), PAL_ERR_IO);
+    CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_IO);
     CHECK(second == NULL);
 }
 

@@ -137,16 +137,16 @@ static void sinks_as_ingber_says(void)
     pal_anneal_options o;
     pal_anneal_default(&o);
     o.n_parameter = 1; /* c = 11.512925465 exp(-4.605170186) = 0.11512925465: one power of ten every 20 */
-    CHECK_NEAR(pal_anneal_cooling(&o, 0), 1, 0);
-    CHECK_NEAR(pal_anneal_cooling(&o, 1), 0.8912509381, 1e-10);
-    CHECK_NEAR(pal_anneal_cooling(&o, 20), 0.1, 1e-12);
-    CHECK_NEAR(pal_anneal_cooling(&o, 100), 1e-5, 1e-15);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 0), 1, 0);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 1), 0.8912509381, 1e-10);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 20), 0.1, 1e-12);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 100), 1e-5, 1e-15);
     o.n_parameter = 3; /* c = 11.512925465 / 100^(1/3) = 2.4803846 */
-    CHECK_NEAR(pal_anneal_cooling(&o, 1), 0.0837110241, 1e-10);
-    CHECK_NEAR(pal_anneal_cooling(&o, 8), 0.0837110241 * 0.0837110241, 1e-10);
-    CHECK_NEAR(pal_anneal_cooling(&o, 100), 1e-5, 1e-15);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 1), 0.0837110241, 1e-10);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 8), 0.0837110241 * 0.0837110241, 1e-10);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 100), 1e-5, 1e-15);
     /* neither falls to nothing */
-    CHECK_NEAR(pal_anneal_cooling(&o, 1e300), 1e-10, 0);
+    CHECK_NEAR(pal_anneal_temperature_ratio(&o, 1e300), 1e-10, 0);
     CHECK_NEAR(pal_anneal_jump(1e-18, 0.75), 1e-9, 1e-17);
     /* y at T = 1: sgn (2^|2u - 1| - 1) */
     CHECK_NEAR(pal_anneal_jump(1, 0.5), 0, 0);
@@ -216,7 +216,7 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
         o.seed = seed;
         o.n_start = 0;
         o.reanneal_generated = 50;
-        o.most_evaluation = 1 + 4 * 53;
+        o.max_evaluation = 1 + 4 * 53;
         double p[3], k[3] = {0, 0, 0};
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
@@ -234,7 +234,7 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
                 continue;
             }
             for (int i = 0; i < 3; i++) {
-                double temperature = pal_anneal_cooling(&o, k[i]), least = chance(-first[i], temperature);
+                double temperature = pal_anneal_temperature_ratio(&o, k[i]), least = chance(-first[i], temperature);
                 double y = t.trail_p[g][i] - first[i], most = chance(1 - first[i], temperature);
                 u[i][n] = (chance(y, temperature) - least) / (most - least);
                 k[i]++;
@@ -257,7 +257,7 @@ static double cooled(double cost_scale, const double *first, int reanneal_accept
     o.first = first;
     o.cost_scale = cost_scale;
     o.reanneal_accepted = reanneal_accepted;
-    o.most_evaluation = most;
+    o.max_evaluation = most;
     double p[2];
     pal_anneal_result r;
     if (pal_anneal(&o, p, &r, NULL)) return -1;
@@ -293,21 +293,21 @@ static double two_levels(task *t, const double *p)
 static void accepts_a_rise_as_often_as_metropolis(void)
 {
     static task t;
-    int risen = 0, offered = 0;
+    int energy_rose = 0, offered = 0;
     double wanted = 0;
     for (uint64_t seed = 0; seed < 200; seed++) {
         pal_anneal_options o = begin(&t, two_levels, 1, -1, 1);
         o.seed = seed;
         o.cost_scale = 1e-9;
         o.reanneal_accepted = 0;
-        o.most_evaluation = 120; /* while jumps are large */
+        o.max_evaluation = 120; /* while jumps are large */
         double p[1], last = 1;
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
         for (int g = 100; g < t.n_trail; g++) {
             if (t.trail[g] > last) {
                 offered++;
-                risen += t.kind[g] & 1;
+                energy_rose += t.kind[g] & 1;
                 wanted += exp(-1 / r.temperature);
             } else {
                 CHECK_INT(t.kind[g] & 1, 1); /* not worse: always */
@@ -316,7 +316,7 @@ static void accepts_a_rise_as_often_as_metropolis(void)
         }
     }
     CHECK(offered > 500);
-    CHECK_NEAR(risen, wanted, 3.5 * sqrt(0.25 * offered));
+    CHECK_NEAR(energy_rose, wanted, 3.5 * sqrt(0.25 * offered));
 }
 
 static bool same_walk(const task *a, const task *b)
@@ -343,7 +343,7 @@ static void walks_the_same_way_for_every_batch_and_team(void)
             o.n_batch = batches[b];
             o.reanneal_accepted = 30;
             o.reanneal_generated = 333;
-            o.most_evaluation = 3000;
+            o.max_evaluation = 3000;
             double p[4];
             pal_anneal_result r;
             if (teams[b]) REQUIRE(pal_team_create(teams[b], &now->team) == PAL_ERR_OK);
@@ -378,36 +378,36 @@ static void knows_no_units(void)
     double p[2], q[2];
     pal_anneal_result r, s;
     pal_anneal_options o = begin(&a, rosenbrock, 2, -2, 2);
-    o.most_evaluation = 1500;
+    o.max_evaluation = 1500;
     REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
     /* powers of two: to the last bit */
     o = begin(&b, rosenbrock, 2, -2 * 0x1p40, 2 * 0x1p40);
     b.scale = 0x1p40;
-    o.most_evaluation = 1500;
+    o.max_evaluation = 1500;
     REQUIRE(pal_anneal(&o, q, &s, NULL) == PAL_ERR_OK);
     CHECK(memcmp(a.trail, b.trail, sizeof a.trail) == 0);
     CHECK(memcmp(a.kind, b.kind, sizeof a.kind) == 0);
     for (int i = 0; i < 2; i++) CHECK_NEAR(q[i] * 0x1p-40, p[i], 0);
     /* another seed is another walk */
     o = begin(&b, rosenbrock, 2, -2, 2);
-    o.most_evaluation = 1500;
+    o.max_evaluation = 1500;
     o.seed = 1;
     REQUIRE(pal_anneal(&o, q, &s, NULL) == PAL_ERR_OK);
     CHECK(a.trail[0] != b.trail[0] && a.trail[1400] != b.trail[1400]);
 }
 
 /* the largest number of evaluations until the cost is `enough`, over eight seeds; -1: one did not get there */
-static int64_t slowest(double (*cost)(task *, const double *), int n, double box, double coldest, double enough,
-                       int64_t most)
+static int64_t slowest(double (*cost)(task *, const double *), int n, double box, double min_temperature_ratio,
+                       double enough, int64_t most)
 {
     static task t;
     int64_t worst = 0;
     for (uint64_t seed = 1; seed <= 8; seed++) {
         pal_anneal_options o = begin(&t, cost, n, -box, 0.9 * box); /* the minimum is not the middle */
         o.seed = seed;
-        o.coldest = coldest;
+        o.min_temperature_ratio = min_temperature_ratio;
         o.enough = enough;
-        o.most_evaluation = most;
+        o.max_evaluation = most;
         double p[MOST];
         pal_anneal_result r;
         if (pal_anneal(&o, p, &r, NULL) || !(r.best <= enough)) {
@@ -437,8 +437,8 @@ static void goes_around_points_without_a_value(void)
     for (uint64_t seed = 1; seed <= 8; seed++) {
         pal_anneal_options o = begin(&t, half, 2, -2, 2);
         o.seed = seed;
-        o.coldest = 1e-6;
-        o.most_evaluation = 15000;
+        o.min_temperature_ratio = 1e-6;
+        o.max_evaluation = 15000;
         double p[2];
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
@@ -473,11 +473,11 @@ static void samples_on_until_a_point_has_a_value(void)
         o.seed = 5;
         o.n_batch = b;
         o.stall = 300;
-        o.most_evaluation = 100;
+        o.max_evaluation = 100;
         CHECK_INT(pal_anneal(&o, p, &r, NULL), PAL_ERR_NUMERIC); /* the samples have none */
         CHECK_INT(r.n_evaluation, 100);
         o.stall = 0;
-        o.most_evaluation = TRAIL - 1;
+        o.max_evaluation = TRAIL - 1;
         begin(now, rare, 2, -1, 1);
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
         CHECK_LE(r.best, 1e-6);
@@ -494,24 +494,24 @@ static void says_so_when_no_point_has_a_value(void)
 {
     static task t;
     pal_anneal_options o = begin(&t, no_value, 2, -1, 1);
-    o.most_evaluation = 777;
+    o.max_evaluation = 777;
     double p[2] = {9, 9};
     pal_anneal_result r;
-    pal_note note;
-    CHECK_INT(pal_anneal(&o, p, &r, &note), PAL_ERR_NUMERIC);
-    CHECK_TEXT(note.text, "annealing: none of 777 points had a value");
+    pal_diagnostic diag;
+    CHECK_INT(pal_anneal(&o, p, &r, &diag), PAL_ERR_NUMERIC);
+    CHECK_TEXT(diag.text, "annealing: none of 777 points had a value");
     CHECK(r.n_evaluation == 777 && r.n_failed == 777);
     CHECK_INT(r.n_spent, 777); /* a batch ends with the limit */
     CHECK_NEAR(r.best, DBL_MAX, 0);
     CHECK(p[0] == 0 && p[1] == 0); /* the middle */
-    o.most_evaluation = 0;
+    o.max_evaluation = 0;
     o.stall = 250;
-    CHECK_INT(pal_anneal(&o, p, &r, &note), PAL_ERR_NUMERIC);
+    CHECK_INT(pal_anneal(&o, p, &r, &diag), PAL_ERR_NUMERIC);
     CHECK_INT(r.n_evaluation, 250);
     o.stall = 0;
     begin(&t, no_value, 2, -1, 1);
     t.stop_at = 130;
-    CHECK_INT(pal_anneal(&o, p, &r, &note), PAL_ERR_NUMERIC);
+    CHECK_INT(pal_anneal(&o, p, &r, &diag), PAL_ERR_NUMERIC);
     CHECK_INT(r.n_evaluation, 130);
 }
 
@@ -523,7 +523,7 @@ static void is_never_worse_than_the_first_point(void)
         const double first[2] = {0.9, 0.8};
         o.first = first;
         o.seed = (uint64_t)n;
-        o.most_evaluation = n;
+        o.max_evaluation = n;
         double p[2];
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
@@ -538,7 +538,7 @@ static void is_never_worse_than_the_first_point(void)
     const double corner[2] = {-2, 2};
     o.first = corner;
     o.n_start = 0;
-    o.most_evaluation = 2000;
+    o.max_evaluation = 2000;
     double p[2];
     pal_anneal_result r;
     REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
@@ -590,11 +590,11 @@ static double extreme(task *t, const double *p)
 static void survives_extreme_costs(void)
 {
     static task t;
-    for (int n_temper = 1; n_temper <= 100; n_temper += 33) {
+    for (int n_temperature_sample = 1; n_temperature_sample <= 100; n_temperature_sample += 33) {
         pal_anneal_options o = begin(&t, extreme, 3, -1, 1);
-        o.n_temper = n_temper;
+        o.n_temperature_sample = n_temperature_sample;
         o.reanneal_generated = 20;
-        o.most_evaluation = 3000;
+        o.max_evaluation = 3000;
         double p[3];
         pal_anneal_result r;
         REQUIRE(pal_anneal(&o, p, &r, NULL) == PAL_ERR_OK);
@@ -612,10 +612,10 @@ static void check_refused(task *t, const pal_anneal_options *o, const char *word
 {
     double p[2] = {7, 7};
     pal_anneal_result r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     t->seen = 0;
-    CHECK_INT(pal_anneal(o, p, &r, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, words)) CHECK_TEXT(note.text, words);
+    CHECK_INT(pal_anneal(o, p, &r, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, words)) CHECK_TEXT(diag.text, words);
     CHECK(p[0] == 7 && t->seen == 0 && r.n_spent == 0 && r.best == DBL_MAX);
     CHECK_INT(pal_anneal(o, p, &r, NULL), PAL_ERR_REFUSED);
 }
@@ -647,11 +647,11 @@ static void refuses_numbers_out_of_range(void)
     pal_anneal_options good = begin(&t, rosenbrock, 2, -2, 2), o;
     o = good, o.n_start = -1;
     check_refused(&t, &o, "n_start -1");
-    o = good, o.n_temper = 0;
+    o = good, o.n_temperature_sample = 0;
     check_refused(&t, &o, "n_temper 0");
     o = good, o.n_batch = 0;
     check_refused(&t, &o, "n_batch 0");
-    o = good, o.n_batch = PAL_ANNEAL_MOST_BATCH + 1;
+    o = good, o.n_batch = PAL_ANNEAL_MAX_BATCH + 1;
     check_refused(&t, &o, "at most 4096");
     const double bad[4] = {0, -1, NAN, INFINITY};
     for (int i = 0; i < 4; i++) {
@@ -664,9 +664,9 @@ static void refuses_numbers_out_of_range(void)
         o = good, o.difference = bad[i];
         check_refused(&t, &o, "difference");
     }
-    o = good, o.coldest = 0;
+    o = good, o.min_temperature_ratio = 0;
     check_refused(&t, &o, "coldest 0");
-    o = good, o.coldest = 1;
+    o = good, o.min_temperature_ratio = 1;
     check_refused(&t, &o, "coldest 1");
     o = good, o.ratio_scale = 1;
     check_refused(&t, &o, "ratio_scale 1");

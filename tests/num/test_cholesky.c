@@ -1,8 +1,8 @@
 /* Sparse Cholesky factors: against a dense solve, with held points, of every scale, refused, refreshed beside. */
 #include "server/num/cholesky.h"
-#include "server/num/conjugate.h"
-#include "server/num/incomplete.h"
-#include "server/num/shape.h"
+#include "server/num/conjugate_gradient.h"
+#include "server/num/incomplete_cholesky.h"
+#include "server/num/shape_functions.h"
 #include "tests/check.h"
 
 #include <SuiteSparse_config.h>
@@ -48,22 +48,22 @@ static double draw(void)
 typedef struct grid {
     int n, n_hex;
     int32_t *node;
-    uint8_t *held; /* the end x = 0 */
+    uint8_t *fixed; /* the end x = 0 */
     pal_arena *arena;
-    pal_blocks a;
+    pal_block_matrix a;
 } grid;
 
 static grid make_grid(int nx, int ny, int nz)
 {
     grid g = {.n = (nx + 1) * (ny + 1) * (nz + 1), .n_hex = nx * ny * nz, .arena = pal_arena_create(1 << 16, true)};
     g.node = PAL_NEW(g.arena, int32_t, 8 * g.n_hex);
-    g.held = PAL_NEW(g.arena, uint8_t, g.n);
-    for (int i = 0; i < g.n; i++) g.held[i] = i % (nx + 1) == 0;
+    g.fixed = PAL_NEW(g.arena, uint8_t, g.n);
+    for (int i = 0; i < g.n; i++) g.fixed[i] = i % (nx + 1) == 0;
     for (int e = 0; e < g.n_hex; e++)
         for (int c = 0; c < 8; c++)
             g.node[8 * e + c] =
                 e % nx + (c & 1) + (nx + 1) * (e / nx % ny + (c >> 1 & 1) + (ny + 1) * (e / nx / ny + (c >> 2)));
-    if (pal_blocks_make(g.n, &(pal_cliques){g.n_hex, 8, g.node}, 1, g.arena, &g.a)) abort();
+    if (pal_block_matrix_make(g.n, &(pal_cliques){g.n_hex, 8, g.node}, 1, g.arena, &g.a)) abort();
     return g;
 }
 
@@ -72,14 +72,14 @@ static void fill_grid(grid *g, double size, double inertia, double kappa, double
 {
     static double shear[576], volume[576];
     pal_hex_stiffness(1, shear, volume);
-    pal_blocks_zero(&g->a);
+    pal_block_matrix_zero(&g->a);
     for (int e = 0; e < g->n_hex; e++) {
         double s = size * (factor ? factor(e) : 1);
         const int32_t *node = g->node + 8 * (size_t)e;
         for (int i = 0; i < 8; i++)
             for (int j = 0; j < 8; j++) {
                 if (node[i] < node[j]) continue;
-                double *v = g->a.value + 9 * pal_blocks_find(&g->a, node[i], node[j]);
+                double *v = g->a.value + 9 * pal_block_matrix_find(&g->a, node[i], node[j]);
                 for (int r = 0; r < 9; r++) {
                     int at = (3 * i + r / 3) * 24 + 3 * j + r % 3;
                     v[r] += s * (shear[at] + kappa * volume[at]);
@@ -91,15 +91,15 @@ static void fill_grid(grid *g, double size, double inertia, double kappa, double
 }
 
 /* |A x - b| / (|A| |x| + |b|) over points that are not held, |A| the largest diagonal entry; x = 0 at the held ones */
-static double residual(const grid *g, const uint8_t *held, const double *x, const double *b)
+static double residual(const grid *g, const uint8_t *fixed, const double *x, const double *b)
 {
     double *r = calloc(3 * (size_t)g->n, sizeof *r), most = 0, top = 0, rr = 0, bb = 0, xx = 0;
     for (int i = 0; i < 3 * g->n; i++) most = fmax(most, fabs(b[i]));
     for (int i = 0; i < 3 * g->n; i++) top = fmax(top, g->a.value[9 * g->a.start[i / 3] + i % 3 * 4]);
-    pal_blocks_multiply(&g->a, 1 / most, x, r);
+    pal_block_matrix_multiply(&g->a, 1 / most, x, r);
     bool moved = false;
     for (int i = 0; i < 3 * g->n; i++) {
-        if (held && held[i / 3]) {
+        if (fixed && fixed[i / 3]) {
             moved |= x[i] != 0;
             continue;
         }
@@ -116,16 +116,17 @@ static void draw_vector(double *b, int n, double size)
 }
 
 /* dense Cholesky solve of the points that are not held */
-static void solve_dense(const pal_blocks *a, const uint8_t *held, const double *b, double *x)
+static void solve_dense(const pal_block_matrix *a, const uint8_t *fixed, const double *b, double *x)
 {
     int n = 3 * a->n;
     double *l = calloc((size_t)n * (size_t)n, sizeof *l);
     for (int j = 0; j < a->n; j++)
         for (int k = a->start[j]; k < a->start[j + 1]; k++)
             for (int r = 0; r < 9; r++)
-                if (!held[j] && !held[a->row[k]]) l[(3 * a->row[k] + r / 3) * n + 3 * j + r % 3] = a->value[9 * k + r];
+                if (!fixed[j] && !fixed[a->row[k]])
+                    l[(3 * a->row[k] + r / 3) * n + 3 * j + r % 3] = a->value[9 * k + r];
     for (int i = 0; i < n; i++) {
-        if (held[i / 3]) l[i * n + i] = 1;
+        if (fixed[i / 3]) l[i * n + i] = 1;
         for (int j = 0; j <= i; j++) {
             double sum = l[i * n + j];
             for (int k = 0; k < j; k++) sum -= l[i * n + k] * l[j * n + k];
@@ -133,7 +134,7 @@ static void solve_dense(const pal_blocks *a, const uint8_t *held, const double *
         }
     }
     for (int i = 0; i < n; i++) {
-        x[i] = held[i / 3] ? 0 : b[i];
+        x[i] = fixed[i / 3] ? 0 : b[i];
         for (int j = 0; j < i; j++) x[i] -= l[i * n + j] * x[j];
         x[i] /= l[i * n + i];
     }
@@ -150,14 +151,14 @@ static void agrees_with_a_dense_solve_of_random_matrices(void)
 {
     for (int t = 0; t < 30; t++) {
         int32_t pair[2 * R_PAIR];
-        uint8_t held[R];
+        uint8_t fixed[R];
         int n_pair = t < 5 ? 0 : 4 * t - 10, n_held = 0;
         for (int i = 0; i < 2 * n_pair; i++) pair[i] = (int)((draw() + 1) / 2 * R) % R;
-        for (int i = 0; i < R; i++) held[i] = draw() > 0.7, n_held += held[i];
+        for (int i = 0; i < R; i++) fixed[i] = draw() > 0.7, n_held += fixed[i];
         pal_arena *arena = pal_arena_create(1 << 16, true);
-        pal_blocks a;
+        pal_block_matrix a;
         pal_cholesky *c;
-        REQUIRE(pal_blocks_make(R, &(pal_cliques){n_pair, 2, pair}, 1, arena, &a) == PAL_ERR_OK);
+        REQUIRE(pal_block_matrix_make(R, &(pal_cliques){n_pair, 2, pair}, 1, arena, &a) == PAL_ERR_OK);
         for (int j = 0; j < R; j++)
             for (int k = a.start[j]; k < a.start[j + 1]; k++)
                 for (int r = 0; r < 3; r++)
@@ -167,10 +168,10 @@ static void agrees_with_a_dense_solve_of_random_matrices(void)
                         else if (s <= r)
                             a.value[9 * k + 3 * r + s] = a.value[9 * k + 3 * s + r] = r == s ? 60 : draw();
                     }
-        REQUIRE(pal_cholesky_create(&a, held, &c) == PAL_ERR_OK);
+        REQUIRE(pal_cholesky_create(&a, fixed, &c) == PAL_ERR_OK);
         double b[3 * R], x[3 * R], wanted[3 * R], single = 0, both = 0;
         draw_vector(b, 3 * R, 1);
-        solve_dense(&a, held, b, wanted);
+        solve_dense(&a, fixed, b, wanted);
         CHECK_INT(pal_cholesky_factor(c, &a, false), PAL_ERR_OK);
         CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
         for (int i = 0; i < 3 * R; i++) both = fmax(both, fabs(x[i] - wanted[i]));
@@ -180,7 +181,7 @@ static void agrees_with_a_dense_solve_of_random_matrices(void)
         for (int i = 0; i < 3 * R; i++) single = fmax(single, fabs(b[i] - wanted[i]));
         CHECK_LE(single, 1e-7);
         CHECK(single > 1e-12); /* it is the single precision factor that is used */
-        for (int i = 0; i < 3 * R; i++) CHECK(!held[i / 3] || (x[i] == 0 && b[i] == 0));
+        for (int i = 0; i < 3 * R; i++) CHECK(!fixed[i / 3] || (x[i] == 0 && b[i] == 0));
         CHECK(pal_cholesky_nonzeros(c) >= 6 * (R - n_held));
         pal_cholesky_destroy(c);
         pal_arena_destroy(arena);
@@ -205,12 +206,12 @@ static void leaves_a_small_residual(void)
         double *b = malloc(sizeof *b * 3 * (size_t)g.n), *x = malloc(sizeof *x * 3 * (size_t)g.n);
         fill_grid(&g, 1, body[t].inertia, body[t].kappa, body[t].factor);
         pal_cholesky *c;
-        REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+        REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
         draw_vector(b, 3 * g.n, 1);
         for (int single = 0; single < 2; single++) {
             REQUIRE(pal_cholesky_factor(c, &g.a, single) == PAL_ERR_OK);
             CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
-            CHECK_LE(residual(&g, g.held, x, b), single ? 1e-6 : 1e-14);
+            CHECK_LE(residual(&g, g.fixed, x, b), single ? 1e-6 : 1e-14);
         }
         pal_cholesky_destroy(c);
         free(b), free(x);
@@ -226,13 +227,13 @@ static void does_not_mind_the_units(void)
     double *b = malloc(sizeof *b * 3 * (size_t)g.n), *x = malloc(sizeof *x * 3 * (size_t)g.n);
     pal_cholesky *c;
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     for (int t = 0; t < 12; t++) {
         fill_grid(&g, size[t / 2], 0, 5, NULL);
         CHECK_INT(pal_cholesky_factor(c, &g.a, t % 2), PAL_ERR_OK);
         draw_vector(b, 3 * g.n, load[t / 2]);
         CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
-        CHECK_LE(residual(&g, g.held, x, b), t % 2 ? 1e-5 : 1e-12);
+        CHECK_LE(residual(&g, g.fixed, x, b), t % 2 ? 1e-5 : 1e-12);
     }
     pal_cholesky_destroy(c);
     free(b), free(x);
@@ -272,7 +273,7 @@ static void refuses_what_is_not_positive_and_keeps_the_old_factor(void)
     double *b = malloc(n_byte), *x = malloc(n_byte), *again = malloc(n_byte);
     pal_cholesky *c;
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     draw_vector(b, 3 * g.n, 1);
     CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_STATE);
     CHECK_INT(pal_cholesky_refresh(c, &g.a), PAL_ERR_STATE);
@@ -296,7 +297,7 @@ static void refuses_what_is_not_positive_and_keeps_the_old_factor(void)
     /* negative everywhere, and zero */
     fill_grid(&g, -1, 0, 5, NULL);
     CHECK_INT(pal_cholesky_factor(c, &g.a, false), PAL_ERR_NUMERIC);
-    pal_blocks_zero(&g.a);
+    pal_block_matrix_zero(&g.a);
     CHECK_INT(pal_cholesky_factor(c, &g.a, false), PAL_ERR_NUMERIC);
     CHECK_INT((long long)pal_cholesky_bytes(c), (long long)n_kept);
     b[7 * 3] = NAN; /* a point that is not held */
@@ -331,9 +332,9 @@ static void takes_bodies_with_every_point_held_and_with_none(void)
     pal_cholesky *c;
     double b[36], x[36];
     fill_grid(&g, 1, 0, 5, NULL);
-    memset(g.held, 1, (size_t)g.n);
+    memset(g.fixed, 1, (size_t)g.n);
     draw_vector(b, 36, 1), draw_vector(x, 36, 1);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     CHECK_INT(pal_cholesky_factor(c, &g.a, true), PAL_ERR_OK);
     CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
     for (int i = 0; i < 36; i++) CHECK(x[i] == 0);
@@ -341,7 +342,7 @@ static void takes_bodies_with_every_point_held_and_with_none(void)
     CHECK_INT(pal_cholesky_adopt(c, false), PAL_ERR_OK);
     CHECK_INT(pal_cholesky_nonzeros(c), 0);
     pal_cholesky_destroy(c);
-    pal_blocks none = {.n = 0, .start = (int32_t[1]){0}};
+    pal_block_matrix none = {.n = 0, .start = (int32_t[1]){0}};
     REQUIRE(pal_cholesky_create(&none, NULL, &c) == PAL_ERR_OK);
     CHECK_INT(pal_cholesky_factor(c, &none, false), PAL_ERR_OK);
     CHECK_INT(pal_cholesky_solve(c, NULL, NULL), PAL_ERR_OK);
@@ -357,12 +358,12 @@ static void gives_columns_of_the_inverse(void)
     double b[162], x[162], wanted[162];
     pal_cholesky *c;
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(g.n == 54 && pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(g.n == 54 && pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     for (int t = 0; t < 3 * g.n; t++) {
         REQUIRE(pal_cholesky_factor(c, &g.a, t % 2) == PAL_ERR_OK);
         memset(b, 0, sizeof b);
         b[t] = 1;
-        solve_dense(&g.a, g.held, b, wanted);
+        solve_dense(&g.a, g.fixed, b, wanted);
         CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
         double most = 0, off = 0;
         for (int i = 0; i < 3 * g.n; i++) most = fmax(most, fabs(wanted[i])), off = fmax(off, fabs(x[i] - wanted[i]));
@@ -380,7 +381,7 @@ static void counts_the_same_work_every_time(void)
     for (int t = 0; t < 3; t++) {
         pal_cholesky *c;
         fill_grid(&g, 1 + t, 0, 5, NULL);
-        REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+        REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
         if (t == 0) flops = pal_cholesky_flops(c), nonzeros = pal_cholesky_nonzeros(c);
         CHECK(pal_cholesky_flops(c) == flops);
         CHECK_INT(pal_cholesky_nonzeros(c), nonzeros);
@@ -389,7 +390,7 @@ static void counts_the_same_work_every_time(void)
     int64_t lower = 0; /* of the matrix, without held points */
     for (int j = 0; j < g.n; j++)
         for (int k = g.a.start[j]; k < g.a.start[j + 1]; k++)
-            if (!g.held[j] && !g.held[g.a.row[k]]) lower += g.a.row[k] == j ? 6 : 9;
+            if (!g.fixed[j] && !g.fixed[g.a.row[k]]) lower += g.a.row[k] == j ? 6 : 9;
     CHECK(nonzeros >= lower && nonzeros < 10 * lower);
     CHECK(flops > (double)nonzeros);
     pal_arena_destroy(g.arena);
@@ -403,8 +404,8 @@ static void refreshes_beside_the_factor_in_use(void)
     pal_cholesky *c, *other;
     draw_vector(b, 3 * g.n, 1);
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &other) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &other) == PAL_ERR_OK);
     for (int t = 0; t < 6; t++) {
         bool single = t % 3 != 0;
         fill_grid(&g, 1, t, 5, NULL);
@@ -418,7 +419,7 @@ static void refreshes_beside_the_factor_in_use(void)
         CHECK(pal_cholesky_refreshing(c));
         CHECK_INT(pal_cholesky_refresh(c, &g.a), PAL_ERR_STATE);
         CHECK_INT(pal_cholesky_factor(c, &g.a, single), PAL_ERR_STATE);
-        pal_blocks_zero(&g.a); /* the values were copied */
+        pal_block_matrix_zero(&g.a); /* the values were copied */
         for (int k = 0; k < 20; k++) {
             CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
             CHECK(!memcmp(x, old, n_byte));
@@ -446,7 +447,7 @@ static void keeps_the_old_factor_when_a_refresh_fails(void)
     pal_cholesky *c;
     draw_vector(b, 3 * g.n, 1);
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     REQUIRE(pal_cholesky_factor(c, &g.a, true) == PAL_ERR_OK);
     CHECK_INT(pal_cholesky_solve(c, b, old), PAL_ERR_OK);
     for (int t = 0; t < 3; t++) {
@@ -484,7 +485,7 @@ static void factors_on_the_threads_it_was_called_on(void)
     grid g = make_grid(12, 12, 12);
     pal_cholesky *c;
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(pal_cholesky_create(&g.a, g.held, &c) == PAL_ERR_OK);
+    REQUIRE(pal_cholesky_create(&g.a, g.fixed, &c) == PAL_ERR_OK);
     int n = count_threads();
     REQUIRE(pal_cholesky_factor(c, &g.a, false) == PAL_ERR_OK);
     CHECK_INT(count_threads(), n);
@@ -511,7 +512,7 @@ static void survives_every_request_for_memory_that_fails(void)
         pal_cholesky_destroy(c);
         c = NULL;
         requests = 0, refuse = ++n_create;
-        pal_err err = pal_cholesky_create(&g.a, g.held, &c);
+        pal_err err = pal_cholesky_create(&g.a, g.fixed, &c);
         CHECK(!err || err == PAL_ERR_MEMORY);
     } while (requests >= refuse && n_create < 2000);
     refuse = 0;
@@ -568,48 +569,48 @@ static void an_incomplete_factor_without_fill_is_whole(void)
             for (int c = 0; c < 9 && g.a.row[k] > j + 1; c++) g.a.value[9 * (size_t)k + (size_t)c] = 0;
     double *b = calloc(3 * (size_t)g.n, sizeof *b), *x = calloc(3 * (size_t)g.n, sizeof *x);
     for (int i = 0; i < 3 * g.n; i++) b[i] = draw();
-    pal_incomplete f;
-    REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+    pal_incomplete_cholesky f;
+    REQUIRE(!pal_incomplete_cholesky_make(&g.a, g.fixed, g.arena, &f) && !pal_incomplete_cholesky_factor(&f, &g.a));
     CHECK_NEAR(f.shift, 0, 0);
-    pal_incomplete_solve(&f, b, x);
-    CHECK_LE(residual(&g, g.held, x, b), 1e-6);
+    pal_incomplete_cholesky_solve(&f, b, x);
+    CHECK_LE(residual(&g, g.fixed, x, b), 1e-6);
     free(b), free(x);
     pal_arena_destroy(g.arena);
 }
 
 typedef struct gradients {
     const grid *g;
-    const pal_incomplete *f; /* NULL: the diagonal alone */
+    const pal_incomplete_cholesky *f; /* NULL: the diagonal alone */
 } gradients;
 
 static void multiply(void *user, const double *p, double *out)
 {
     const gradients *of = user;
     memset(out, 0, 3 * sizeof *out * (size_t)of->g->n);
-    pal_blocks_multiply(&of->g->a, 1, p, out);
-    for (int i = 0; i < 3 * of->g->n; i++) out[i] = of->g->held[i / 3] ? 0 : out[i];
+    pal_block_matrix_multiply(&of->g->a, 1, p, out);
+    for (int i = 0; i < 3 * of->g->n; i++) out[i] = of->g->fixed[i / 3] ? 0 : out[i];
 }
 
 static void precondition(void *user, const double *r, double *out)
 {
     const gradients *of = user;
     if (of->f) {
-        pal_incomplete_solve(of->f, r, out);
+        pal_incomplete_cholesky_solve(of->f, r, out);
         return;
     }
     for (int i = 0; i < 3 * of->g->n; i++)
         out[i] =
-            of->g->held[i / 3] ? 0 : r[i] / of->g->a.value[9 * (size_t)of->g->a.start[i / 3] + 4 * (size_t)(i % 3)];
+            of->g->fixed[i / 3] ? 0 : r[i] / of->g->a.value[9 * (size_t)of->g->a.start[i / 3] + 4 * (size_t)(i % 3)];
 }
 
-static int iterations(const grid *g, const pal_incomplete *f, const double *b, double *x)
+static int iterations(const grid *g, const pal_incomplete_cholesky *f, const double *b, double *x)
 {
     double *room = calloc(12 * (size_t)g->n, sizeof *room), *r = room, size = 0;
     const size_t n = 3 * (size_t)g->n;
-    for (size_t i = 0; i < n; i++) r[i] = g->held[i / 3] ? 0 : b[i], size += r[i] * r[i], x[i] = 0;
+    for (size_t i = 0; i < n; i++) r[i] = g->fixed[i / 3] ? 0 : b[i], size += r[i] * r[i], x[i] = 0;
     gradients of = {g, f};
-    pal_conjugate cg = {(int)n, multiply, precondition, &of, r, room + n, room + 2 * n, room + 3 * n, -1};
-    const int turns = pal_conjugate_run(&cg, x, 1e-8 * sqrt(size), 1, 5000);
+    pal_conjugate_gradient cg = {(int)n, multiply, precondition, &of, r, room + n, room + 2 * n, room + 3 * n, -1};
+    const int turns = pal_conjugate_gradient_run(&cg, x, 1e-8 * sqrt(size), 1, 5000);
     free(room);
     return turns;
 }
@@ -630,13 +631,13 @@ static void conjugate_gradients_gain_from_an_incomplete_factor(void)
     double *b = calloc(3 * (size_t)g.n, sizeof *b), *x = calloc(3 * (size_t)g.n, sizeof *x);
     for (int i = 0; i < 3 * g.n; i++) b[i] = 1e-5 * draw();
     for (size_t k = 0; k < sizeof body / sizeof *body; k++) {
-        pal_incomplete f;
+        pal_incomplete_cholesky f;
         fill_grid(&g, 3e4, 0, body[k].kappa, body[k].factor);
-        REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+        REQUIRE(!pal_incomplete_cholesky_make(&g.a, g.fixed, g.arena, &f) && !pal_incomplete_cholesky_factor(&f, &g.a));
         const int diagonal = iterations(&g, NULL, b, x), incomplete = iterations(&g, &f, b, x);
         printf("  kappa %g%s: %d iterations, %d by the diagonal; shift %.2g\n", body[k].kappa,
                body[k].factor ? ", soft voxels" : "", incomplete, diagonal, f.shift);
-        CHECK_LE(residual(&g, g.held, x, b), 1e-8);
+        CHECK_LE(residual(&g, g.fixed, x, b), 1e-8);
         CHECK_LE(2 * incomplete, diagonal);
     }
     free(b), free(x);
@@ -646,17 +647,17 @@ static void conjugate_gradients_gain_from_an_incomplete_factor(void)
 static void an_incomplete_factor_refuses_what_has_none(void)
 {
     grid g = make_grid(3, 2, 2);
-    pal_incomplete f;
+    pal_incomplete_cholesky f;
     fill_grid(&g, 1, 0, 5, NULL);
-    REQUIRE(!pal_incomplete_make(&g.a, g.held, g.arena, &f) && !pal_incomplete_factor(&f, &g.a));
+    REQUIRE(!pal_incomplete_cholesky_make(&g.a, g.fixed, g.arena, &f) && !pal_incomplete_cholesky_factor(&f, &g.a));
     const int last = g.n - 1; /* not held */
     double *v = g.a.value + 9 * (size_t)g.a.start[last], was = v[4];
     v[4] = -1;
-    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_NUMERIC);
+    CHECK_INT(pal_incomplete_cholesky_factor(&f, &g.a), PAL_ERR_NUMERIC);
     v[4] = NAN;
-    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_NUMERIC);
+    CHECK_INT(pal_incomplete_cholesky_factor(&f, &g.a), PAL_ERR_NUMERIC);
     v[4] = was;
-    CHECK_INT(pal_incomplete_factor(&f, &g.a), PAL_ERR_OK);
+    CHECK_INT(pal_incomplete_cholesky_factor(&f, &g.a), PAL_ERR_OK);
     pal_arena_destroy(g.arena);
 }
 

@@ -195,7 +195,7 @@ static void finds_the_rotation_of_a_stretched_and_turned_matrix(void)
         product(at, a, a); /* a stretch */
         product(r, a, f);
         draw_quat(p);
-        pal_polar_turn(f, p, 100);
+        pal_polar_rotation(f, p, 100);
         pal_quat_matrix(p, found);
         CHECK_LE(distance(found, r, 9), 1e-10);
         CHECK_NEAR(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3], 1, 1e-15);
@@ -211,12 +211,12 @@ static void needs_three_turns_from_a_warm_start(void)
         pal_quat_matrix(q, old);
         for (int i = 0; i < 9; i++) f[i] = (i % 4 == 0) + 0.1 * draw(); /* strains of 10 %, turned by up to 0.1 */
         product(old, f, f);
-        int n = pal_polar_turn(f, q, 100);
+        int n = pal_polar_rotation(f, q, 100);
         if (n > most) most = n;
         CHECK_LE(shortfall(f, q), 1e-14);
         pal_quat_matrix(q, r);
         CHECK(distance(r, old, 9) < 0.4);
-        CHECK_INT(pal_polar_turn(f, q, 100), 1); /* there already */
+        CHECK_INT(pal_polar_rotation(f, q, 100), 1); /* there already */
     }
     CHECK_LE(most, 4);
 }
@@ -233,14 +233,14 @@ static void leaves_the_saddle_half_a_turn_off(void)
         for (int i = 0; i < 9; i++) half[i] = 2 * k[i / 3] * k[i % 3] - (i % 4 == 0);
         product(r, half, f);
         memcpy(p, q, sizeof p);
-        pal_polar_turn(f, p, 100);
+        pal_polar_rotation(f, p, 100);
         pal_quat_matrix(p, found);
         CHECK_LE(distance(found, f, 9), 1e-12);
         /* stretched along the axis and beside it: a saddle whose skew part is zero */
         double s[9] = {3, 0, 0, 0, 2, 0, 0, 0, 0.5};
         product(f, s, f);
         memcpy(p, q, sizeof p);
-        pal_polar_turn(f, p, 100);
+        pal_polar_rotation(f, p, 100);
         CHECK_LE(shortfall(f, p), 1e-12);
     }
 }
@@ -251,13 +251,13 @@ static void never_fails_where_the_determinant_is_zero_or_negative(void)
         double f[9], q[4], again[4];
         draw_with(values[t % N_VALUES], f);
         draw_quat(q);
-        int n = pal_polar_turn(f, q, 100);
+        int n = pal_polar_rotation(f, q, 100);
         CHECK(n <= 20);
         CHECK_LE(shortfall(f, q), 1e-11 * values[t % N_VALUES][0]);
         CHECK_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1, 1e-14);
         /* where many rotations serve, the one at hand stays */
         memcpy(again, q, sizeof q);
-        pal_polar_turn(f, again, 100);
+        pal_polar_rotation(f, again, 100);
         if (t % N_VALUES != 4) CHECK_LE(distance(again, q, 4), 1e-7);
     }
 }
@@ -267,11 +267,11 @@ static void stays_where_there_is_nothing_to_follow(void)
     double zero[9] = {0}, bad[9] = {1, 0, 0, 0, NAN, 0, 0, 0, 1}, huge[9] = {1, 0, 0, 0, INFINITY, 0, 0, 0, 1};
     double q[4] = {0.5, -0.5, 0.5, 0.5}, old[4];
     memcpy(old, q, sizeof q);
-    CHECK_INT(pal_polar_turn(zero, q, 100), 0);
-    CHECK_INT(pal_polar_turn(bad, q, 100), 0);
-    CHECK_INT(pal_polar_turn(huge, q, 100), 0);
+    CHECK_INT(pal_polar_rotation(zero, q, 100), 0);
+    CHECK_INT(pal_polar_rotation(bad, q, 100), 0);
+    CHECK_INT(pal_polar_rotation(huge, q, 100), 0);
     CHECK(!memcmp(q, old, sizeof q));
-    CHECK_INT(pal_polar_turn((double[9]){0, -1, 0, 1, 0, 0, 0, 0, 1}, q, 0), 0);
+    CHECK_INT(pal_polar_rotation((double[9]){0, -1, 0, 1, 0, 0, 0, 0, 1}, q, 0), 0);
     CHECK(!memcmp(q, old, sizeof q));
 }
 
@@ -283,7 +283,7 @@ static void does_not_mind_the_size_of_the_matrix(void)
         draw_quat(q);
         pal_quat_matrix(q, r);
         for (int i = 0; i < 9; i++) f[i] = size[t] * r[i];
-        pal_polar_turn(f, p, 100);
+        pal_polar_rotation(f, p, 100);
         pal_quat_matrix(p, found);
         CHECK_LE(distance(found, r, 9), 1e-12);
     }
@@ -298,7 +298,7 @@ static void follows_ten_thousand_turns(void)
         double a = tau * (i % 10) / 10, c = cos(a), s = sin(a), r[9];
         double f[9] = {1.1 * c, -0.9 * s, 0, 1.1 * s, 0.9 * c, 0, 0, 0, 1.02};
         double wanted[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
-        pal_polar_turn(f, q, 20);
+        pal_polar_rotation(f, q, 20);
         pal_quat_matrix(q, r);
         worst = fmax(worst, distance(r, wanted, 9));
     }

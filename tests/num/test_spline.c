@@ -56,8 +56,8 @@ static void the_lattice_gives_the_place_itself(void)
 static void quadrature_is_exact_to_degree_seven(void)
 {
     double sum = 0, ones = 0, beyond = 0;
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double x[3], w = pal_cell_point(p, x);
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        double x[3], w = pal_cell_gauss_point(p, x);
         ones += w;
         sum += w * pow(x[0], 7) * pow(x[1], 6) * x[2];
         beyond += w * pow(x[0], 8);

@@ -96,30 +96,30 @@ static void matrix_is_the_interpolation_of_its_points(void)
     enum { N = 300 };
     const pal_grid grid = {{5, 5, 3}, {-1, -1, -1}, {1, 1, 1}};
     double x[3 * N], value[75], used[75], at[N], back[75] = {0}, random[N], left = 0, right = 0;
-    pal_weights w;
+    pal_grid_weights w;
     for (int i = 0; i < 3 * N; i++) x[i] = 1.2 * uniform();
     for (int i = 0; i < 75; i++) value[i] = uniform();
     for (int i = 0; i < N; i++) random[i] = uniform();
-    REQUIRE(pal_weights_make(&grid, x, N, &w) == PAL_ERR_OK);
+    REQUIRE(pal_grid_weights_make(&grid, x, N, &w) == PAL_ERR_OK);
     CHECK_INT(w.n_point, N);
     CHECK_LE(w.start[N], 8 * N);
     for (int k = 0; k < w.n_used; k++) {
         used[k] = value[w.used[k]];
         CHECK(k == 0 || w.used[k] > w.used[k - 1]);
     }
-    pal_weights_apply(&w, used, at);
+    pal_grid_weights_apply(&w, used, at);
     for (int i = 0; i < N; i++) CHECK_NEAR(at[i], pal_trilinear_at(&grid, value, x + 3 * i), 1e-15);
     /* (W a).b = a.(W' b), and W' adds */
-    pal_weights_transpose(&w, random, back);
+    pal_grid_weights_apply_transpose(&w, random, back);
     for (int i = 0; i < N; i++) left += at[i] * random[i];
     for (int k = 0; k < w.n_used; k++) right += back[k] * used[k];
     CHECK_NEAR(left, right, 1e-12);
     double once = back[0];
-    pal_weights_transpose(&w, random, back);
+    pal_grid_weights_apply_transpose(&w, random, back);
     CHECK_NEAR(back[0], 2 * once, 1e-15);
-    pal_weights_free(&w);
+    pal_grid_weights_free(&w);
     CHECK(w.used == NULL && w.n_point == 0);
-    pal_weights_free(&w);
+    pal_grid_weights_free(&w);
 }
 
 /* points in the lower half along x of a 9x3x3 grid touch its first five planes only: 45 of 81 nodes, and those exactly
@@ -129,22 +129,22 @@ static void nodes_that_touch_no_point_are_dropped(void)
     const pal_grid grid = {{9, 3, 3}, {0, 0, 0}, {8, 2, 2}};
     double x[3 * 5 * 5 * 5];
     int n = 0;
-    pal_weights w;
+    pal_grid_weights w;
     for (int i = 0; i < 5; i++)
         for (int j = 0; j < 5; j++)
             for (int k = 0; k < 5; k++, n++) x[3 * n] = i, x[3 * n + 1] = 0.5 * j, x[3 * n + 2] = 0.5 * k;
-    REQUIRE(pal_weights_make(&grid, x, n, &w) == PAL_ERR_OK);
+    REQUIRE(pal_grid_weights_make(&grid, x, n, &w) == PAL_ERR_OK);
     CHECK_INT(w.n_used, 45);
     for (int k = 0; k < w.n_used; k++) {
         CHECK_INT(w.used[k] % 9, k % 5);
         CHECK_INT(w.used[k] / 9, k / 5);
     }
     for (int k = 0; k < w.start[n]; k++) CHECK(w.weight[k] > 0 && w.node[k] >= 0 && w.node[k] < w.n_used);
-    pal_weights_free(&w);
-    REQUIRE(pal_weights_make(&grid, x, 0, &w) == PAL_ERR_OK);
+    pal_grid_weights_free(&w);
+    REQUIRE(pal_grid_weights_make(&grid, x, 0, &w) == PAL_ERR_OK);
     CHECK_INT(w.n_used, 0);
     CHECK_INT(w.start[0], 0);
-    pal_weights_free(&w);
+    pal_grid_weights_free(&w);
 }
 
 int main(void)

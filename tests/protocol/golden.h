@@ -80,10 +80,10 @@ static inline pal_wire_haptic golden_haptic(void)
                          .n_patch = 2,
                          .origin_m = {0.123456789012345, -1e-9, 2},
                          .f_ref_N = {0.5f, -0.25f, 3},
-                         .has_grip = 1,
-                         .grip_x0_m = {0.01f, 0.02f, 0.03f},
-                         .grip_f0_N = {1, 2, 3},
-                         .grip_k_N_m = {100, 1, 2, 110, 3, 120},
+                         .has_grasp = 1,
+                         .grasp_x0_m = {0.01f, 0.02f, 0.03f},
+                         .grasp_f0_N = {1, 2, 3},
+                         .grasp_k_N_m = {100, 1, 2, 110, 3, 120},
                          .grip_b_N_s_m = 1.5f};
     for (uint32_t i = 0; i < h.n_patch; i++) {
         float k = (float)(i + 1);
@@ -199,7 +199,7 @@ static inline void golden_estimate(pal_wire_estimate *e)
                              .age_s = 0.25,
                              .ms = 16.25,
                              .own_ms = 81.5,
-                             .most_m = 0.0125,
+                             .max_m = 0.0125,
                              .error_m = 1e-3,
                              .discretisation_m = 7e-4,
                              .algebraic_m = 1e-9,
@@ -207,7 +207,7 @@ static inline void golden_estimate(pal_wire_estimate *e)
                              .model_m = 1e-4,
                              .zz_percent = 12.5,
                              .locking = true,
-                             .note = "nearly incompressible",
+                             .diag = "nearly incompressible",
                              .n_neighbour = 2};
     e->neighbour[0] = (pal_wire_neighbour){"resolution", "fem, 24 voxels", 54.2, 3e-4, 24, 0, 0};
     e->neighbour[1] = (pal_wire_neighbour){"tolerance", "fem, 0.01", NAN, NAN, 0, 0, 0.01};
@@ -216,7 +216,7 @@ static inline void golden_estimate(pal_wire_estimate *e)
 /* nothing is known yet: what is not a number is not on the wire */
 static inline void golden_no_estimate(pal_wire_estimate *e)
 {
-    *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .most_m = NAN};
+    *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .max_m = NAN};
     e->age_s = e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->zz_percent = NAN;
 }
 
@@ -243,14 +243,14 @@ static inline void golden_control(pal_control_type type, pal_control *c)
                                       .n_row = 3,
                                       .row_ms = {0.001, 1.0 / 3, 0.03},
                                       .n_row_name = 3,
-                                      .row = {"gravity", "verlet", "field_out"},
+                                      .row = {"gravity", "verlet", "field_output"},
                                       .n_member = 2,
                                       .bytes_s = 312000,
                                       .rtt_ms = 0.4,
                                       .n_skipped = 5,
                                       .n_late = 6,
                                       .n_refused = 7,
-                                      .note = "slower than real time"};
+                                      .diag = "slower than real time"};
         break;
     case PAL_CONTROL_MEMBERS:
         c->members.n_member = 2;
@@ -293,12 +293,12 @@ static inline void golden_control(pal_control_type type, pal_control *c)
 
 /* what came with settings, rescues and switches of rows */
 static inline void golden_rows(uint32_t n, uint32_t *n_part, double *part, uint32_t *n_why,
-                               char (*why)[PAL_WIRE_WHY_BYTES])
+                               char (*reason)[PAL_WIRE_WHY_BYTES])
 {
     *n_part = *n_why = n;
     for (uint32_t i = 0; i < n; i++) {
         part[i] = (double)i - 1;
-        snprintf(why[i], PAL_WIRE_WHY_BYTES, "bodies[0].model \"fem\" %u", i);
+        snprintf(reason[i], PAL_WIRE_WHY_BYTES, "bodies[0].model \"fem\" %u", i);
     }
 }
 

@@ -103,9 +103,9 @@ static void make_haptic(void)
             h.hold_us, h.frame_us);
     doubles("origin", h.origin_m, 3, ",");
     floats("fRef", h.f_ref_N, 3, ",\"grip\":{");
-    floats("x0", h.grip_x0_m, 3, ",");
-    floats("f0", h.grip_f0_N, 3, ",");
-    floats("k", h.grip_k_N_m, 6, ",");
+    floats("x0", h.grasp_x0_m, 3, ",");
+    floats("f0", h.grasp_f0_N, 3, ",");
+    floats("k", h.grasp_k_N_m, 6, ",");
     fprintf(expected, "\"b\":%.9g},\"patches\":[\n", (double)h.grip_b_N_s_m);
     for (uint32_t i = 0; i < h.n_patch; i++) {
         const pal_wire_patch *p = &h.patch[i];
@@ -250,19 +250,19 @@ static void make_asset_and_frames(void)
 static void make_control(void)
 {
     static char text[PAL_CONTROL_OUT_MAX + 1], all[64 * 1024];
-    size_t n_all = 0, n_byte;
+    size_t n_finest = 0, n_byte;
     static pal_control c;
     fprintf(expected, "\"control\":[\n");
     for (int line = 0; line < GOLDEN_CONTROL_LINES; line++) {
         golden_line(line, &c);
         need(!pal_control_put(text, sizeof text, &c, &n_byte), pal_control_name(c.type));
         fprintf(expected, "%s%s", line ? ",\n" : "", text);
-        need(n_all + n_byte + 1 <= sizeof all, "control room");
-        memcpy(all + n_all, text, n_byte);
-        all[n_all + n_byte] = '\n';
-        n_all += n_byte + 1;
+        need(n_finest + n_byte + 1 <= sizeof all, "control room");
+        memcpy(all + n_finest, text, n_byte);
+        all[n_finest + n_byte] = '\n';
+        n_finest += n_byte + 1;
     }
-    save("control.jsonl", all, n_all);
+    save("control.jsonl", all, n_finest);
     fprintf(expected, "]}\n");
 }
 

@@ -264,11 +264,11 @@ static void largest_messages_fit_their_limit(void)
     full.status.n_state = PAL_WIRE_PART_MAX;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
         full.status.state[i] = (pal_wire_part_state){i, true, true, "", 9007199254740991, 1 / 3.0};
-        memset(full.status.state[i].why, '"', PAL_WIRE_WHY_BYTES - 1);
+        memset(full.status.state[i].reason, '"', PAL_WIRE_WHY_BYTES - 1);
     }
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
-    CHECK(again.status.n_active == PAL_WIRE_PART_MAX && again.status.active[15].n_all_spring == UINT32_MAX);
+    CHECK(again.status.n_active == PAL_WIRE_PART_MAX && again.status.active[15].n_finest_spring == UINT32_MAX);
     CHECK(again.status.n_state == PAL_WIRE_PART_MAX && again.status.state[15].n_rescue == 9007199254740991);
 }
 

@@ -121,7 +121,7 @@ static void haptic_model_is_read_and_written_as_committed(void)
     CHECK_NEAR((double)h.echo_stamp_us, number(e, "echoStampUs"), 0);
     CHECK_NEAR(h.frame_us, number(e, "frameUs"), 0);
     for (int c = 0; c < 3; c++) CHECK_NEAR(h.origin_m[c], element(e, "origin", c), 0);
-    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grip_k_N_m[c], element(grip, "k", c), 1e-6);
+    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grip, "k", c), 1e-6);
     CHECK_NEAR((double)h.grip_b_N_s_m, number(grip, "b"), 1e-8);
     for (int i = 0; i < (int)h.n_patch; i++) {
         const cJSON *patch = cJSON_GetArrayItem(cJSON_GetObjectItem(e, "patches"), i);

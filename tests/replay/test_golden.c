@@ -2,16 +2,16 @@
  * doubles. A change of a hash means that the answer of a step has changed: say why in the commit that changes it. */
 #include "server/sim/world/world.h"
 #include "tests/check.h"
+#include "tests/fixtures/adaptive_worlds.h"
 #include "tests/fixtures/boxes.h"
-#include "tests/fixtures/shells.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 
 static uint64_t run(pal_prepared *box, pal_scene *scene, void (*drive)(pal_world *, int), int n_step)
 {
     pal_world *world;
-    if (pal_world_create(scene, &note, &world)) {
-        printf("  %s\n", note.text);
+    if (pal_world_create(scene, &diag, &world)) {
+        printf("  %s\n", diag.text);
         return 0;
     }
     for (int i = 0; i < n_step; i++) {
@@ -36,7 +36,7 @@ static void pull_and_stiffen(pal_world *world, int tick)
                            (const double[3]){tick == 10 ? 0.08 : 0, 0, tick == 10 ? 0.03 : 0});
     if (tick == 60) {
         pal_material stiff = {.young_Pa = 9000, .poisson = 0.4, .density_kg_m3 = 1100, .damping_1_s = 2};
-        pal_world_material(world, 0, &stiff, &note);
+        pal_world_material(world, 0, &stiff, &diag);
     }
 }
 
@@ -54,12 +54,12 @@ static void collapse(pal_world *world, int tick)
     if (tick > 0) return;
     pal_body *body = pal_world_body(world, 0), *other = pal_world_body(world, 1);
     for (int i = 0; i < body->n_dof; i++)
-        for (int c = 0; c < 3 && !body->held[i]; c++) body->x[3 * i + c] = 0.0625;
+        for (int c = 0; c < 3 && !body->fixed[i]; c++) body->x[3 * i + c] = 0.0625;
     for (int i = 0; i < other->n_dof; i++) {
         other->v[3 * i] = 0.125 + 16 * other->x[3 * i + 1];
         other->v[3 * i + 1] = -16 * other->x[3 * i];
     }
-    pal_world_moved(world, 0);
+    pal_world_invalidate_limits(world, 0);
 }
 
 static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
@@ -67,18 +67,18 @@ static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
     /* as springs alone open again by their weight, and without it by what untangles them: the first is as it was before
      * there was that */
     static const uint64_t golden[] = {0x08f13457f5082aa2u, 0x747949b168bb8dd6u};
-    for (int untangle = 0; untangle < 2; untangle++) {
+    for (int recover = 0; recover < 2; recover++) {
         pal_prepared box;
         REQUIRE(!box_make(4, 3, 3, 0.01, &box));
-        pal_scene *scene = box_scene(&box, true, !untangle);
-        pal_item_put_number(&scene->body[0].model, "c_area_Js", 1e-7, NULL);
+        pal_scene *scene = box_scene(&box, true, !recover);
+        pal_entry_put_number(&scene->body[0].model, "c_area_Js", 1e-7, NULL);
         scene->n_body = 2;
         pal_body_default(&scene->body[1], "other", &box);
         scene->body[1].output.name[0] = 0;
         scene->body[1].n_support = scene->body[1].n_effect = 0;
         scene->body[1].material.damping_1_s = 0;
-        pal_item_put_number(&scene->body[1].model, "k_area_J", 0, NULL);
-        CHECK(run(&box, scene, collapse, 40) == golden[untangle]);
+        pal_entry_put_number(&scene->body[1].model, "k_area_J", 0, NULL);
+        CHECK(run(&box, scene, collapse, 40) == golden[recover]);
     }
 }
 
@@ -98,9 +98,9 @@ static void a_pressed_and_grabbed_block_has_its_golden_hash(void)
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
     pal_body_def *def = &scene->body[0];
-    pal_item_put_number(&def->model, "c_distance_Js", 2e-7, NULL);
-    pal_item_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
-    pal_item_init(&def->effect[def->n_effect++], "effects[3]", "tool_grab");
+    pal_entry_put_number(&def->model, "c_distance_Js", 2e-7, NULL);
+    pal_entry_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
     CHECK(run(&box, scene, press_and_grab, 100) == 0x4a0d36bd83ed8daeu);
@@ -124,9 +124,9 @@ static void a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash(void)
     shell_scene_take(&s, &stomach.surface);
     shell_scene_number(&s, "levels", 3);
     shell_scene_hold(&s, low, high);
-    pal_item_put_text(shell_scene_effect(&s, "inflate"), "kind", "fluid", NULL);
+    pal_entry_put_text(shell_scene_effect(&s, "inflate"), "kind", "fluid", NULL);
     shell_scene_effect(&s, "tool_push");
-    shell_scene_effect(&s, "tool_grab");
+    shell_scene_effect(&s, "tool_grasp");
     pal_tools_default(s.scene, 2);
     s.scene->tool[0].radius_m = s.scene->tool[1].radius_m = 0.015;
     REQUIRE(shell_scene_start(&s));

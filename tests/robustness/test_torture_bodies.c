@@ -2,12 +2,12 @@
  * nothing happened. All bodies share the world's sub-steps: where the one that is stopped was the one that asked for
  * more, the others go on in longer ones, near what they were. Bodies do not touch. */
 #include "server/robustness/torture.h"
+#include "tests/fixtures/adaptive_worlds.h"
 #include "tests/fixtures/fem_beam.h"
-#include "tests/fixtures/shells.h"
 
 enum { STEPS = 12, AT = 4 };
 
-static pal_note note;
+static pal_diagnostic diag;
 
 /* two beams of fem and one of springs, or three of springs, at one place: bodies do not meet each other */
 static void three_make(fem_beam *b, bool springs)
@@ -15,21 +15,21 @@ static void three_make(fem_beam *b, bool springs)
     beam_make(b, 5, 2, 2, 0.01, true);
     b->scene->n_body = 3;
     b->def->material.damping_1_s = 20;
-    pal_item_init(&b->def->effect[b->def->n_effect++], "effects[0]", "finite_guard");
+    pal_entry_init(&b->def->effect[b->def->n_effect++], "effects[0]", "finite_guard");
     if (springs) {
-        pal_item_init(&b->def->model, "model", "tet_springs");
-        pal_item_init(&b->def->solver, "solver", "verlet");
+        pal_entry_init(&b->def->model, "model", "tet_springs");
+        pal_entry_init(&b->def->solver, "solver", "verlet");
     }
     for (int k = 1; k < 3; k++) b->scene->body[k] = b->scene->body[0];
     strcpy(b->scene->body[1].name, "second");
     strcpy(b->scene->body[2].name, "springs");
-    pal_item_init(&b->scene->body[2].model, "model", "tet_springs");
-    pal_item_init(&b->scene->body[2].solver, "solver", "verlet");
-    REQUIRE(!beam_open(b, &note));
+    pal_entry_init(&b->scene->body[2].model, "model", "tet_springs");
+    pal_entry_init(&b->scene->body[2].solver, "solver", "verlet");
+    REQUIRE(!beam_open(b, &diag));
     for (int k = 0; k < 3; k++) {
         pal_body *body = pal_world_body(b->world, k);
         for (int i = 0; i < body->n_dof; i++)
-            if (!body->held[i]) body->v[3 * i + 2] = 0.2 * body->x[3 * i] / b->length_m;
+            if (!body->fixed[i]) body->v[3 * i + 2] = 0.2 * body->x[3 * i] / b->length_m;
     }
 }
 
@@ -45,8 +45,8 @@ static void throw_away(pal_world *world, int which)
 {
     pal_body *body = pal_world_body(world, which);
     for (int i = 0; i < body->n_dof; i++)
-        if (!body->held[i]) body->x[3 * i] += 100 * body->size_m;
-    pal_world_moved(world, which);
+        if (!body->fixed[i]) body->x[3 * i] += 100 * body->length_scale_m;
+    pal_world_invalidate_limits(world, which);
 }
 
 static bool same_bits(const pal_body *a, const pal_body *b)
@@ -60,7 +60,7 @@ static double apart(const pal_body *a, const pal_body *b)
 {
     double sum = 0;
     for (int i = 0; i < 3 * a->n_dof; i++) sum += (a->x[i] - b->x[i]) * (a->x[i] - b->x[i]);
-    return sqrt(sum / a->n_dof) / a->size_m;
+    return sqrt(sum / a->n_dof) / a->length_scale_m;
 }
 
 /* the others of a step: how many are what they are without the insult, and how far off the worst one is */
@@ -91,9 +91,9 @@ static void stop_one(insult *what, int which, bool springs, bool shared)
         CHECK(!pal_world_step(calm.world, calm.scene->step_s));
         n_same += others(&hurt, &calm, which, &most_S);
         if (i != STEPS) continue;
-        CHECK(stopped->frozen && stopped->why[0] && stopped->rescue.n_stopped == 1 && pal_body_finite(stopped));
+        CHECK(stopped->frozen && stopped->reason[0] && stopped->safeguards.n_stopped == 1 && pal_body_finite(stopped));
         for (int k = 0; k < 3; k++) CHECK(pal_world_body(hurt.world, k)->frozen == (k == which));
-        printf("  %s: %s\n", stopped->name, stopped->why);
+        printf("  %s: %s\n", stopped->name, stopped->reason);
         CHECK(!pal_world_reset_body(hurt.world, which) && !stopped->frozen);
     }
     printf("  %d of %d states of the others the same, %g S apart at most\n", n_same, 2 * n_step, most_S);
@@ -131,8 +131,8 @@ static void tortured_together_each_is_judged(void)
         static pal_torture_report report;
         pal_torture_default(&options);
         options.only = insult_name[k];
-        REQUIRE(!pal_torture(b.scene, &options, &report, &note));
-        printf("  %s: %s, %s\n", insult_name[k], pal_verdict_name(report.result[0].verdict), report.result[0].note);
+        REQUIRE(!pal_torture(b.scene, &options, &report, &diag));
+        printf("  %s: %s, %s\n", insult_name[k], pal_verdict_name(report.result[0].verdict), report.result[0].diag);
         CHECK(report.n == 1 && report.n_passed == 1);
     }
     beam_free(&b);
@@ -149,15 +149,15 @@ static void what_sleeps_under_a_meganewton_is_let_go(void)
     shell_scene_take(&s, &ball);
     shell_scene_hold(&s, (const double[3]){-1, -1, -1}, (const double[3]){1, 1, -0.04});
     s.scene->body[0].material.damping_1_s = 20;
-    pal_item_put_number(shell_scene_effect(&s, "sleep"), "still_s", 0.1, NULL);
+    pal_entry_put_number(shell_scene_effect(&s, "sleep"), "rest_time_s", 0.1, NULL);
     pal_torture_default(&options);
     options.only = "meganewton";
-    REQUIRE(!pal_torture(s.scene, &options, &report, &note));
+    REQUIRE(!pal_torture(s.scene, &options, &report, &diag));
     const pal_torture_result *r = &report.result[0];
-    printf("  %s, %s\n", pal_verdict_name(r->verdict), r->note);
+    printf("  %s, %s\n", pal_verdict_name(r->verdict), r->diag);
     CHECK_INT(report.n_passed, 1);
     CHECK_LE(r->left_S, 1e-3);
-    CHECK(strstr(r->note, "S away in RMS"));
+    CHECK(strstr(r->diag, "S away in RMS"));
     shell_scene_close(&s);
 }
 

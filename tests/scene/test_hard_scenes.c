@@ -3,7 +3,7 @@
  */
 #include "server/base/vec3.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "tests/stability/hard_case.h"
 
@@ -16,11 +16,11 @@ typedef struct hard_scene {
 static bool open_scene(const char *name, hard_scene *s)
 {
     char path[256];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     memset(s, 0, sizeof *s);
     snprintf(path, sizeof path, "tests/data/hard/%s.json", name);
-    if (pal_scene_load(path, &s->loaded, &note) || pal_world_create(&s->loaded->scene, &note, &s->world)) {
-        printf("  %s\n", note.text);
+    if (pal_scene_load(path, &s->loaded, &diag) || pal_world_create(&s->loaded->scene, &diag, &s->world)) {
+        printf("  %s\n", diag.text);
         return false;
     }
     s->body = pal_world_body(s->world, 0);
@@ -39,7 +39,7 @@ static double off(const hard_scene *s)
     double most = 0;
     for (int i = 0; i < s->body->n_node; i++)
         most = fmax(most, pal_dist3(s->body->d + 3 * i, s->body->node_rest + 3 * i));
-    return 100 * most / s->body->size_m;
+    return 100 * most / s->body->length_scale_m;
 }
 
 /* NaN: a step was refused, or the body frozen; else how far it was off rest at most */
@@ -96,9 +96,9 @@ static void a_body_follows_its_anchor(void)
         for (int j = 0; j < i; j++)
             stretch = fmax(stretch, fabs(pal_dist3(s.body->x + 3 * i, s.body->x + 3 * j) -
                                          pal_dist3(s.body->x_rest + 3 * i, s.body->x_rest + 3 * j)));
-    printf("  %.3g %% S away at most, distances change by %.3g %% S\n", most, 100 * stretch / s.body->size_m);
-    HARD_CASE("anchors", "fem", "scene: to and fro with 1.7 Hz, distances change by", 100 * stretch / s.body->size_m, 5,
-              "% S");
+    printf("  %.3g %% S away at most, distances change by %.3g %% S\n", most, 100 * stretch / s.body->length_scale_m);
+    HARD_CASE("anchors", "fem", "scene: to and fro with 1.7 Hz, distances change by",
+              100 * stretch / s.body->length_scale_m, 5, "% S");
     CHECK(most > 20);
     close_scene(&s);
 }
@@ -116,7 +116,7 @@ static void a_pull_on_a_led_body_is_forgotten(void)
         REQUIRE(isfinite(run(&s, 1.0 / 60, 1.0 / 60)) && isfinite(run(&still, 1.0 / 60, 1.0 / 60)));
         for (int n = 0; n < s.body->n_node; n++)
             off_m = fmax(off_m, pal_dist3(s.body->x + 3 * n, still.body->x + 3 * n));
-        away = 100 * off_m / s.body->size_m;
+        away = 100 * off_m / s.body->length_scale_m;
         pulled = fmax(pulled, away);
     }
     printf("  pulled %.3g %% S away, in the end %.3g %% S\n", pulled, away);
@@ -131,23 +131,23 @@ static void levels_do_not_flicker_at_the_threshold(void)
 {
     hard_scene s;
     REQUIRE(open_scene("threshold", &s));
-    const pal_shell *shell = s.body->shell;
-    const int n = shell->levels.first_face[shell->levels.n_level];
+    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const int n = adaptive->levels.first_face[adaptive->levels.n_level];
     uint8_t *was = malloc((size_t)n);
     int *switched = calloc((size_t)n, sizeof *switched), most = 0, top = 0, nodes = 0;
     for (int k = 0; k < s.body->n_active; k++)
         if (s.body->x_rest[3 * pal_body_point(s.body, k) + 2] > s.body->x_rest[3 * top + 2])
             top = pal_body_point(s.body, k);
     REQUIRE(was && switched);
-    memcpy(was, shell->face_state, (size_t)n);
+    memcpy(was, adaptive->face_state, (size_t)n);
     for (int i = 0; i < 120; i++) {
         REQUIRE(!pal_world_load(s.world, 0, top, (const double[3]){0, 0, i % 2 ? -0.99 * 0.0076 : -1.01 * 0.0076}));
         REQUIRE(run(&s, 1.0 / 60, 1.0 / 60) < 100);
         nodes = s.body->n_active > nodes ? s.body->n_active : nodes;
         for (int k = 0; k < n; k++) {
-            switched[k] += (shell->face_state[k] == PAL_FACE_SPLIT) != (was[k] == PAL_FACE_SPLIT);
+            switched[k] += (adaptive->face_state[k] == PAL_FACE_SPLIT) != (was[k] == PAL_FACE_SPLIT);
             most = switched[k] > most ? switched[k] : most;
-            was[k] = shell->face_state[k];
+            was[k] = adaptive->face_state[k];
         }
     }
     printf("  %d switches of a face in 2 s at most, %d nodes of %d\n", most, nodes, s.body->n_node);
@@ -169,7 +169,7 @@ static void an_hour_under_its_weight_moves_nothing(void)
     memcpy(x, s.body->x, n_byte);
     REQUIRE(run(&s, CHECK_REPEATS(3600, 100), 1) > 0.1);
     for (int i = 0; i < s.body->n_dof; i++) drift = fmax(drift, pal_dist3(s.body->x + 3 * i, x + 3 * i));
-    HARD_CASE("hour", "fem", "scene: drift in an hour", drift / s.body->size_m, 1e-6, "S");
+    HARD_CASE("hour", "fem", "scene: drift in an hour", drift / s.body->length_scale_m, 1e-6, "S");
     free(x);
     close_scene(&s);
 }

@@ -32,23 +32,23 @@ static char *build(const parts *p)
 static void expect_refusal(const char *text, const char *sentence)
 {
     pal_problem *problem = NULL;
-    pal_note note = {""};
-    pal_err err = pal_problem_parse("p.json", text, strlen(text), "/nowhere", &problem, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_problem_parse("p.json", text, strlen(text), "/nowhere", &problem, &diag);
     CHECK_INT(err, PAL_ERR_REFUSED);
     CHECK(problem == NULL);
     free(problem);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (strncmp(note.text, "p.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", note.text);
-    if (strchr(note.text, '\n')) CHECK_FAIL("\"%s\" has a line end", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (strncmp(diag.text, "p.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", diag.text);
+    if (strchr(diag.text, '\n')) CHECK_FAIL("\"%s\" has a line end", diag.text);
 }
 
 static pal_problem *expect_good(const char *text)
 {
     pal_problem *problem = NULL;
-    pal_note note = {""};
-    pal_err err = pal_problem_parse("d/p.json", text, strlen(text), "/folder", &problem, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_problem_parse("d/p.json", text, strlen(text), "/folder", &problem, &diag);
     CHECK_INT(err, PAL_ERR_OK);
-    if (err) CHECK_FAIL("refused: %s", note.text);
+    if (err) CHECK_FAIL("refused: %s", diag.text);
     return err ? NULL : problem;
 }
 
@@ -303,11 +303,10 @@ static void the_shared_references_are_read(void)
     for (int k = 0; k < 3; k++) {
         const char *path = check_shared(known[k].path);
         pal_problem *p = NULL;
-        pal_note note = {""};
-        CHECK(true);
+        pal_diagnostic diag = {""};
         if (!path) continue;
-        pal_err err = pal_problem_read(path, &p, &note);
-        if (err) CHECK_FAIL("refused: %s", note.text);
+        pal_err err = pal_problem_read(path, &p, &diag);
+        if (err) CHECK_FAIL("refused: %s", diag.text);
         REQUIRE(!err);
         CHECK_INT(p->n_material, known[k].n_material);
         CHECK_INT(p->n_case, known[k].n_case);
@@ -323,9 +322,9 @@ static void the_shared_references_are_read(void)
 static void files_that_cannot_be_read_are_named(void)
 {
     pal_problem *p = NULL;
-    pal_note note = {""};
-    CHECK_INT(pal_problem_read("/nowhere/p.json", &p, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/nowhere/p.json") != NULL);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_problem_read("/nowhere/p.json", &p, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/nowhere/p.json") != NULL);
 }
 
 int main(void)

@@ -28,17 +28,17 @@ static bool open_it(const char *name, open_problem *out)
     char path[512];
     uint8_t *bytes = NULL;
     size_t n_byte;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_surface_report report;
     snprintf(path, sizeof path, "%s/%s", folder, name);
     *out = (open_problem){0};
-    pal_err err = pal_problem_read(path, &out->problem, &note);
+    pal_err err = pal_problem_read(path, &out->problem, &diag);
     pal_mesh_file_options options = {.unit_m = err ? 1 : out->problem->unit_m, .weld = PAL_MESH_WELD};
-    if (!err) err = pal_mesh_file_read(out->problem->surface, &options, &out->surface, &report, NULL, NULL, &note);
-    if (!err) err = pal_file_read(path, 1 << 20, &bytes, &n_byte, &note);
+    if (!err) err = pal_mesh_file_read(out->problem->surface, &options, &out->surface, &report, NULL, NULL, &diag);
+    if (!err) err = pal_file_read(path, 1 << 20, &bytes, &n_byte, &diag);
     if (!err) out->json = cJSON_ParseWithLength((const char *)bytes, n_byte);
     free(bytes);
-    if (err || !out->json) CHECK_FAIL("%s: %s", name, note.text);
+    if (err || !out->json) CHECK_FAIL("%s: %s", name, diag.text);
     return !err && out->json;
 }
 

@@ -11,10 +11,10 @@ static pal_prepared mesh;
 #define BODY(regions)                                                                                                  \
     "{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"model\": {\"name\": \"fem\"}, \"regions\": " regions "}]}"
 
-static pal_loaded_scene *parse(const char *text, pal_note *note)
+static pal_loaded_scene *parse(const char *text, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, note);
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, diag);
     return err ? NULL : loaded;
 }
 
@@ -58,14 +58,14 @@ static bool write_scan(const char *name, const float axes[3][3], const float fir
 
 static void boxes_and_grids_hold_where_they_say(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_loaded_scene *s = parse(
         BODY("[{\"box\": {\"low_m\": [-1, -1, -1], \"high_m\": [0, 1, 1]}, \"young_Pa\": 70000, \"poisson\": 0.3},"
              "{\"box\": {\"low_m\": [-1, -1, -1], \"high_m\": [-0.02, 1, 1]}, \"density_kg_m3\": 1500},"
              "{\"grid\": {\"n\": [2, 1, 1], \"low_m\": [0.02, 0, 0], \"high_m\": [0.03, 0, 0], \"poisson\": [0.1, "
              "0.2]}}]"),
-        &note);
-    if (!s) CHECK_FAIL("%s", note.text);
+        &diag);
+    if (!s) CHECK_FAIL("%s", diag.text);
     REQUIRE(s != NULL);
     CHECK_INT(s->scene.body[0].n_region, 3);
     CHECK_NEAR(at(s, 0.01, 0, 0).young_Pa, 5000, 0);
@@ -91,12 +91,12 @@ static void a_label_holds_in_its_voxels_however_the_scan_lies(void)
                 {"turned.nii", {{8, 6, 0}, {-12, 16, 0}, {0, 0, 30}}, {0, -25, -15}}};
     for (int l = 0; l < 3; l++) {
         char text[512];
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         REQUIRE(write_scan(lie[l].name, lie[l].axes, lie[l].first, corner_label));
         snprintf(text, sizeof text, BODY("[{\"label\": {\"volume\": \"%s\", \"is\": 2}, \"young_Pa\": 90000}]"),
                  lie[l].name);
-        pal_loaded_scene *s = parse(text, &note);
-        if (!s) CHECK_FAIL("%s", note.text);
+        pal_loaded_scene *s = parse(text, &diag);
+        if (!s) CHECK_FAIL("%s", diag.text);
         REQUIRE(s != NULL);
         /* points a third of a voxel from the middles of all voxels; the mesh's origin is that of the scan's frame */
         for (int v = 0; v < 24; v++) {
@@ -117,7 +117,7 @@ static void a_label_holds_in_its_voxels_however_the_scan_lies(void)
 static void a_saved_scene_has_the_same_material_everywhere(void)
 {
     char where[300];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const float axes[3][3] = {{-10, 0, 0}, {0, 0, -20}, {0, 30, 0}}, first[3] = {15, -15, 20};
     REQUIRE(write_scan("mirrored.nii", axes, first, corner_label));
     pal_loaded_scene *in =
@@ -125,15 +125,15 @@ static void a_saved_scene_has_the_same_material_everywhere(void)
                    "{\"label\": {\"volume\": \"mirrored.nii\", \"is\": 2}, \"poisson\": 0.31},"
                    "{\"grid\": {\"n\": [2, 2, 2], \"low_m\": [-0.04, -0.03, -0.02], \"high_m\": [0.03, 0.02, 0.04], "
                    "\"density_kg_m3\": [900, 950, 1000, 1050, 1100, 1111.1, 1200, 1300]}}]"),
-              &note);
-    if (!in) CHECK_FAIL("%s", note.text);
+              &diag);
+    if (!in) CHECK_FAIL("%s", diag.text);
     REQUIRE(in != NULL);
     snprintf(where, sizeof where, "%s/saved", folder);
-    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    CHECK_INT(pal_scene_save(in, where, &diag), 0);
     snprintf(where, sizeof where, "%s/saved/scene.json", folder);
     pal_loaded_scene *out = NULL;
-    pal_err err = pal_scene_load(where, &out, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_load(where, &out, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     int n_seen[2] = {0, 0}, n_differ = 0;
     for (int k = 0; k < 20 * 20 * 20; k++) {
@@ -190,22 +190,22 @@ static void every_bad_region_has_its_sentence(void)
     const float axes[3][3] = {{10, 0, 0}, {0, 20, 0}, {0, 0, 30}}, first[3] = {-15, -20, -15};
     REQUIRE(write_scan("plain.nii", axes, first, corner_label));
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
-        pal_note note = {""};
-        pal_loaded_scene *s = parse(bad[k].text, &note);
+        pal_diagnostic diag = {""};
+        pal_loaded_scene *s = parse(bad[k].text, &diag);
         CHECK(s == NULL);
         pal_scene_free(s);
-        if (!strstr(note.text, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, bad[k].sentence);
-        if (strncmp(note.text, "s.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", note.text);
+        if (!strstr(diag.text, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, bad[k].sentence);
+        if (strncmp(diag.text, "s.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", diag.text);
     }
 }
 
 int main(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     char path[300];
     if (!mkdtemp(folder) || !small_scene(&plain, &mesh, 8)) return 1;
     snprintf(path, sizeof path, "%s/ball.palmesh", folder);
-    if (pal_prepared_save(&mesh, path, &note)) return 1;
+    if (pal_prepared_save(&mesh, path, &diag)) return 1;
     RUN(boxes_and_grids_hold_where_they_say);
     RUN(a_label_holds_in_its_voxels_however_the_scan_lies);
     RUN(a_saved_scene_has_the_same_material_everywhere);

@@ -32,17 +32,17 @@ static bool write_text(const char *path, const char *text)
 static void expect_refusal(const char *text, const char *sentence)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
-    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &diag);
     CHECK(err != PAL_ERR_OK);
     CHECK(loaded == NULL);
     if (!err) {
         CHECK_FAIL("taken: %s", text);
         pal_scene_free(loaded);
     }
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (strncmp(note.text, "s.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", note.text);
-    if (strchr(note.text, '\n')) CHECK_FAIL("\"%s\" has a line end", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (strncmp(diag.text, "s.json: ", 8) != 0) CHECK_FAIL("\"%s\" does not name the file first", diag.text);
+    if (strchr(diag.text, '\n')) CHECK_FAIL("\"%s\" has a line end", diag.text);
 }
 
 static void what_is_not_json_is_refused_with_its_line(void)
@@ -63,12 +63,12 @@ static void big_files_are_refused_before_they_are_parsed(void)
     size_t n = (1 << 20) + 1;
     char *text = malloc(n + 1);
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(text != NULL);
     memset(text, ' ', n);
     text[n] = 0;
-    CHECK_INT(pal_scene_parse("s.json", text, n, folder, &loaded, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "more than 1048576") != NULL);
+    CHECK_INT(pal_scene_parse("s.json", text, n, folder, &loaded, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "more than 1048576") != NULL);
     free(text);
 }
 
@@ -220,11 +220,11 @@ static void absent_keys_take_the_defaults(void)
 {
     const char *text = "{\"bodies\": [{\"mesh\": \"ball.palmesh\"}]}";
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_scene want;
     pal_body_def body;
-    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     pal_scene_default(&want);
     pal_body_default(&body, "body 1", NULL);
@@ -258,9 +258,9 @@ static void given_keys_arrive(void)
         "\"supports\": [{\"lowest\": 0.2}, {\"box\": {\"low_m\": [-1, -2, -3], \"high_m\": [1, 2, 3]}}], \"effects\": "
         "[{\"name\": \"x\", \"yes\": true, \"word\": \"w\", \"list\": [1, 2.5], \"number\": -3}]}]}";
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
-    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, &loaded, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     const pal_scene *s = &loaded->scene;
     const pal_body_def *b = &s->body[0];
@@ -270,7 +270,7 @@ static void given_keys_arrive(void)
     CHECK_NEAR(s->step_s, 0.002, 0);
     CHECK_NEAR(s->up[1], 1, 0);
     CHECK_NEAR(s->gravity_m_s2, 1.62, 0);
-    CHECK_INT(s->most_substep, 77);
+    CHECK_INT(s->max_substep, 77);
     CHECK_INT(s->n_tool, 1);
     CHECK_TEXT(s->tool[0].name, "hook");
     CHECK_NEAR(s->tool[0].radius_m, 0.003, 0);
@@ -278,7 +278,7 @@ static void given_keys_arrive(void)
     CHECK_TEXT(b->name, "a b");
     CHECK_NEAR(b->material.damping_1_s, 0, 0);
     CHECK_TEXT(b->solver.name, "verlet");
-    CHECK_TEXT(b->output.name, "surface_out");
+    CHECK_TEXT(b->output.name, "surface_output");
     CHECK_INT(b->n_support, 2);
     CHECK(b->support[0].lowest && !b->support[1].lowest);
     CHECK_NEAR(b->support[1].low_m[2], -3, 0);
@@ -287,9 +287,9 @@ static void given_keys_arrive(void)
     CHECK_TEXT(b->effect[0].value[1].text, "w");
     CHECK_INT(b->effect[0].value[2].n_number, 2);
     CHECK_NEAR(b->effect[0].value[3].number[0], -3, 0);
-    pal_item model = b->model;
+    pal_config_entry model = b->model;
     double k = 0;
-    CHECK_INT(pal_item_number(&model, "k_distance_J", 0, 1, &k, &note), 0);
+    CHECK_INT(pal_entry_read_number(&model, "k_distance_J", 0, 1, &k, &diag), 0);
     CHECK_NEAR(k, 0.5, 0);
     pal_scene_free(loaded);
 }
@@ -297,9 +297,9 @@ static void given_keys_arrive(void)
 static uint64_t hash_after(const pal_scene *scene, int n_step)
 {
     pal_world *world = NULL;
-    pal_note note = {""};
-    if (pal_world_create(scene, &note, &world)) {
-        CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_world_create(scene, &diag, &world)) {
+        CHECK_FAIL("%s", diag.text);
         return 0;
     }
     pal_pose pose = {.position_m = {0, 0, 0.045}, .quat = {1, 0, 0, 0}};
@@ -316,20 +316,20 @@ static uint64_t hash_after(const pal_scene *scene, int n_step)
 static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
 {
     pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(in != NULL);
     in->scene = plain;
     in->scene.body[0].material = (pal_material){6543.21, 0.41, 1030, 3};
     in->scene.tool[0].radius_m = 0.1 / 3;
-    pal_item_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
+    pal_entry_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
     in->scene.body[0].n_support = 2;
-    in->scene.body[0].support[1] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {-0.04, 1, 1}};
+    in->scene.body[0].support[1] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, 1, 1}};
     char where[600];
     snprintf(where, sizeof where, "%s/a/b/saved", folder);
-    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    CHECK_INT(pal_scene_save(in, where, &diag), 0);
     snprintf(where, sizeof where, "%s/a/b/saved/scene.json", folder);
-    pal_err err = pal_scene_load(where, &out, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_load(where, &out, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     uint64_t before = hash_after(&in->scene, CHECK_REPEATS(100, 20));
     CHECK(before != 0);
@@ -347,7 +347,7 @@ static void constants_of_springs_come_back_bit_for_bit(void)
 {
     enum { N = 3 * 2 * 2 };
     pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double k_J[2][N];
     REQUIRE(in != NULL);
     in->scene = plain;
@@ -362,16 +362,16 @@ static void constants_of_springs_come_back_bit_for_bit(void)
     k_J[1][4] = 1.0 / 3, k_J[1][5] = nextafter(1, 2), k_J[1][6] = 3;
     def->spring_grid = (pal_spring_grid){
         {3, 2, 2}, {-0.05, -0.1 / 3, nextafter(-0.05, 0)}, {0.05, 0.1 / 3, 0.05}, {k_J[0], NULL, k_J[1]}};
-    pal_item_put_text(&def->model, "weights", "volume", NULL);
-    pal_item_put_number(&def->model, "k_area_J", nextafter(0.002, 1), NULL);
+    pal_entry_put_text(&def->model, "weights", "volume", NULL);
+    pal_entry_put_number(&def->model, "k_area_J", nextafter(0.002, 1), NULL);
     snprintf(in->scene.accuracy, sizeof in->scene.accuracy, "2.1 %% RMS \xc2\xb1 \"0.3\"");
     in->scene.max_error_m = 0.1 / 1000, in->scene.budget_ms = 1.0 / 3;
     char where[600];
     snprintf(where, sizeof where, "%s/springs", folder);
-    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    CHECK_INT(pal_scene_save(in, where, &diag), 0);
     snprintf(where, sizeof where, "%s/springs/scene.json", folder);
-    pal_err err = pal_scene_load(where, &out, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_load(where, &out, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     const pal_spring_grid *a = &def->spring_grid, *b = &out->scene.body[0].spring_grid;
     CHECK_TEXT(out->scene.accuracy, in->scene.accuracy);
@@ -382,7 +382,7 @@ static void constants_of_springs_come_back_bit_for_bit(void)
     REQUIRE(b->k_J[0] && !b->k_J[1] && b->k_J[2]);
     CHECK(memcmp(b->k_J[0], k_J[0], sizeof k_J[0]) == 0 && memcmp(b->k_J[2], k_J[1], sizeof k_J[1]) == 0);
     double area_J = 0;
-    CHECK_INT(pal_item_number(&out->scene.body[0].model, "k_area_J", 0, 1, &area_J, &note), 0);
+    CHECK_INT(pal_entry_read_number(&out->scene.body[0].model, "k_area_J", 0, 1, &area_J, &diag), 0);
     CHECK_NEAR(area_J, nextafter(0.002, 1), 0);
     /* and both make the same body */
     k_J[1][0] = k_J[1][1] = 1e-3;
@@ -398,17 +398,17 @@ static void constants_of_springs_come_back_bit_for_bit(void)
 
     /* what could not be read again is not written */
     def->spring_grid.n[0] = 1 << 15;
-    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_IO); /* a file stands where the folder would */
+    CHECK_INT(pal_scene_save(in, where, &diag), PAL_ERR_IO); /* a file stands where the folder would */
     snprintf(where, sizeof where, "%s/too_many", folder);
-    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "model.grid.n: 131072 nodes, more than 65536") != NULL);
+    CHECK_INT(pal_scene_save(in, where, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "model.grid.n: 131072 nodes, more than 65536") != NULL);
     double *many = malloc(sizeof *many << 16);
     REQUIRE(many != NULL);
     for (int i = 0; i < 1 << 16; i++) many[i] = 1.0 / 3;
     def->spring_grid.n[0] = 1 << 14;
     def->spring_grid.k_J[0] = def->spring_grid.k_J[2] = many;
-    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "scene.json: would have 2") != NULL);
+    CHECK_INT(pal_scene_save(in, where, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "scene.json: would have 2") != NULL);
     struct stat facts;
     snprintf(where, sizeof where, "%s/too_many/ball.palmesh", folder);
     CHECK(stat(where, &facts) != 0);
@@ -419,7 +419,7 @@ static void constants_of_springs_come_back_bit_for_bit(void)
 static void two_bodies_of_like_names_get_two_files(void)
 {
     pal_loaded_scene *in = calloc(1, sizeof *in), *out = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(in != NULL);
     in->scene = plain;
     in->scene.n_body = 2;
@@ -428,10 +428,10 @@ static void two_bodies_of_like_names_get_two_files(void)
     snprintf(in->scene.body[1].name, PAL_NAME, "left.. lobe");
     char where[600];
     snprintf(where, sizeof where, "%s/two", folder);
-    CHECK_INT(pal_scene_save(in, where, &note), 0);
+    CHECK_INT(pal_scene_save(in, where, &diag), 0);
     snprintf(where, sizeof where, "%s/two/scene.json", folder);
-    pal_err err = pal_scene_load(where, &out, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_load(where, &out, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_INT(out->scene.n_body, 2);
     CHECK_TEXT(out->scene.body[0].name, "Left/../ lobe");
@@ -443,18 +443,18 @@ static void two_bodies_of_like_names_get_two_files(void)
 static void a_save_that_fails_leaves_nothing(void)
 {
     pal_loaded_scene *in = calloc(1, sizeof *in);
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     struct stat facts;
     REQUIRE(in != NULL);
     in->scene = plain;
-    CHECK_INT(pal_scene_save(in, "/proc/no/such", &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/proc/no") != NULL);
+    CHECK_INT(pal_scene_save(in, "/proc/no/such", &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/proc/no") != NULL);
     /* scene.json cannot be written because a folder has its name */
     char where[600], there[700];
     snprintf(where, sizeof where, "%s/blocked", folder);
     snprintf(there, sizeof there, "%s/scene.json", where);
     REQUIRE(mkdir(where, 0777) == 0 && mkdir(there, 0777) == 0);
-    CHECK_INT(pal_scene_save(in, where, &note), PAL_ERR_IO);
+    CHECK_INT(pal_scene_save(in, where, &diag), PAL_ERR_IO);
     snprintf(there, sizeof there, "%s/ball.palmesh", where);
     CHECK(stat(there, &facts) != 0);
     free(in);
@@ -479,10 +479,10 @@ static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
     pal_surface_scene options = {.label = -1};
     pal_surface_scene_report report;
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(write_ball(in_folder("Ball \xc3\xa9\x01 7.obj"), 40));
-    pal_err err = pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     const pal_scene *s = &loaded->scene;
     CHECK_NEAR(s->body[0].mesh->tets.n_tet, 13000, 2600);
@@ -500,7 +500,7 @@ static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
     options.unit_m = 1;
     options.resolution = 10;
     options.material = (pal_material){1e6, 0.3, 1200, 1};
-    REQUIRE(!pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &note));
+    REQUIRE(!pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &diag));
     CHECK_NEAR(report.prepare.voxel.surface_volume_m3, 4.0 / 3 * M_PI * 1.25e5, 4e3);
     CHECK(!report.unit_guessed);
     CHECK_INT(report.resolution, 10);
@@ -520,9 +520,9 @@ static void flat_thin_and_long_shapes_also_get_about_13000_tets(void)
         fclose(file);
         pal_surface_scene options = {.label = -1, .unit_m = 1e-3};
         pal_loaded_scene *loaded = NULL;
-        pal_note note = {""};
-        pal_err err = pal_scene_from_surface(in_folder("box.obj"), &options, &loaded, NULL, &note);
-        if (err) CHECK_FAIL("%s", note.text);
+        pal_diagnostic diag = {""};
+        pal_err err = pal_scene_from_surface(in_folder("box.obj"), &options, &loaded, NULL, &diag);
+        if (err) CHECK_FAIL("%s", diag.text);
         REQUIRE(!err);
         CHECK_NEAR(log(loaded->scene.body[0].mesh->tets.n_tet / 13000.0), 0, 0.5);
         pal_scene_free(loaded);
@@ -546,9 +546,9 @@ static void overlapping_shapes_also_get_about_13000_tets(void)
     fclose(file);
     pal_surface_scene options = {.label = -1};
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
-    pal_err err = pal_scene_from_surface(in_folder("balls.obj"), &options, &loaded, NULL, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_scene_from_surface(in_folder("balls.obj"), &options, &loaded, NULL, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_NEAR(loaded->scene.body[0].mesh->tets.n_tet, 13000, 2600);
     pal_scene_free(loaded);
@@ -558,11 +558,11 @@ static void a_scene_may_name_a_surface(void)
 {
     const char *text = "{\"bodies\": [{\"surface\": \"b.obj\", \"units\": \"cm\", \"resolution\": 9}]}";
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(write_ball(in_folder("b.obj"), 10));
     REQUIRE(write_text(in_folder("surface.json"), text));
-    pal_err err = pal_scene_load(in_folder("surface.json"), &loaded, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_scene_load(in_folder("surface.json"), &loaded, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_NEAR(pal_tets_volume(&loaded->mesh[0].tets) / (4.0 / 3 * M_PI * 0.125), 1.5, 0.6);
     pal_scene_free(loaded);
@@ -572,16 +572,16 @@ static void what_is_no_surface_is_refused_and_names_the_file(void)
 {
     pal_surface_scene options = {.label = -1};
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
-    CHECK_INT(pal_scene_from_surface("/no/file.stl", &options, &loaded, NULL, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/no/file.stl") != NULL);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_scene_from_surface("/no/file.stl", &options, &loaded, NULL, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/no/file.stl") != NULL);
     REQUIRE(write_text(in_folder("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-    CHECK_INT(pal_scene_from_surface(in_folder("flat.obj"), &options, &loaded, NULL, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "flat.obj") != NULL);
+    CHECK_INT(pal_scene_from_surface(in_folder("flat.obj"), &options, &loaded, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "flat.obj") != NULL);
     REQUIRE(write_ball(in_folder("b.obj"), 10));
     options.label = 3;
-    CHECK_INT(pal_scene_from_surface(in_folder("b.obj"), &options, &loaded, NULL, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "label 3") != NULL);
+    CHECK_INT(pal_scene_from_surface(in_folder("b.obj"), &options, &loaded, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "label 3") != NULL);
     CHECK(loaded == NULL);
 }
 
@@ -590,18 +590,18 @@ static void the_procedural_organ_is_a_scene(void)
     pal_surface_scene options = {.target_tri = 5000};
     pal_surface_scene_report report;
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
-    pal_err err = pal_scene_procedural(&options, &loaded, &report, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_scene_procedural(&options, &loaded, &report, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     CHECK_NEAR(loaded->scene.body[0].mesh->tets.n_tet, 13000, 2600);
     CHECK_TEXT(loaded->scene.title, "Procedural organ");
     CHECK(strstr(loaded->scene.source, "not from a patient") != NULL);
-    CHECK_INT(pal_scene_rename(loaded, "ok", "T", NULL, &note), 0);
+    CHECK_INT(pal_scene_rename(loaded, "ok", "T", NULL, &diag), 0);
     CHECK_TEXT(loaded->scene.name, "ok");
     CHECK_TEXT(loaded->scene.title, "T");
-    CHECK_INT(pal_scene_rename(loaded, "Not ok", NULL, NULL, &note), PAL_ERR_REFUSED);
-    CHECK_INT(pal_scene_rename(loaded, NULL, "a\x1b[31m", NULL, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_scene_rename(loaded, "Not ok", NULL, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_scene_rename(loaded, NULL, "a\x1b[31m", NULL, &diag), PAL_ERR_REFUSED);
     CHECK_TEXT(loaded->scene.title, "T");
     pal_scene_free(loaded);
     pal_scene_free(NULL);
@@ -625,7 +625,7 @@ static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
         CHECK_NEAR(loaded->scene.up[1], -asked, 0);
         CHECK_NEAR(loaded->scene.up[2], !asked, 0);
         CHECK_NEAR(loaded->scene.body[0].support[0].fraction, asked ? 0.12 : 0.05, 1e-12);
-        CHECK(has_effect(&loaded->scene.body[0], "tool_push") && has_effect(&loaded->scene.body[0], "tool_grab"));
+        CHECK(has_effect(&loaded->scene.body[0], "tool_push") && has_effect(&loaded->scene.body[0], "tool_grasp"));
         pal_scene_free(loaded);
     }
 }
@@ -633,9 +633,9 @@ static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
 int main(void)
 {
     char command[128];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (!mkdtemp(folder) || !small_scene(&plain, &mesh, CHECK_REPEATS(8, 5))) return 1;
-    if (pal_prepared_save(&mesh, in_folder("ball.palmesh"), &note)) return 1;
+    if (pal_prepared_save(&mesh, in_folder("ball.palmesh"), &diag)) return 1;
     RUN(what_is_not_json_is_refused_with_its_line);
     RUN(big_files_are_refused_before_they_are_parsed);
     RUN(every_bad_scene_has_its_sentence);

@@ -2,7 +2,7 @@
  * saved loads to the same. */
 #include "server/mesh/geometry/stomach.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 
@@ -43,9 +43,9 @@ static const pal_surface_scene adaptive = {
 static pal_loaded_scene *from_text(const char *text, const pal_surface_scene *options, pal_surface_scene_report *report)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (!write_text("x.obj", text)) return NULL;
-    if (pal_scene_from_surface(in_folder("x.obj"), options, &loaded, report, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_scene_from_surface(in_folder("x.obj"), options, &loaded, report, &diag)) CHECK_FAIL("%s", diag.text);
     return loaded;
 }
 
@@ -77,7 +77,7 @@ static void a_surface_is_taken_as_it_is(void)
     CHECK(r.level_byte > 0);
     const pal_body_def *body = &loaded->scene.body[0];
     CHECK_TEXT(body->model.name, "adaptive_springs");
-    CHECK_TEXT(body->output.name, "surface_out");
+    CHECK_TEXT(body->output.name, "surface_output");
     CHECK_INT(body->n_support, 1);
     CHECK(body->support[0].lowest);
     CHECK_NEAR(body->material.young_Pa, 50000, 0);
@@ -132,14 +132,14 @@ static void of_several_pieces_the_largest_can_be_kept(void)
 static void expect_refusal(const char *text, const pal_surface_scene *options, pal_err wanted, const char *sentence)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(write_text("bad.obj", text));
-    pal_err err = pal_scene_from_surface(in_folder("bad.obj"), options, &loaded, NULL, &note);
+    pal_err err = pal_scene_from_surface(in_folder("bad.obj"), options, &loaded, NULL, &diag);
     CHECK_INT(err, wanted);
     CHECK(loaded == NULL);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (!strstr(note.text, "bad.obj: line ")) CHECK_FAIL("\"%s\" does not name file and line", note.text);
-    if (strchr(note.text, '\n')) CHECK_FAIL("\"%s\" has a line end", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (!strstr(diag.text, "bad.obj: line ")) CHECK_FAIL("\"%s\" does not name file and line", diag.text);
+    if (strchr(diag.text, '\n')) CHECK_FAIL("\"%s\" has a line end", diag.text);
     pal_scene_free(loaded);
 }
 
@@ -167,10 +167,10 @@ static void what_the_model_cannot_take_has_its_sentence(void)
 static pal_loaded_scene *from_shape(const char *name, pal_surface_scene_report *report)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_surface_scene options = adaptive;
     options.shape = name;
-    if (pal_scene_procedural(&options, &loaded, report, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_scene_procedural(&options, &loaded, report, &diag)) CHECK_FAIL("%s", diag.text);
     return loaded;
 }
 
@@ -197,25 +197,25 @@ static void the_shapes_have_the_counts_of_the_paper(void)
     }
     pal_surface_scene options = adaptive;
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     options.shape = "cube";
-    CHECK_INT(pal_scene_procedural(&options, &loaded, NULL, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "no shape \"cube\"") != NULL);
+    CHECK_INT(pal_scene_procedural(&options, &loaded, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "no shape \"cube\"") != NULL);
 }
 
 static pal_world *world_of(const pal_scene *scene)
 {
     pal_world *world = NULL;
-    pal_note note = {""};
-    if (pal_world_create(scene, &note, &world)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_world_create(scene, &diag, &world)) CHECK_FAIL("%s", diag.text);
     return world;
 }
 
 static int n_held(const pal_body *body, int n)
 {
-    int held = 0;
-    for (int i = 0; i < n; i++) held += body->held[i] != 0;
-    return held;
+    int fixed = 0;
+    for (int i = 0; i < n; i++) fixed += body->fixed[i] != 0;
+    return fixed;
 }
 
 static void a_stomach_is_held_at_both_ends_with_the_midpoints_between(void)
@@ -226,13 +226,13 @@ static void a_stomach_is_held_at_both_ends_with_the_midpoints_between(void)
     pal_world *world = world_of(&loaded->scene);
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
-    const pal_levels *levels = &body->shell->levels;
+    const pal_levels *levels = &body->adaptive->levels;
     CHECK_INT(n_held(body, PAL_STOMACH_VERTEX), 2 * (PAL_STOMACH_RING + 1));
-    for (int k = 0; k < PAL_STOMACH_RING; k++) CHECK(body->held[s.oesophagus[k]] && body->held[s.duodenum[k]]);
-    CHECK(body->held[s.oesophagus_cap] && body->held[s.duodenum_cap]);
+    for (int k = 0; k < PAL_STOMACH_RING; k++) CHECK(body->fixed[s.oesophagus[k]] && body->fixed[s.duodenum[k]]);
+    CHECK(body->fixed[s.oesophagus_cap] && body->fixed[s.duodenum_cap]);
     for (int32_t e = 0; e < levels->first_edge[1]; e++) {
         const int32_t *end = levels->edge[e].vertex;
-        if (body->held[end[0]] && body->held[end[1]]) CHECK(body->held[pal_levels_edge_midpoint(levels, e)]);
+        if (body->fixed[end[0]] && body->fixed[end[1]]) CHECK(body->fixed[pal_levels_edge_midpoint(levels, e)]);
     }
     pal_stomach_free(&s);
     pal_world_destroy(world);
@@ -256,11 +256,11 @@ static void a_sheet_is_held_at_its_border_on_every_level_and_a_sphere_nowhere(vo
     CHECK_INT(n_held(pal_world_body(world, 0), 450), 0);
     pal_world_destroy(world);
     /* a border that is not there */
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     loaded->scene.body[0].n_support = 1;
-    loaded->scene.body[0].support[0] = (pal_support){.rim = true};
-    CHECK_INT(pal_world_create(&loaded->scene, &note, &world), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "supports[0].rim: the surface has no open edge") != NULL);
+    loaded->scene.body[0].support[0] = (pal_support_def){.rim = true};
+    CHECK_INT(pal_world_create(&loaded->scene, &diag, &world), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "supports[0].rim: the surface has no open edge") != NULL);
     pal_scene_free(loaded);
 }
 
@@ -284,14 +284,14 @@ static uint64_t hash_after(const pal_scene *scene, int n_step)
 static void a_saved_scene_loads_to_the_same_world(void)
 {
     pal_loaded_scene *in = from_shape("stomach", NULL), *out = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(in != NULL);
-    CHECK_INT(pal_scene_save(in, in_folder("saved"), &note), 0);
+    CHECK_INT(pal_scene_save(in, in_folder("saved"), &diag), 0);
     CHECK(access(in_folder("saved/stomach.palmesh"), R_OK) == 0);
-    if (pal_scene_load(in_folder("saved/scene.json"), &out, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_scene_load(in_folder("saved/scene.json"), &out, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(out != NULL);
     CHECK_INT(out->scene.body[0].n_support, 2);
-    const pal_support *a = &in->scene.body[0].support[1], *b = &out->scene.body[0].support[1];
+    const pal_support_def *a = &in->scene.body[0].support[1], *b = &out->scene.body[0].support[1];
     CHECK(!memcmp(a->low_m, b->low_m, sizeof a->low_m) && !memcmp(a->high_m, b->high_m, sizeof a->high_m));
     uint64_t hash = hash_after(&in->scene, 40);
     CHECK(hash != 0);
@@ -303,8 +303,8 @@ static void a_saved_scene_loads_to_the_same_world(void)
     pal_scene_free(out);
     in = from_shape("sheet", NULL), out = NULL;
     REQUIRE(in != NULL);
-    CHECK_INT(pal_scene_save(in, in_folder("saved"), &note), 0);
-    if (pal_scene_load(in_folder("saved/scene.json"), &out, &note)) CHECK_FAIL("%s", note.text);
+    CHECK_INT(pal_scene_save(in, in_folder("saved"), &diag), 0);
+    if (pal_scene_load(in_folder("saved/scene.json"), &out, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(out != NULL);
     CHECK(out->scene.body[0].n_support == 1 && out->scene.body[0].support[0].rim);
     pal_scene_free(in);
@@ -317,12 +317,12 @@ static void a_saved_scene_loads_to_the_same_world(void)
 /* loads and makes a world; the refusal's sentence or "" */
 static const char *try_text(const char *text, pal_loaded_scene **loaded, pal_world **world)
 {
-    static pal_note note;
-    note = (pal_note){""};
+    static pal_diagnostic diag;
+    diag = (pal_diagnostic){""};
     *loaded = NULL, *world = NULL;
-    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, loaded, &note);
-    if (!err) err = pal_world_create(&(*loaded)->scene, &note, world);
-    return err ? note.text : "";
+    pal_err err = pal_scene_parse("s.json", text, strlen(text), folder, loaded, &diag);
+    if (!err) err = pal_world_create(&(*loaded)->scene, &diag, world);
+    return err ? diag.text : "";
 }
 
 static void every_key_of_the_model_arrives(void)
@@ -343,21 +343,21 @@ static void every_key_of_the_model_arrives(void)
     REQUIRE(write_text("x.obj", tube));
     CHECK_TEXT(try_text(text, &loaded, &world), "");
     REQUIRE(world != NULL);
-    const pal_shell *shell = pal_world_body(world, 0)->shell;
-    CHECK_INT(shell->levels.n_level, 3);
-    CHECK_INT(shell->options.start_level, 1);
-    CHECK_NEAR(shell->options.mass_kg, 0.25, 0);
-    CHECK_INT(shell->options.law, PAL_SHELL_PAPER);
-    CHECK_INT(shell->options.place, PAL_SHELL_BUTTERFLY);
-    CHECK_INT(shell->options.budget_byte, 64 << 20);
+    const pal_adaptive_surface *surface = pal_world_body(world, 0)->adaptive;
+    CHECK_INT(surface->levels.n_level, 3);
+    CHECK_INT(surface->options.start_level, 1);
+    CHECK_NEAR(surface->options.mass_kg, 0.25, 0);
+    CHECK_INT(surface->options.law, PAL_ADAPTIVE_PAPER);
+    CHECK_INT(surface->options.place, PAL_MIDPOINT_BUTTERFLY);
+    CHECK_INT(surface->options.budget_byte, 64 << 20);
     /* 8 vertices and 16 edges, split once */
-    CHECK_INT(shell->n_node, 24);
-    static const char *const rows[] = {"edge_spring", "shape_spring", "viscous", "refine", "rk4", "surface_out"};
+    CHECK_INT(surface->n_node, 24);
+    static const char *const rows[] = {"edge_spring", "shape_spring", "viscous", "refine", "rk4", "surface_output"};
     for (int k = 0; k < 6; k++) {
         bool found = false;
-        for (int r = 0; r < pal_world_rows(world); r++) {
-            pal_row_info info;
-            pal_world_row(world, r, &info);
+        for (int r = 0; r < pal_world_component_count(world); r++) {
+            pal_component_info info;
+            pal_world_component_info(world, r, &info);
             found = found || !strcmp(info.name, rows[k]);
         }
         if (!found) CHECK_FAIL("no row %s", rows[k]);

@@ -3,7 +3,7 @@
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/cells/cell_models.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/subdivision/solid.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/solids.h"
 
@@ -29,32 +29,32 @@ static pal_cells bricks(void)
         c.x[3 * (size_t)i + 1] -= 0.7;
         c.x[3 * (size_t)i + 2] += 1e-3 * sin(i);
     }
-    c.vertex_sharp[0] = 2.5f;
+    c.vertex_sharpness[0] = 2.5f;
     return c;
 }
 
 static bool write_bricks(const char *name)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_cells c = bricks();
-    pal_err err = pal_cell_file_save(&c, in_folder(name), &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_cell_file_save(&c, in_folder(name), &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     pal_cells_free(&c);
     return !err;
 }
 
-static pal_err parse(const char *text, pal_loaded_scene **out, pal_note *note)
+static pal_err parse(const char *text, pal_loaded_scene **out, pal_diagnostic *diag)
 {
     *out = NULL;
-    note->text[0] = 0;
-    return pal_scene_parse("scene.json", text, strlen(text), folder, out, note);
+    diag->text[0] = 0;
+    return pal_scene_parse("scene.json", text, strlen(text), folder, out, diag);
 }
 
 static pal_loaded_scene *load(const char *text)
 {
     pal_loaded_scene *loaded;
-    pal_note note;
-    if (parse(text, &loaded, &note)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag;
+    if (parse(text, &loaded, &diag)) CHECK_FAIL("%s", diag.text);
     return loaded;
 }
 
@@ -81,12 +81,12 @@ static void cells_stand_about_the_middle_of_their_box(void)
     for (int32_t i = 0; i < from.n_vertex; i++)
         for (int a = 0; a < 3; a++) CHECK_NEAR(def->cells->x[3 * i + a] + origin[a], from.x[3 * i + a], 1e-15);
     CHECK_NEAR(origin[1], -0.7, 1e-12);
-    CHECK(def->cells->vertex_sharp[0] == 2.5f);
+    CHECK(def->cells->vertex_sharpness[0] == 2.5f);
     /* 32 boundary quads */
     CHECK_INT(def->mesh->surface.n_tri, 64);
     CHECK_INT(def->mesh->tets.n_node, 0);
     CHECK_TEXT(def->model.name, "subdivision_fem");
-    CHECK_TEXT(def->output.name, "surface_out");
+    CHECK_TEXT(def->output.name, "surface_output");
     CHECK_INT(def->n_support, 1);
     CHECK(def->support[0].lowest);
     CHECK_INT(def->n_effect, 4);
@@ -98,9 +98,9 @@ static void cells_stand_about_the_middle_of_their_box(void)
 static void units_and_other_formats_are_read(void)
 {
     double low[3], high[3];
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_cells c = solid_bricks(2, 1, 1, 40, 30, 20);
-    REQUIRE(!pal_cell_file_save(&c, in_folder("mm.vtk"), &note));
+    REQUIRE(!pal_cell_file_save(&c, in_folder("mm.vtk"), &diag));
     pal_cells_free(&c);
     pal_loaded_scene *loaded = load("{\"bodies\": [{\"cells\": \"mm.vtk\", \"units\": \"mm\"}]}");
     REQUIRE(loaded != NULL);
@@ -123,16 +123,16 @@ static const char whole[] =
 
 static void what_is_saved_loads_to_the_same_bits(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_loaded_scene *a = load(whole), *b = NULL, *c = NULL;
     REQUIRE(a != NULL);
-    REQUIRE(!pal_scene_save(a, in_folder("saved"), &note));
-    if (pal_scene_load(in_folder("saved/scene.json"), &b, &note)) CHECK_FAIL("%s", note.text);
+    REQUIRE(!pal_scene_save(a, in_folder("saved"), &diag));
+    if (pal_scene_load(in_folder("saved/scene.json"), &b, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(b != NULL);
     /* cut down since, so that the box's middle is elsewhere: the frame stays */
     for (int32_t i = 0; i < b->cells[0].n_vertex; i++) b->cells[0].x[3 * i] *= b->cells[0].x[3 * i] > 0 ? 0.7 : 1;
-    REQUIRE(!pal_scene_save(b, in_folder("again"), &note));
-    if (pal_scene_load(in_folder("again/scene.json"), &c, &note)) CHECK_FAIL("%s", note.text);
+    REQUIRE(!pal_scene_save(b, in_folder("again"), &diag));
+    if (pal_scene_load(in_folder("again/scene.json"), &c, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(c != NULL);
     CHECK(pal_cells_equal(&b->cells[0], &c->cells[0]));
     for (int32_t i = 0; i < b->cells[0].n_vertex; i++) b->cells[0].x[3 * i] = a->cells[0].x[3 * i];
@@ -165,10 +165,10 @@ static void what_is_saved_loads_to_the_same_bits(void)
 static void bare_cells_become_a_scene(void)
 {
     pal_loaded_scene *loaded = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const pal_surface_scene options = {.label = -1, .material = {9000, 0.4, 1100, 2}, .hold = 0.2, .up = {0, 1, 0}};
     REQUIRE(write_bricks("My Bricks.palcells"));
-    if (pal_scene_from_cells(in_folder("My Bricks.palcells"), &options, &loaded, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_scene_from_cells(in_folder("My Bricks.palcells"), &options, &loaded, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(loaded != NULL);
     CHECK_TEXT(loaded->scene.name, "my_bricks");
     CHECK_TEXT(loaded->scene.title, "My Bricks");
@@ -182,11 +182,11 @@ static void bare_cells_become_a_scene(void)
     CHECK_INT(def->n_effect, 4);
     CHECK_TEXT(def->effect[3].name, "sleep");
     CHECK(loaded->scene.tool[2].radius_m > 0);
-    CHECK(!pal_scene_rename(loaded, "liver", "Liver", "us", &note));
+    CHECK(!pal_scene_rename(loaded, "liver", "Liver", "us", &diag));
     CHECK_TEXT(loaded->scene.body[0].name, "liver");
     pal_scene_free(loaded);
-    CHECK_INT(pal_scene_from_cells(in_folder("none.palcells"), &options, &loaded, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "none.palcells") != NULL);
+    CHECK_INT(pal_scene_from_cells(in_folder("none.palcells"), &options, &loaded, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "none.palcells") != NULL);
 }
 
 /* the kidney's ureter has 12 of its 198 vertices: held there alone it would sway for half a minute */
@@ -198,12 +198,12 @@ static void enough_of_a_solid_is_held(void)
     } wanted[] = {{"kidney", 0.392}, {"chair", 0.137}, {"block3", 0.05}};
     const pal_surface_scene options = {.label = -1};
     for (int k = 0; k < 3; k++) {
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_cells cells;
         pal_loaded_scene *loaded = NULL;
-        REQUIRE(pal_cell_model_make(pal_cell_model_find(wanted[k].name), &cells, &note) == PAL_ERR_OK);
-        CHECK(!pal_cell_file_save(&cells, in_folder("stands.palcells"), &note));
-        if (pal_scene_from_cells(in_folder("stands.palcells"), &options, &loaded, &note)) CHECK_FAIL("%s", note.text);
+        REQUIRE(pal_cell_model_make(pal_cell_model_find(wanted[k].name), &cells, &diag) == PAL_ERR_OK);
+        CHECK(!pal_cell_file_save(&cells, in_folder("stands.palcells"), &diag));
+        if (pal_scene_from_cells(in_folder("stands.palcells"), &options, &loaded, &diag)) CHECK_FAIL("%s", diag.text);
         REQUIRE(loaded != NULL);
         double fraction = loaded->scene.body[0].support[0].fraction, low = INFINITY, high = -INFINITY;
         int n_held = 0;
@@ -222,13 +222,13 @@ static void expect(const char *body, const char *sentence)
 {
     char text[2048];
     pal_loaded_scene *loaded;
-    pal_note note;
+    pal_diagnostic diag;
     snprintf(text, sizeof text, "{\"bodies\": [{%s}]}", body);
-    if (!parse(text, &loaded, &note)) CHECK_FAIL("taken: %s", body);
+    if (!parse(text, &loaded, &diag)) CHECK_FAIL("taken: %s", body);
     CHECK(loaded == NULL);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (strncmp(note.text, "scene.json: ", 12) != 0 || strchr(note.text, '\n'))
-        CHECK_FAIL("\"%s\" is no sentence with the file", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (strncmp(diag.text, "scene.json: ", 12) != 0 || strchr(diag.text, '\n'))
+        CHECK_FAIL("\"%s\" is no sentence with the file", diag.text);
     pal_scene_free(loaded);
 }
 
@@ -283,13 +283,13 @@ static void more_strokes_than_there_may_be_are_refused(void)
     size_t room = (PAL_STROKE_MAX + 1) * 48 + 256;
     char *text = malloc(room), *at = text;
     pal_loaded_scene *loaded;
-    pal_note note;
+    pal_diagnostic diag;
     REQUIRE(text != NULL);
     at += sprintf(at, "{\"bodies\": [{" CELLS ", \"strokes\": [");
     for (int k = 0; k <= PAL_STROKE_MAX; k++) at += sprintf(at, "%s{" STROKE "}", k ? "," : "");
     sprintf(at, "]}]}");
-    CHECK_INT(parse(text, &loaded, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, "bodies[0].strokes: 4097 entries, more than 4096")) CHECK_FAIL("%s", note.text);
+    CHECK_INT(parse(text, &loaded, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, "bodies[0].strokes: 4097 entries, more than 4096")) CHECK_FAIL("%s", diag.text);
     pal_scene_free(loaded);
     free(text);
 }
@@ -297,9 +297,9 @@ static void more_strokes_than_there_may_be_are_refused(void)
 /* cells so far away that a double cannot hold their edges */
 static void cells_that_lose_their_shape_are_refused(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_cells c = solid_bricks(2, 1, 1, 1e-9, 1e-9, 1e-9);
-    REQUIRE(!pal_cell_file_save(&c, in_folder("tiny.palcells"), &note));
+    REQUIRE(!pal_cell_file_save(&c, in_folder("tiny.palcells"), &diag));
     pal_cells_free(&c);
     pal_loaded_scene *loaded = load("{\"bodies\": [{\"cells\": \"tiny.palcells\"}]}");
     CHECK(loaded != NULL);
@@ -308,15 +308,15 @@ static void cells_that_lose_their_shape_are_refused(void)
 
 static void a_scene_of_cells_steps(void)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_world *world = NULL;
     pal_loaded_scene *loaded = load(whole);
     REQUIRE(loaded != NULL);
-    if (pal_world_create(&loaded->scene, &note, &world)) CHECK_FAIL("%s", note.text);
+    if (pal_world_create(&loaded->scene, &diag, &world)) CHECK_FAIL("%s", diag.text);
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
     int n_held = 0;
-    for (int i = 0; i < body->n_dof; i++) n_held += body->held[i];
+    for (int i = 0; i < body->n_dof; i++) n_held += body->fixed[i];
     CHECK_INT(body->n_dof, 36);
     CHECK_INT(n_held, 9);
     CHECK_INT(pal_cell_elements_count(&body->solid->elements), 96);

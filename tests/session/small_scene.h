@@ -1,7 +1,7 @@
 /* A small ball of tissue for the tests of this room and of scene: built in the test, no files. */
 #ifndef TESTS_SESSION_SMALL_SCENE_H
 #define TESTS_SESSION_SMALL_SCENE_H
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -42,12 +42,12 @@ static inline bool small_ball(pal_surface *out, double r_m, int rings)
 static inline bool small_scene(pal_scene *scene, pal_prepared *mesh, int resolution)
 {
     pal_surface ball;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_prepare_report report;
     pal_voxel_options options = {.resolution = resolution, .border = true};
-    bool good = small_ball(&ball, 0.05, 12) && !pal_prepared_make(&ball, &options, mesh, &report, &note);
+    bool good = small_ball(&ball, 0.05, 12) && !pal_prepared_make(&ball, &options, mesh, &report, &diag);
     pal_surface_free(&ball);
-    if (!good) printf("  small scene: %s\n", note.text);
+    if (!good) printf("  small scene: %s\n", diag.text);
     if (!good) return false;
     pal_scene_default(scene);
     pal_body_default(&scene->body[0], "ball", mesh);

@@ -36,9 +36,9 @@ static bool record(void)
                             .lift_m = {0, 0, 0.005},
                             .stiffness_N_m = 20};
     pal_session *s;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_session_options options = {.record_path = path, .lease_s = 0.1};
-    if (pal_session_open(&scene, &options, &note, &s)) return false;
+    if (pal_session_open(&scene, &options, &diag, &s)) return false;
     uint64_t tick = 0, seq = 0;
     for (const pal_frame *f; tick < 150;) {
         f = pal_session_take_frame(s);
@@ -73,12 +73,12 @@ static bool record(void)
 static void a_recorded_session_gives_the_same_hashes_again(void)
 {
     pal_replay_report report;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(record());
     n_whole = slurp(path, whole, sizeof whole);
     REQUIRE(n_whole > 1000 && n_whole < sizeof whole);
-    pal_err err = pal_replay_run(path, &scene, &report, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_replay_run(path, &scene, &report, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     CHECK(report.n_tick > 200);
     CHECK(report.n_pose > 10);
     CHECK_INT(report.n_command, 9);
@@ -114,11 +114,11 @@ static void changed_poses_and_materials_are_found_at_the_next_hash(void)
     REQUIRE(n_whole > 0);
     for (int k = 0; k < 3; k++) {
         pal_replay_report report;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         memcpy(bytes, whole, n_whole);
         uint64_t when = change(bytes, what[k].kind, what[k].byte);
         REQUIRE(when > 0);
-        REQUIRE(!pal_replay_parse("log", bytes, n_whole, &scene, &report, &note));
+        REQUIRE(!pal_replay_parse("log", bytes, n_whole, &scene, &report, &diag));
         CHECK(report.n_hash_equal < report.n_hash);
         CHECK(report.first_difference > when);
         if (k == 1) CHECK_LE((double)report.first_difference, (double)when + PAL_INPUT_HASH_STEPS);
@@ -128,22 +128,22 @@ static void changed_poses_and_materials_are_found_at_the_next_hash(void)
 static void every_cut_is_refused_with_its_byte(void)
 {
     pal_replay_report report;
-    pal_note note;
+    pal_diagnostic diag;
     REQUIRE(n_whole > 0);
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, &report, &note), 0);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, &report, &diag), 0);
     for (size_t n = 0; n < n_whole; n += n < 300 ? 1 : 977) {
-        note.text[0] = 0;
-        CHECK_INT(pal_replay_parse("log", whole, n, NULL, &report, &note), PAL_ERR_REFUSED);
-        CHECK(!strncmp(note.text, "log: byte ", 10));
+        diag.text[0] = 0;
+        CHECK_INT(pal_replay_parse("log", whole, n, NULL, &report, &diag), PAL_ERR_REFUSED);
+        CHECK(!strncmp(diag.text, "log: byte ", 10));
     }
 }
 
 static void refused(const uint8_t *bytes, size_t n, const char *part)
 {
     pal_replay_report report;
-    pal_note note = {""};
-    CHECK_INT(pal_replay_parse("log", bytes, n, &scene, &report, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, part);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_replay_parse("log", bytes, n, &scene, &report, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, part);
 }
 
 static void broken_logs_are_refused_with_one_sentence(void)
@@ -178,54 +178,54 @@ static void broken_logs_are_refused_with_one_sentence(void)
 static void a_log_of_another_material_is_refused_and_texts_do_not_matter(void)
 {
     pal_replay_report report;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_scene other = scene;
     REQUIRE(n_whole > 0);
     snprintf(other.title, sizeof other.title, "another title");
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &note), 0);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &diag), 0);
     other.body[0].material.young_Pa = nextafter(5000, 6000);
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "another scene") != NULL);
-    CHECK_INT(pal_replay_run("/no/such/log", &scene, &report, &note), PAL_ERR_IO);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "another scene") != NULL);
+    CHECK_INT(pal_replay_run("/no/such/log", &scene, &report, &diag), PAL_ERR_IO);
 }
 
 /* far more than a ring of 1 KiB holds before the writer comes round */
 static void what_does_not_fit_is_counted_and_makes_the_log_invalid(void)
 {
     pal_input_log *log = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_replay_report report;
     char name[] = "/tmp/palpate_small_XXXXXX";
     int file = mkstemp(name);
     REQUIRE(file >= 0);
     close(file);
-    REQUIRE(!pal_input_log_open(name, &scene, 1024, &note, &log));
+    REQUIRE(!pal_input_log_open(name, &scene, 1024, &diag, &log));
     for (int k = 0; k < 20000; k++)
         pal_input_log_put(log, &(pal_input_record){.kind = PAL_INPUT_POSE, .pose = {.quat = {1, 0, 0, 0}}});
     uint64_t n = pal_input_log_dropped(log);
     CHECK(n > 0);
     CHECK_INT(pal_input_log_close(log, 0, 7), 0);
-    CHECK_INT(pal_replay_run(name, &scene, &report, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "records were lost") != NULL);
+    CHECK_INT(pal_replay_run(name, &scene, &report, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "records were lost") != NULL);
     unlink(name);
 }
 
 static void a_full_disk_is_told_at_close(void)
 {
     pal_input_log *log = NULL;
-    pal_note note = {""};
-    pal_err err = pal_input_log_open("/dev/full", &scene, 1024, &note, &log);
+    pal_diagnostic diag = {""};
+    pal_err err = pal_input_log_open("/dev/full", &scene, 1024, &diag, &log);
     /* the header is written at once, so that a place that cannot be written is refused before the session starts */
     CHECK_INT(err, PAL_ERR_IO);
-    CHECK(strstr(note.text, "/dev/full") != NULL);
+    CHECK(strstr(diag.text, "/dev/full") != NULL);
 }
 
 static void records_survive_the_round_trip_bit_by_bit(void)
 {
     pal_input_log *log = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     static uint8_t bytes[4096];
-    REQUIRE(!pal_input_log_open(path, &scene, 0, &note, &log));
+    REQUIRE(!pal_input_log_open(path, &scene, 0, &diag, &log));
     const pal_input_record in[] = {
         {.kind = PAL_INPUT_POSE,
          .index = 1,
@@ -248,11 +248,11 @@ static void records_survive_the_round_trip_bit_by_bit(void)
     size_t n = slurp(path, bytes, sizeof bytes), at = 0;
     pal_input_header header;
     pal_input_record out;
-    REQUIRE(!pal_input_get_header("log", bytes, n, &header, &at, &note));
+    REQUIRE(!pal_input_get_header("log", bytes, n, &header, &at, &diag));
     CHECK(header.fingerprint == pal_scene_fingerprint(&scene));
     CHECK_NEAR(header.step_s, scene.step_s, 0);
     for (int k = 0; k < n_in; k++) {
-        REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &note));
+        REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &diag));
         CHECK_INT(out.kind, in[k].kind);
         CHECK(out.index == in[k].index && out.step == in[k].step && out.hash == in[k].hash);
         CHECK(!memcmp(&out.pose, &in[k].pose, sizeof out.pose));
@@ -262,7 +262,7 @@ static void records_survive_the_round_trip_bit_by_bit(void)
         CHECK(out.slot == in[k].slot && out.brush.kind == in[k].brush.kind);
         CHECK(!memcmp(out.brush.at_m, in[k].brush.at_m, sizeof(pal_brush) - offsetof(pal_brush, at_m)));
     }
-    REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &note));
+    REQUIRE(!pal_input_get_record("log", bytes, n, &at, &out, &diag));
     CHECK(out.kind == PAL_INPUT_END && out.hash == 42 && out.n_dropped == 0 && at == n);
 }
 
@@ -272,7 +272,7 @@ int main(void)
     if (file < 0 || !small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     close(file);
     /* bodies with a skin have no brushes */
-    pal_item_init(&scene.body[0].output, "output", "surface_out");
+    pal_entry_init(&scene.body[0].output, "output", "surface_output");
     RUN(a_recorded_session_gives_the_same_hashes_again);
     RUN_SERIAL(changed_poses_and_materials_are_found_at_the_next_hash);
     RUN(every_cut_is_refused_with_its_byte);

@@ -2,11 +2,11 @@
  * every bit; and thousands of commands one after the other leave a solid that can be simulated. */
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
-#include "server/sim/subdivision/solid.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 #include "tests/session/clay.h"
 
 static clay_scene clay;
-static pal_note note;
+static pal_diagnostic diag;
 
 static uint64_t mix(uint64_t h, const void *bytes, size_t n)
 {
@@ -39,8 +39,8 @@ typedef struct studio {
 static bool studio_open(studio *s)
 {
     *s = (studio){.scene = &clay.scene};
-    if (pal_sculptor_create(s->scene, 0, &note, &s->sculptor) || pal_world_create(s->scene, &note, &s->world))
-        CHECK_FAIL("%s", note.text);
+    if (pal_sculptor_create(s->scene, 0, &diag, &s->sculptor) || pal_world_create(s->scene, &diag, &s->world))
+        CHECK_FAIL("%s", diag.text);
     return s->world != NULL;
 }
 
@@ -56,9 +56,9 @@ static pal_err studio_do(studio *s, const pal_sculpt *command)
 {
     pal_sculpt_turn *turn = NULL;
     pal_world *next = NULL;
-    note.text[0] = 0;
-    pal_err err = pal_sculptor_prepare(s->sculptor, s->scene, command, &note, &turn);
-    if (!err) err = pal_world_create(pal_sculpt_scene(turn), &note, &next);
+    diag.text[0] = 0;
+    pal_err err = pal_sculptor_prepare(s->sculptor, s->scene, command, &diag, &turn);
+    if (!err) err = pal_world_create(pal_sculpt_scene(turn), &diag, &next);
     if (err) {
         pal_sculpt_free(turn);
         return err;
@@ -145,12 +145,12 @@ static void lasting_loads_stay_by_place(void)
         else
             REQUIRE(!turn_back(&s, PAL_SCULPT_UNDO));
         body = pal_world_body(s.world, 0);
-        REQUIRE(body->outer != NULL);
+        REQUIRE(body->external_force != NULL);
         if (turn == 0) CHECK(body->n_node > n_before);
         double sum[3] = {0};
         int n_loaded = 0;
         for (int i = 0; i < body->n_node; i++) {
-            const double *f = body->outer + 3 * i;
+            const double *f = body->external_force + 3 * i;
             for (int c = 0; c < 3; c++) sum[c] += f[c];
             if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
             int k = f[1] != 0;
@@ -175,14 +175,14 @@ static void a_material_set_while_an_edit_is_made_is_kept(void)
     pal_scene *scene = malloc(sizeof *scene);
     REQUIRE(scene != NULL);
     CHECK_INT(pal_sculptor_prepare(s.sculptor, s.scene, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = stroke},
-                                   &note, &turn),
+                                   &diag, &turn),
               0);
-    CHECK_INT(pal_world_create(pal_sculpt_scene(turn), &note, &next), 0);
+    CHECK_INT(pal_world_create(pal_sculpt_scene(turn), &diag, &next), 0);
     /* now the slider moves */
     *scene = *pal_sculpt_scene(turn);
     scene->body[0].material.young_Pa *= 8, scene->body[0].material.density_kg_m3 *= 2;
-    CHECK_INT(pal_world_material(s.world, 0, &scene->body[0].material, &note), 0);
-    CHECK_INT(pal_world_create(scene, &note, &stiff), 0);
+    CHECK_INT(pal_world_material(s.world, 0, &scene->body[0].material, &diag), 0);
+    CHECK_INT(pal_world_create(scene, &diag, &stiff), 0);
     pal_sculpt_carry(turn, next, s.world);
     pal_body *a = pal_world_body(next, 0), *b = pal_world_body(stiff, 0);
     for (int i = 0; i < a->n_dof; i++) a->v[3 * i] = b->v[3 * i] = a->x_rest[3 * i + 2];
@@ -229,7 +229,7 @@ static void undo_and_redo_bring_back_every_bit(void)
     }
     CHECK(pal_cells_equal(pal_sculptor_cells(s.sculptor), &clay.cells));
     CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "there is nothing to undo");
+    CHECK_TEXT(diag.text, "there is nothing to undo");
     for (int k = 1; k < 5; k++) {
         CHECK_INT(turn_back(&s, PAL_SCULPT_REDO), 0);
         CHECK(print_of(s.scene, s.world) == print[k]);
@@ -249,7 +249,7 @@ static void a_shape_that_is_kept_rests_where_it_is(void)
     REQUIRE(studio_open(&s));
     pal_body *body = pal_world_body(s.world, 0);
     for (int i = 0; i < body->n_dof; i++) body->x[3 * i] += 0.2 * (body->x[3 * i + 2] + 0.05);
-    pal_world_moved(s.world, 0);
+    pal_world_invalidate_limits(s.world, 0);
     CHECK(pal_world_energy_J(s.world) > 1e-6);
     int n = body->n_dof;
     double *x = malloc(3 * sizeof *x * (size_t)n);
@@ -266,7 +266,7 @@ static void a_shape_that_is_kept_rests_where_it_is(void)
     /* and what is folded cannot be kept */
     for (int i = 0; i < n; i++) x[3 * i + 2] = -x[3 * i + 2];
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_KEEP, .point_m = x, .n_point = n}), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "control cell 0"));
+    CHECK(strstr(diag.text, "control cell 0"));
     free(x);
     studio_close(&s);
 }
@@ -275,13 +275,13 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
 {
     studio s;
     REQUIRE(studio_open(&s));
-    double kg = pal_solid_mass_kg(pal_world_body(s.world, 0)->solid);
-    double litre = pal_solid_volume_m3(pal_world_body(s.world, 0)->solid);
+    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid);
+    double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->solid);
     CHECK_NEAR(kg, 1000 * litre, 1e-9 * kg);
     /* a hard brush over all of it */
     pal_stroke all = {{0, 0, 0}, 1, 0, 2, 5};
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = all}), 0);
-    CHECK_NEAR(pal_solid_mass_kg(pal_world_body(s.world, 0)->solid), 5 * kg, 1e-6 * kg);
+    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid), 5 * kg, 1e-6 * kg);
     CHECK_NEAR(pal_world_body(s.world, 0)->solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
     static const struct {
         pal_stroke stroke;
@@ -291,7 +291,7 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
                {{{0, 0, 0}, 1, 0, 0, 1}, "young_factor: 0"}, {{{0, 0, 0}, 1, 0, 1, INFINITY}, "density_factor: inf"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = bad[i].stroke}), PAL_ERR_REFUSED);
-        if (!strstr(note.text, bad[i].says)) CHECK_FAIL("\"%s\" does not name %s", note.text, bad[i].says);
+        if (!strstr(diag.text, bad[i].says)) CHECK_FAIL("\"%s\" does not name %s", diag.text, bad[i].says);
     }
     CHECK_INT(pal_sculptor_past(s.sculptor), 1);
     studio_close(&s);
@@ -345,11 +345,11 @@ static pal_sculpt any_command(const pal_sculptor *sculptor)
 /* what must hold after every command that was taken */
 static void check_solid(const studio *s)
 {
-    const pal_solid *solid = pal_world_body(s->world, 0)->solid;
+    const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->solid;
     const pal_body *body = pal_world_body(s->world, 0);
-    if (pal_cells_check(pal_sculptor_cells(s->sculptor), NULL, &note)) CHECK_FAIL("%s", note.text);
-    double kg = pal_solid_mass_kg(solid), sum = 0;
-    CHECK(pal_solid_volume_m3(solid) > 0);
+    if (pal_cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
+    double kg = pal_subdivision_solid_mass_kg(solid), sum = 0;
+    CHECK(pal_subdivision_solid_volume_m3(solid) > 0);
     for (int i = 0; i < body->n_node; i++) sum += body->node_mass_kg[i];
     CHECK_NEAR(sum, kg, 1e-9 * kg);
     CHECK(pal_body_finite(body));
@@ -365,8 +365,8 @@ static void five_thousand_commands_leave_a_solid_and_undo_the_start(void)
         /* elements of a level take eight times as long as the control cells themselves, which have the rounds between
          */
         studio_close(&s);
-        pal_item_init(&clay.scene.body[0].model, "model", "subdivision_fem");
-        CHECK(!pal_item_put_number(&clay.scene.body[0].model, "levels", n_round % 8 == 0, &note));
+        pal_entry_init(&clay.scene.body[0].model, "model", "subdivision_fem");
+        CHECK(!pal_entry_put_number(&clay.scene.body[0].model, "levels", n_round % 8 == 0, &diag));
         REQUIRE(studio_open(&s));
         steps(&s, 1 + n_round++ % 3);
         /* as many as can be undone, then all of them back */
@@ -378,7 +378,7 @@ static void five_thousand_commands_leave_a_solid_and_undo_the_start(void)
             uint64_t before = print_of(s.scene, s.world);
             if (studio_do(&s, &command)) {
                 n_refused++;
-                CHECK(note.text[0]);
+                CHECK(diag.text[0]);
                 CHECK(print_of(s.scene, s.world) == before);
                 continue;
             }

@@ -99,10 +99,10 @@ static watch *make_watch(void)
 static pal_session *open_with(pal_session_options options, watch *w)
 {
     pal_session *session = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     options.wake = wake;
     options.user = w;
-    if (pal_session_open(&scene, &options, &note, &session)) CHECK_FAIL("open: %s", note.text);
+    if (pal_session_open(&scene, &options, &diag, &session)) CHECK_FAIL("open: %s", diag.text);
     return session;
 }
 
@@ -157,11 +157,11 @@ static void a_session_that_starts_paused_shows_rest_and_steps_one_by_one(void)
     CHECK_INT(order(s, PAL_COMMAND_PAUSE), 0);
     f = frame_where(s, w, is_paused, 1);
     REQUIRE(f != NULL);
-    uint64_t held = f->tick;
+    uint64_t fixed = f->tick;
     CHECK_INT(order(s, PAL_COMMAND_RESET), 0);
     f = frame_where(s, w, tick_is, 0);
     REQUIRE(f != NULL);
-    CHECK(held >= 6 && f->paused);
+    CHECK(fixed >= 6 && f->paused);
     CHECK_NEAR(f->time_s, 0, 0);
     pal_session_close(s);
 }
@@ -274,23 +274,23 @@ static void bad_poses_and_commands_are_refused_and_counted(void)
 static void a_material_beyond_the_budget_is_refused_with_a_sentence(void)
 {
     watch *w = make_watch();
-    pal_note note;
+    pal_diagnostic diag;
     pal_session *s = open_with((pal_session_options){0}, w);
     REQUIRE(s != NULL);
-    pal_session_last_note(s, &note);
-    CHECK_TEXT(note.text, "");
+    pal_session_last_note(s, &diag);
+    CHECK_TEXT(diag.text, "");
     pal_command stiff = {.kind = PAL_COMMAND_MATERIAL, .material = {1e12, 0.45, 1000, 4}};
     CHECK_INT(pal_session_command(s, &stiff), 0);
     REQUIRE(frame_where(s, w, refused_at_least, 1) != NULL);
-    pal_session_last_note(s, &note);
-    CHECK(strstr(note.text, "sub-steps") != NULL);
+    pal_session_last_note(s, &diag);
+    CHECK(strstr(diag.text, "sub-steps") != NULL);
     pal_command softer = {.kind = PAL_COMMAND_MATERIAL, .material = {2500, 0.45, 1000, 4}};
     CHECK_INT(pal_session_command(s, &softer), 0);
     const pal_frame *f = next_frame(s, w);
     REQUIRE(f != NULL);
     REQUIRE(frame_where(s, w, tick_at_least, f->tick + 2) != NULL);
-    pal_session_last_note(s, &note);
-    CHECK_TEXT(note.text, "");
+    pal_session_last_note(s, &diag);
+    CHECK_TEXT(diag.text, "");
     pal_session_close(s);
 }
 
@@ -389,12 +389,12 @@ static void *put_poses(void *user)
 static void *give_orders(void *user)
 {
     crowd *c = user;
-    pal_note note;
+    pal_diagnostic diag;
     for (int k = 0; !atomic_load(&c->stop); k++) {
         pal_command command = {.kind = (pal_command_kind)(k % PAL_COMMAND_MATERIAL)};
         if (k % 32 == 0) command.kind = PAL_COMMAND_MATERIAL, command.material = scene.body[0].material;
         while (pal_session_command(c->session, &command) == PAL_ERR_FULL && !atomic_load(&c->stop)) usleep(500);
-        pal_session_last_note(c->session, &note);
+        pal_session_last_note(c->session, &diag);
         pal_session_alive(c->session);
     }
     return NULL;
@@ -426,7 +426,7 @@ static void survives_poses_commands_and_frames_from_many_threads_and_a_close_in_
 static void carry_all(void *user, pal_world *next, const pal_world *before)
 {
     *(uint64_t *)user = pal_world_hash(before);
-    pal_world_follow(next, before, -1, NULL, NULL);
+    pal_world_transfer(next, before, -1, NULL, NULL);
     CHECK(pal_world_hash(next) == *(uint64_t *)user);
 }
 
@@ -435,7 +435,7 @@ static void another_session_goes_on_where_one_was(void)
 {
     watch *w = make_watch();
     uint64_t hash = 0;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_session *before = open_with((pal_session_options){.lease_s = 10}, w);
     pal_session *next = open_with((pal_session_options){.lease_s = 10, .hold = true}, w);
     REQUIRE(before && next);
@@ -447,7 +447,7 @@ static void another_session_goes_on_where_one_was(void)
     REQUIRE(f != NULL);
     uint64_t tick = f->tick;
     CHECK(pal_session_take_frame(next) == NULL);
-    CHECK_INT(pal_session_follow(next, before, carry_all, &hash, &note), 0);
+    CHECK_INT(pal_session_follow(next, before, carry_all, &hash, &diag), 0);
     CHECK(hash != 0);
     f = frame_where(next, w, used_seq, 7);
     REQUIRE(f != NULL);
@@ -468,14 +468,14 @@ static void a_scene_that_cannot_run_opens_no_session(void)
 {
     pal_scene bad = scene;
     pal_session *s = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     bad.step_s = 7;
-    CHECK(pal_session_open(&bad, NULL, &note, &s) == PAL_ERR_REFUSED);
-    CHECK(s == NULL && note.text[0]);
+    CHECK(pal_session_open(&bad, NULL, &diag, &s) == PAL_ERR_REFUSED);
+    CHECK(s == NULL && diag.text[0]);
     pal_session_options options = {.record_path = "/no/such/folder/log"};
-    note.text[0] = 0;
-    CHECK_INT(pal_session_open(&scene, &options, &note, &s), PAL_ERR_IO);
-    CHECK(s == NULL && strstr(note.text, "/no/such/folder/log") != NULL);
+    diag.text[0] = 0;
+    CHECK_INT(pal_session_open(&scene, &options, &diag, &s), PAL_ERR_IO);
+    CHECK(s == NULL && strstr(diag.text, "/no/such/folder/log") != NULL);
 }
 
 static void rows_and_parts_are_known_to_every_thread(void)
@@ -483,7 +483,7 @@ static void rows_and_parts_are_known_to_every_thread(void)
     watch *w = make_watch();
     pal_session *s = open_with((pal_session_options){.start_paused = true}, w);
     REQUIRE(s != NULL);
-    pal_row_info row;
+    pal_component_info row;
     pal_shown shown;
     bool gravity = false;
     for (int k = 0; k < pal_session_rows(s); k++) {
@@ -525,7 +525,7 @@ static void a_field_is_there_while_anybody_looks(void)
     f = frame_where(s, w, shows_displacement, 1);
     REQUIRE(f != NULL);
     CHECK_INT(f->n_row, rows + 1);
-    CHECK_TEXT(f->row_name[rows], "field_out");
+    CHECK_TEXT(f->component_name[rows], "field_output");
     CHECK_INT(f->tick, 0);
     const pal_frame_field *field = &f->part[0].field[PAL_FIELD_DISPLACEMENT_M];
     CHECK(field->revision > 0);
@@ -556,7 +556,7 @@ static void a_field_is_there_while_anybody_looks(void)
 static bool has_brush(const pal_frame *frame, uint64_t wanted)
 {
     bool found = false;
-    for (int i = 0; i < frame->n_row; i++) found = found || !strcmp(frame->row_name[i], "brush");
+    for (int i = 0; i < frame->n_row; i++) found = found || !strcmp(frame->component_name[i], "brush");
     return found == (wanted != 0);
 }
 
@@ -566,13 +566,13 @@ static void a_brush_lasts_until_its_tool_is_let_go(void)
     static pal_scene bare;
     watch *w = make_watch();
     pal_session *s;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_command brush = {
         .kind = PAL_COMMAND_BRUSH,
         .brush = {.kind = PAL_BRUSH_INFLATE, .at_m = {0, 0, 0.05}, .radius_m = 0.04, .pressure_Pa = 200}};
     bare = scene;
-    pal_item_init(&bare.body[0].output, "output", "surface_out");
-    REQUIRE(!pal_session_open(&bare, &(pal_session_options){.lease_s = 0.25, .wake = wake, .user = w}, &note, &s));
+    pal_entry_init(&bare.body[0].output, "output", "surface_output");
+    REQUIRE(!pal_session_open(&bare, &(pal_session_options){.lease_s = 0.25, .wake = wake, .user = w}, &diag, &s));
     for (int way = 0; way < 3; way++) {
         const pal_pose pose = pose_at(0.2, 0, 1);
         const pal_frame *f = frame_where(s, w, has_brush, 0);
@@ -614,9 +614,9 @@ static void a_brush_that_cannot_be_is_refused_at_the_door_or_with_a_sentence(voi
     CHECK_INT(pal_session_command(s, &good), 0);
     const pal_frame *f = next_frame(s, w);
     while (f && f->n_refused < 6) f = next_frame(s, w);
-    pal_note note;
-    pal_session_last_note(s, &note);
-    CHECK(strstr(note.text, "has no brushes: it is shown by a skin") != NULL);
+    pal_diagnostic diag;
+    pal_session_last_note(s, &diag);
+    CHECK(strstr(diag.text, "has no brushes: it is shown by a skin") != NULL);
     pal_session_close(s);
 }
 

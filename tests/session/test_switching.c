@@ -28,22 +28,22 @@ static const pal_frame *wait_tick(pal_session *s, uint64_t tick)
 /* paused: steps come one by one, so that what is seen does not depend on the clock */
 static pal_session *begin(bool paused)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_session *s = NULL;
     pal_session_options options = {.lease_s = 60, .start_paused = paused};
-    if (pal_session_open(&scene, &options, &note, &s)) CHECK_FAIL("%s", note.text);
+    if (pal_session_open(&scene, &options, &diag, &s)) CHECK_FAIL("%s", diag.text);
     return s;
 }
 
 /* the session that takes over, *change kept; NULL: complained */
-static pal_session *change_to(pal_session *s, const pal_setting *to, pal_switch **change)
+static pal_session *change_to(pal_session *s, const pal_configuration *to, pal_switch **change)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_session *next = NULL;
-    if (pal_switch_prepare(pal_session_scene(s), &scene.body[0], 0, to, &note, change) ||
-        pal_session_open_after(s, pal_switch_scene(*change), &note, &next) ||
-        pal_session_follow(next, s, pal_switch_carry, *change, &note)) {
-        CHECK_FAIL("%s", note.text);
+    if (pal_switch_prepare(pal_session_scene(s), &scene.body[0], 0, to, &diag, change) ||
+        pal_session_open_after(s, pal_switch_scene(*change), &diag, &next) ||
+        pal_session_follow(next, s, pal_switch_carry, *change, &diag)) {
+        CHECK_FAIL("%s", diag.text);
         return NULL;
     }
     return next;
@@ -60,9 +60,9 @@ static const pal_frame *take_steps(pal_session *s, bool paused, uint64_t tick, i
 
 static void a_session_changes_its_method_and_comes_back(bool paused)
 {
-    const pal_setting list[] = {{.model = "fem", .element = "hex8_bbar", .size = 8},
-                                {.model = "fem", .element = "tet4", .size = 6, .step_s = 0.01, .tolerance = 1e-3},
-                                {.model = "tet_springs", .size = 0, .step_s = 0.005, .k_area_J = -1}};
+    const pal_configuration list[] = {{.model = "fem", .element = "hex8_bbar", .size = 8},
+                                      {.model = "fem", .element = "tet4", .size = 6, .step_s = 0.01, .tolerance = 1e-3},
+                                      {.model = "tet_springs", .size = 0, .step_s = 0.005, .k_area_J = -1}};
     pal_session *s = begin(paused);
     pal_switch *old = NULL;
     pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
@@ -70,15 +70,15 @@ static void a_session_changes_its_method_and_comes_back(bool paused)
     uint64_t tick = take_steps(s, paused, 0, 20)->tick;
     for (int i = 0; i < 3; i++) {
         pal_switch *change = NULL;
-        pal_switch_report r;
+        pal_refine_history r;
         pal_session *next = change_to(s, &list[i], &change);
         REQUIRE(next);
         pal_switch_report_of(change, &r);
         /* the springs' own voxels are full to their border: another mass, and held farther out */
         CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
-        CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_SCALE * (1 + 1e-9));
+        CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_MAX_SCALE * (1 + 1e-9));
         CHECK(r.energy_before_J > 0 && isfinite(r.energy_after_J));
-        CHECK_LE(r.most_move_m, 0.005); /* of a ball of 100 mm that a tool presses */
+        CHECK_LE(r.max_move_m, 0.005); /* of a ball of 100 mm that a tool presses */
         pal_session_close(s);
         pal_switch_free(old);
         s = next, old = change;
@@ -86,8 +86,8 @@ static void a_session_changes_its_method_and_comes_back(bool paused)
         CHECK(f->tick >= tick + 10); /* counts on */
         CHECK(f->tool[0].present);
         tick = f->tick;
-        pal_setting now;
-        pal_setting_of(pal_session_scene(s), 0, &now);
+        pal_configuration now;
+        pal_configuration_of(pal_session_scene(s), 0, &now);
         CHECK_TEXT(now.model, list[i].model);
         CHECK_NEAR(pal_session_scene(s)->step_s, list[i].step_s > 0 ? list[i].step_s : 0.005, 1e-12);
     }
@@ -113,21 +113,21 @@ static void step_by_step_the_energy_is_kept(void)
  * the remainder */
 static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
 {
-    pal_item *model = &scene.body[0].model, was = *model;
-    CHECK(!pal_item_put_text(model, "weights", "volume", NULL));
-    CHECK(!pal_item_put_number(model, "k_distance_J", 0.25, NULL) &&
-          !pal_item_put_number(model, "k_volume_J", 1, NULL));
+    pal_config_entry *model = &scene.body[0].model, was = *model;
+    CHECK(!pal_entry_put_text(model, "weights", "volume", NULL));
+    CHECK(!pal_entry_put_number(model, "k_distance_J", 0.25, NULL) &&
+          !pal_entry_put_number(model, "k_volume_J", 1, NULL));
     pal_session *s = begin(true);
     pal_switch *change = NULL;
-    pal_switch_report r;
+    pal_refine_history r;
     pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
     uint64_t tick = take_steps(s, true, 0, 8)->tick;
     CHECK(!pal_session_put_pose(s, 0, &pose));
     take_steps(s, true, tick, 1);
-    pal_session *next = change_to(s, &(pal_setting){.model = "fem", .element = "hex8_bbar", .size = 7}, &change);
+    pal_session *next = change_to(s, &(pal_configuration){.model = "fem", .element = "hex8_bbar", .size = 7}, &change);
     REQUIRE(next);
     pal_switch_report_of(change, &r);
-    CHECK_NEAR(r.scale, PAL_TRANSFER_SCALE, 1e-9);
+    CHECK_NEAR(r.scale, PAL_TRANSFER_MAX_SCALE, 1e-9);
     CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
     pal_session_close(s);
     pal_session_close(next);
@@ -158,18 +158,18 @@ static void count_tools(void *user)
 /* with the lease of every day, and a carry that takes longer */
 static void a_tool_is_held_on_however_long_it_takes(void)
 {
-    const pal_setting to = {.model = "fem", .element = "hex8_bbar", .size = 8};
+    const pal_configuration to = {.model = "fem", .element = "hex8_bbar", .size = 8};
     const pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
     bool starved = true;
     for (int round = 0; round < CHECK_REPEATS(10, 2) && starved; round++) {
         pal_session *s = NULL, *next = NULL;
         pal_switch *change = NULL;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_session_options options = {.wake = count_tools};
         looked = NULL;
-        REQUIRE(!pal_session_open(&scene, &options, &note, &s));
-        REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &to, &note, &change));
-        REQUIRE(!pal_session_open_after(s, pal_switch_scene(change), &note, &next));
+        REQUIRE(!pal_session_open(&scene, &options, &diag, &s));
+        REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &to, &diag, &change));
+        REQUIRE(!pal_session_open_after(s, pal_switch_scene(change), &diag, &next));
         /* pressed for a while, so that it is taken */
         for (const pal_frame *f = NULL; !f || !f->tool[0].present;) {
             CHECK(!pal_session_put_pose(s, 0, &pose));
@@ -182,7 +182,7 @@ static void a_tool_is_held_on_however_long_it_takes(void)
         looked = next;
         n_shown = n_without = 0;
         uint64_t began_ns = pal_clock_ns();
-        CHECK(!pal_session_follow(next, s, carry_slowly, change, &note));
+        CHECK(!pal_session_follow(next, s, carry_slowly, change, &diag));
         began_ns = pal_clock_ns() - began_ns;
         while (n_shown < 3) nanosleep(&(struct timespec){0, 500000}, NULL);
         /* the machine itself was too slow for the lease: again */
@@ -214,22 +214,22 @@ static void count_steps(void *user)
 
 static void a_switch_is_rehearsed_while_the_session_runs_on(void)
 {
-    const pal_setting to = {.model = "fem", .element = "hex8_bbar", .size = 8};
+    const pal_configuration to = {.model = "fem", .element = "hex8_bbar", .size = 8};
     const pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}};
     pal_session *s = NULL, *next = NULL;
     pal_switch *change = NULL;
-    pal_switch_report r;
-    pal_note note = {""};
+    pal_refine_history r;
+    pal_diagnostic diag = {""};
     int n_rehearsed = 0;
     pal_session_options options = {.lease_s = 60, .wake = count_steps};
-    REQUIRE(!pal_session_open(&scene, &options, &note, &s));
+    REQUIRE(!pal_session_open(&scene, &options, &diag, &s));
     CHECK(!pal_session_put_pose(s, 0, &pose));
     wait_tick(s, 20);
-    REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &to, &note, &change));
-    REQUIRE(!pal_session_open_after(s, pal_switch_scene(change), &note, &next));
+    REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &to, &diag, &change));
+    REQUIRE(!pal_session_open_after(s, pal_switch_scene(change), &diag, &next));
     pal_session_rehearse(next, s, pal_switch_look, rehearse_slowly, change);
     pal_session_carry_over(next, s, pal_switch_carry, change);
-    CHECK(!pal_session_go_on(next, s, &note));
+    CHECK(!pal_session_go_on(next, s, &diag));
     double stood_s = pal_session_stood_s(next, &n_rehearsed);
     CHECK(stood_s > 0 && n_rehearsed >= 1 && n_rehearsed <= PAL_SESSION_REHEARSALS);
     pal_switch_report_of(change, &r);
@@ -244,15 +244,15 @@ static void a_switch_is_rehearsed_while_the_session_runs_on(void)
 static bool has_row(const pal_frame *f, const char *name)
 {
     for (int i = 0; i < f->n_row; i++)
-        if (!strcmp(f->row_name[i], name)) return true;
+        if (!strcmp(f->component_name[i], name)) return true;
     return false;
 }
 
 static void a_row_that_is_off_stays_off_through_a_method_without_it(void)
 {
-    const pal_setting list[] = {{.model = "fem", .element = "hex8_bbar", .size = 6},
-                                {.model = "fem", .element = "tet4", .size = 6},
-                                {.model = "tet_springs", .k_area_J = -1}};
+    const pal_configuration list[] = {{.model = "fem", .element = "hex8_bbar", .size = 6},
+                                      {.model = "fem", .element = "tet4", .size = 6},
+                                      {.model = "tet_springs", .k_area_J = -1}};
     const char *const off[] = {"face_area", "gravity"};
     pal_session *s = begin(true);
     pal_switch *old = NULL;
@@ -283,7 +283,8 @@ static void a_row_that_is_off_stays_off_through_a_method_without_it(void)
     f = take_steps(s, true, f->tick, 1);
     CHECK(has_row(f, "face_area"));
     uint64_t tick = f->tick;
-    pal_session *next = change_to(s, &(pal_setting){.model = "tet_springs", .k_area_J = -1, .step_s = 0.004}, &change);
+    pal_session *next =
+        change_to(s, &(pal_configuration){.model = "tet_springs", .k_area_J = -1, .step_s = 0.004}, &change);
     REQUIRE(next);
     pal_session_close(s);
     pal_switch_free(old);
@@ -296,7 +297,7 @@ static void a_row_that_is_off_stays_off_through_a_method_without_it(void)
 static void what_cannot_be_made_is_refused_with_a_sentence(void)
 {
     const struct {
-        pal_setting to;
+        pal_configuration to;
         const char *says;
     } bad[] = {{{.model = "adaptive_springs", .size = 2}, "does not take model"},
                {{.model = "marble"}, "no model"},
@@ -309,16 +310,16 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
     pal_session *s = begin(false);
     wait_tick(s, 3);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         pal_switch *change = NULL;
-        CHECK_INT(pal_switch_prepare(pal_session_scene(s), &scene.body[0], 0, &bad[i].to, &note, &change),
+        CHECK_INT(pal_switch_prepare(pal_session_scene(s), &scene.body[0], 0, &bad[i].to, &diag, &change),
                   PAL_ERR_REFUSED);
-        CHECK(!change && strstr(note.text, bad[i].says));
-        if (!strstr(note.text, bad[i].says)) printf("  %s\n", note.text);
+        CHECK(!change && strstr(diag.text, bad[i].says));
+        if (!strstr(diag.text, bad[i].says)) printf("  %s\n", diag.text);
     }
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_switch *change = NULL;
-    CHECK_INT(pal_switch_prepare(pal_session_scene(s), NULL, 3, &bad[0].to, &note, &change), PAL_ERR_REFUSED);
+    CHECK_INT(pal_switch_prepare(pal_session_scene(s), NULL, 3, &bad[0].to, &diag, &change), PAL_ERR_REFUSED);
     uint64_t tick = wait_tick(s, 5)->tick;
     wait_tick(s, tick + 5); /* it runs on */
     CHECK(pal_session_alive(s));
@@ -329,21 +330,21 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
 static void what_is_not_taken_changes_nothing(void)
 {
     pal_world *w = NULL, *next = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_switch *change = NULL;
-    REQUIRE(!pal_world_create(&scene, &note, &w));
+    REQUIRE(!pal_world_create(&scene, &diag, &w));
     for (int k = 0; k < 5; k++) CHECK(!pal_world_step(w, scene.step_s));
     uint64_t hash = pal_world_hash(w);
-    const pal_setting good = {.model = "fem", .size = 6}, bad = {.model = "fem", .element = "tet5", .size = 6};
-    CHECK_INT(pal_switch_prepare(&scene, NULL, 0, &bad, &note, &change), PAL_ERR_REFUSED);
-    REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &good, &note, &change));
-    REQUIRE(!pal_world_create(pal_switch_scene(change), &note, &next));
+    const pal_configuration good = {.model = "fem", .size = 6}, bad = {.model = "fem", .element = "tet5", .size = 6};
+    CHECK_INT(pal_switch_prepare(&scene, NULL, 0, &bad, &diag, &change), PAL_ERR_REFUSED);
+    REQUIRE(!pal_switch_prepare(&scene, NULL, 0, &good, &diag, &change));
+    REQUIRE(!pal_world_create(pal_switch_scene(change), &diag, &next));
     pal_switch_carry(change, next, w);
     CHECK(pal_world_hash(w) == hash);
     for (int k = 0; k < 5; k++) CHECK(!pal_world_step(w, scene.step_s));
     /* as one that nobody ever wanted to switch */
     pal_world *other = NULL;
-    REQUIRE(!pal_world_create(&scene, &note, &other));
+    REQUIRE(!pal_world_create(&scene, &diag, &other));
     for (int k = 0; k < 10; k++) CHECK(!pal_world_step(other, scene.step_s));
     CHECK(pal_world_hash(w) == pal_world_hash(other));
     pal_world_destroy(other);

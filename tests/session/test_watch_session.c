@@ -25,9 +25,9 @@ static const pal_frame *later(pal_session *s, uint64_t tick)
 static void computes_nothing_to_show_until_somebody_comes(void)
 {
     pal_session *s;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const pal_session_options options = {.only_watched = true};
-    REQUIRE(!pal_session_open(&scene, &options, &note, &s));
+    REQUIRE(!pal_session_open(&scene, &options, &diag, &s));
     const pal_frame *f = later(s, 40);
     REQUIRE(f && f->tick >= 40);
     CHECK(!f->watched);
@@ -57,9 +57,9 @@ static void computes_nothing_to_show_until_somebody_comes(void)
 static void who_comes_to_a_paused_session_sees_it(void)
 {
     pal_session *s;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const pal_session_options options = {.only_watched = true};
-    REQUIRE(!pal_session_open(&scene, &options, &note, &s));
+    REQUIRE(!pal_session_open(&scene, &options, &diag, &s));
     REQUIRE(later(s, 30));
     pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_PAUSE});
     const pal_frame *f = NULL;
@@ -85,8 +85,8 @@ static void who_comes_to_a_paused_session_sees_it(void)
 static void a_session_as_before_shows_every_step(void)
 {
     pal_session *s;
-    pal_note note = {""};
-    REQUIRE(!pal_session_open(&scene, NULL, &note, &s));
+    pal_diagnostic diag = {""};
+    REQUIRE(!pal_session_open(&scene, NULL, &diag, &s));
     const pal_frame *f = later(s, 20);
     REQUIRE(f && f->watched);
     CHECK_INT(f->part[0].n_output, f->tick + 1);
@@ -97,24 +97,24 @@ static void a_session_as_before_shows_every_step(void)
 static void rows_are_switched_by_command(void)
 {
     pal_session *s;
-    pal_note note = {""};
-    REQUIRE(!pal_session_open(&scene, NULL, &note, &s));
+    pal_diagnostic diag = {""};
+    REQUIRE(!pal_session_open(&scene, NULL, &diag, &s));
     const pal_frame *f = later(s, 3);
     REQUIRE(f);
     int n_row = f->n_row;
     CHECK_INT(n_row, pal_session_rows(s));
-    pal_row_info row;
+    pal_component_info row;
     pal_session_row(s, 0, &row);
-    CHECK(row.why && row.why[0]);
+    CHECK(row.reason && row.reason[0]);
     CHECK_INT(pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "gravity"}), 0);
     f = later(s, f->tick + 5);
     REQUIRE(f);
     CHECK_INT(f->n_row, n_row - 1);
-    for (int r = 0; r < f->n_row; r++) CHECK(strcmp(f->row_name[r], "gravity") != 0);
+    for (int r = 0; r < f->n_row; r++) CHECK(strcmp(f->component_name[r], "gravity") != 0);
     CHECK_INT(pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "verlet"}), 0);
     f = later(s, f->tick + 5);
-    pal_session_last_note(s, &note);
-    CHECK(strstr(note.text, "cannot be switched off") != NULL);
+    pal_session_last_note(s, &diag);
+    CHECK(strstr(diag.text, "cannot be switched off") != NULL);
     CHECK(f->n_refused == 1 && f->n_row == n_row - 1);
     CHECK_INT(pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "gravity", .wanted = true}), 0);
     f = later(s, f->tick + 5);
@@ -130,29 +130,29 @@ static void rows_are_switched_by_command(void)
 static void carry_nothing(void *user, pal_world *next, const pal_world *before)
 {
     (void)user;
-    pal_world_follow(next, before, -1, NULL, NULL);
+    pal_world_transfer(next, before, -1, NULL, NULL);
 }
 
 /* a session that follows keeps rows off and who watches */
 static void a_session_that_follows_keeps_them(void)
 {
     pal_session *s, *next;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     const pal_session_options options = {.only_watched = true};
-    REQUIRE(!pal_session_open(&scene, &options, &note, &s));
+    REQUIRE(!pal_session_open(&scene, &options, &diag, &s));
     pal_session_watch(s, true);
-    pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "tool_grab"});
+    pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "tool_grasp"});
     const pal_frame *f = later(s, 20);
     REQUIRE(f);
     int n_row = f->n_row;
-    REQUIRE(!pal_session_open_after(s, &scene, &note, &next));
-    REQUIRE(!pal_session_follow(next, s, carry_nothing, NULL, &note));
+    REQUIRE(!pal_session_open_after(s, &scene, &diag, &next));
+    REQUIRE(!pal_session_follow(next, s, carry_nothing, NULL, &diag));
     pal_session_close(s);
     f = later(next, 30);
     REQUIRE(f && f->tick >= 30);
     CHECK(f->watched);
     CHECK_INT(f->n_row, n_row);
-    for (int r = 0; r < f->n_row; r++) CHECK(strcmp(f->row_name[r], "tool_grab") != 0);
+    for (int r = 0; r < f->n_row; r++) CHECK(strcmp(f->component_name[r], "tool_grasp") != 0);
     pal_session_close(next);
 }
 

@@ -34,7 +34,7 @@ static void derived_numbers_follow_from_errors_and_changes(void)
     double h[N] = {0.5, 0.25, 0.1, 0.05, 0.04}, p = 1.6, c = 0.2;
     for (int k = 0; k < N; k++) {
         point[k] = (pal_convergence_point){.rms_percent = 100 * c * pow(h[k], p), .change_percent = NAN};
-        point[k].result.h_m = h[k];
+        point[k].result.edge_m = h[k];
         if (k > 0) point[k].change_percent = 100 * c * (pow(h[k - 1], p) - pow(h[k], p));
     }
     pal_convergence_orders(point, N);
@@ -93,13 +93,13 @@ static void a_beam_converges_and_richardson_knows_by_how_much(void)
 {
     pal_surface beam;
     static pal_problem p;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_convergence_point point[3];
     const int resolution[3] = {8, 16, 32};
     int done = 0;
     REQUIRE(make_beam(&beam));
     beam_problem(&p);
-    REQUIRE(!pal_convergence(&p, &p.load_case[0], &beam, &beam_options, NULL, resolution, 3, point, &done, &note));
+    REQUIRE(!pal_convergence(&p, &p.load_case[0], &beam, &beam_options, NULL, resolution, 3, point, &done, &diag));
     CHECK_INT(done, 3);
     for (int k = 0; k < 3; k++) {
         int n = resolution[k];
@@ -118,13 +118,13 @@ static void a_beam_converges_and_richardson_knows_by_how_much(void)
     double x[24], u[24];
     pal_samples samples = {.n = 8, .x = x, .u = u};
     o.resolution = 32;
-    REQUIRE(!pal_solve(&p, &p.load_case[0], &beam, &o, &s, &r, &note));
+    REQUIRE(!pal_solve(&p, &p.load_case[0], &beam, &o, &s, &r, &diag));
     for (int i = 0; i < 24; i++) x[i] = beam.x[i] + beam.origin_m[i % 3];
     for (int i = 0; i < 8; i++) pal_solution_at(s, x + 3 * i, u + 3 * i);
     pal_solution_free(s);
     double change = point[2].change_percent;
     REQUIRE(
-        !pal_convergence(&p, &p.load_case[0], &beam, &beam_options, &samples, resolution + 1, 2, point, &done, &note));
+        !pal_convergence(&p, &p.load_case[0], &beam, &beam_options, &samples, resolution + 1, 2, point, &done, &diag));
     CHECK_NEAR(point[0].rms_percent, change, 1e-6);
     CHECK_NEAR(point[1].rms_percent, 0, 1e-9);
     CHECK_NEAR(point[1].change_percent, change, 1e-6);
@@ -135,24 +135,24 @@ static void what_cannot_be_a_series_is_refused(void)
 {
     pal_surface beam;
     static pal_problem p;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_convergence_point point[2];
     int done = 7;
     REQUIRE(make_beam(&beam));
     beam_problem(&p);
     const pal_problem_case *c = &p.load_case[0];
-    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8, 8}, 2, point, &done, &note),
+    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8, 8}, 2, point, &done, &diag),
               PAL_ERR_REFUSED);
     CHECK_INT(done, 0);
-    CHECK(strstr(note.text, "resolution 8 comes after 8") != NULL);
-    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8}, 0, point, &done, &note), PAL_ERR_REFUSED);
-    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8}, 17, point, &done, &note), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "resolution 8 comes after 8") != NULL);
+    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8}, 0, point, &done, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){8}, 17, point, &done, &diag), PAL_ERR_REFUSED);
     /* a fault of a solve is handed on, with what was whole before it */
     p.n_support = 0;
-    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){4, 8}, 2, point, &done, &note),
+    CHECK_INT(pal_convergence(&p, c, &beam, &beam_options, NULL, (int[]){4, 8}, 2, point, &done, &diag),
               PAL_ERR_REFUSED);
     CHECK_INT(done, 0);
-    CHECK(strstr(note.text, "supports: none") != NULL);
+    CHECK(strstr(diag.text, "supports: none") != NULL);
     pal_surface_free(&beam);
 }
 

@@ -6,11 +6,11 @@
 static void expect_refusal(const char *text, const char *sentence)
 {
     pal_samples s = {0};
-    pal_note note = {""};
-    CHECK_INT(pal_samples_parse("u.csv", (const uint8_t *)text, strlen(text), &s, &note), PAL_ERR_REFUSED);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_samples_parse("u.csv", (const uint8_t *)text, strlen(text), &s, &diag), PAL_ERR_REFUSED);
     CHECK(s.x == NULL && s.u == NULL && s.n == 0);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (strncmp(note.text, "u.csv: line ", 12) != 0) CHECK_FAIL("\"%s\" does not name file and line", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (strncmp(diag.text, "u.csv: line ", 12) != 0) CHECK_FAIL("\"%s\" does not name file and line", diag.text);
 }
 
 static void every_fault_is_named_with_line_and_column(void)
@@ -38,8 +38,8 @@ static void other_line_ends_and_blanks_are_fine(void)
 {
     static const char text[] = "\xef\xbb\xbf x , y,z,ux,uy,uz \r\n\r\n 1, 2 ,3,4e-1,5,-6\r\n7,8,9,10,11,12";
     pal_samples s = {0};
-    pal_note note = {""};
-    REQUIRE(!pal_samples_parse("u.csv", (const uint8_t *)text, sizeof text - 1, &s, &note));
+    pal_diagnostic diag = {""};
+    REQUIRE(!pal_samples_parse("u.csv", (const uint8_t *)text, sizeof text - 1, &s, &diag));
     CHECK_INT(s.n, 2);
     CHECK_NEAR(s.x[1], 2, 0);
     CHECK_NEAR(s.u[0], 0.4, 0);
@@ -56,19 +56,19 @@ static void what_is_written_reads_back_bit_by_bit(void)
     char path[] = "/tmp/palpate_samples_XXXXXX";
     int fd = mkstemp(path);
     pal_samples out = {.n = N, .x = x, .u = u}, back = {0};
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(fd >= 0);
     close(fd);
     for (int i = 0; i < 3 * N; i++) x[i] = sin(i * 1.7) * pow(10, i % 19 - 9), u[i] = cos(i * 0.3) / (1 + i);
-    CHECK_INT(pal_samples_write(&out, path, &note), PAL_ERR_OK);
-    CHECK_INT(pal_samples_read(path, &back, &note), PAL_ERR_OK);
+    CHECK_INT(pal_samples_write(&out, path, &diag), PAL_ERR_OK);
+    CHECK_INT(pal_samples_read(path, &back, &diag), PAL_ERR_OK);
     CHECK_INT(back.n, N);
     CHECK(back.n == N && !memcmp(back.x, x, sizeof x) && !memcmp(back.u, u, sizeof u));
     pal_samples_free(&back);
     unlink(path);
-    CHECK_INT(pal_samples_read(path, &back, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, path) != NULL);
-    CHECK_INT(pal_samples_write(&out, "/nowhere/at/all.csv", &note), PAL_ERR_IO);
+    CHECK_INT(pal_samples_read(path, &back, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, path) != NULL);
+    CHECK_INT(pal_samples_write(&out, "/nowhere/at/all.csv", &diag), PAL_ERR_IO);
 }
 
 static void error_is_over_the_largest_reference_displacement(void)

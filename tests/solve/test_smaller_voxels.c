@@ -5,7 +5,7 @@
 
 static double filled(const pal_prepared *p)
 {
-    double sum = 0, cube = p->tets.h_m * p->tets.h_m * p->tets.h_m;
+    double sum = 0, cube = p->tets.edge_m * p->tets.edge_m * p->tets.edge_m;
     for (int e = 0; e < p->hexes.n_hex; e++) sum += cube * (double)p->hexes.fill[e];
     return sum;
 }
@@ -13,10 +13,10 @@ static double filled(const pal_prepared *p)
 static bool make_organ(pal_prepared *out)
 {
     pal_surface organ;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     if (pal_organ_make(2000, &organ)) return false;
-    const pal_voxel_options voxel = {.resolution = 9, .border = true, .least_fill = 0.25};
-    pal_err err = pal_prepared_make(&organ, &voxel, out, NULL, &note);
+    const pal_voxel_options voxel = {.resolution = 9, .border = true, .min_fill = 0.25};
+    pal_err err = pal_prepared_make(&organ, &voxel, out, NULL, &diag);
     pal_surface_free(&organ);
     return !err;
 }
@@ -25,20 +25,20 @@ static void the_body_stays_and_its_voxels_shrink(void)
 {
     for (int split = 1; split <= 3; split++) {
         pal_prepared p;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         REQUIRE(make_organ(&p));
         int n_hex = p.hexes.n_hex, cubes = split * split * split;
-        double h = p.tets.h_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, least = 1, share = 1;
+        double h = p.tets.edge_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, least = 1, share = 1;
         float *fill = malloc(sizeof *fill * (size_t)n_hex);
         double *corner = malloc(3 * sizeof *corner * (size_t)n_hex);
         REQUIRE(fill && corner);
         memcpy(fill, p.hexes.fill, sizeof *fill * (size_t)n_hex);
         for (int e = 0; e < n_hex; e++) memcpy(corner + 3 * e, p.tets.x + 3 * p.hexes.node[8 * e], 24);
         for (int i = 0; i < p.tets.n_node; i++) low[0] = fmin(low[0], p.tets.x[3 * i]);
-        CHECK_INT(pal_refine_voxels(&p, split, &note), 0);
+        CHECK_INT(pal_refine_voxels(&p, split, &diag), 0);
         CHECK_INT(p.hexes.n_hex, n_hex * cubes);
         CHECK_INT(p.tets.n_tet, 5 * n_hex * cubes);
-        CHECK_NEAR(p.tets.h_m, h / split, 1e-15);
+        CHECK_NEAR(p.tets.edge_m, h / split, 1e-15);
         CHECK_NEAR(filled(&p) / volume, 1, 1e-12);
         CHECK(p.hexes.measured);
         CHECK_INT(p.skin.n_vertex, 0);
@@ -70,13 +70,13 @@ static void the_body_stays_and_its_voxels_shrink(void)
 static void too_many_and_none_are_refused(void)
 {
     pal_prepared p, none = {0};
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(make_organ(&p));
     int n_hex = p.hexes.n_hex;
-    CHECK_INT(pal_refine_voxels(&p, 200, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_refine_voxels(&p, 200, &diag), PAL_ERR_BUDGET);
     CHECK_INT(p.hexes.n_hex, n_hex);
     CHECK(p.skin.n_vertex > 0);
-    CHECK_INT(pal_refine_voxels(&none, 2, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_refine_voxels(&none, 2, &diag), PAL_ERR_REFUSED);
     pal_prepared_free(&p);
 }
 

@@ -59,11 +59,11 @@ static pal_solve_options options_of(const char *element, const char *law)
 }
 
 static pal_err solve(const pal_problem *p, const pal_solve_options *o, pal_solution **out, pal_solve_result *r,
-                     pal_note *note)
+                     pal_diagnostic *diag)
 {
     pal_surface bar;
     if (!make_bar(&bar)) return PAL_ERR_MEMORY;
-    pal_err err = pal_solve(p, &p->load_case[0], &bar, o, out, r, note);
+    pal_err err = pal_solve(p, &p->load_case[0], &bar, o, out, r, diag);
     pal_surface_free(&bar);
     return err;
 }
@@ -82,9 +82,9 @@ static void traction_stretches_a_bar_exactly(void)
         pal_solve_options o = options_of(elements[e], "linear");
         pal_solution *s = NULL;
         pal_solve_result r;
-        pal_note note = {""};
-        pal_err err = solve(&p, &o, &s, &r, &note);
-        if (err) CHECK_FAIL("%s: %s", elements[e], note.text);
+        pal_diagnostic diag = {""};
+        pal_err err = solve(&p, &o, &s, &r, &diag);
+        if (err) CHECK_FAIL("%s: %s", elements[e], diag.text);
         REQUIRE(!err);
         double strain = 200 / young_Pa, force = 200 * side_m * side_m;
         CHECK_NEAR(ux(s, 3.4, 0.05, 0.05), strain * length_m, 1e-10);
@@ -94,7 +94,7 @@ static void traction_stretches_a_bar_exactly(void)
         CHECK_NEAR(r.reaction_N[0], -force, 1e-8);
         CHECK_NEAR(r.work_J, force * strain * length_m, 1e-9);
         CHECK_NEAR(r.energy_J, 0.5 * force * strain * length_m, 1e-9);
-        CHECK_NEAR(r.most_m, strain * length_m, 1e-10);
+        CHECK_NEAR(r.max_m, strain * length_m, 1e-10);
         CHECK_NEAR(r.volume_m3, length_m * side_m * side_m, 1e-9);
         CHECK_INT(r.n_element, e < 2 ? 8 * 2 * 2 : 5 * 8 * 2 * 2);
         if (e < 3) CHECK_INT(r.n_node, 9 * 3 * 3);
@@ -129,10 +129,10 @@ static void laws_stretch_a_bar_as_they_say(void)
             pal_solve_options o = options_of(elements[e], law[k]);
             pal_solution *s = NULL;
             pal_solve_result r;
-            pal_note note = {""};
+            pal_diagnostic diag = {""};
             o.tolerance = 1e-10;
-            pal_err err = solve(&p, &o, &s, &r, &note);
-            if (err) CHECK_FAIL("%s %s: %s", law[k], elements[e], note.text);
+            pal_err err = solve(&p, &o, &s, &r, &diag);
+            if (err) CHECK_FAIL("%s %s: %s", law[k], elements[e], diag.text);
             REQUIRE(!err);
             CHECK_NEAR(ux(s, 3.4, 0.05, 0.05), want[k] * length_m, off[k] * length_m);
             CHECK_NEAR(r.reaction_N[0], -traction * side_m * side_m, 1e-6);
@@ -150,14 +150,14 @@ static void total_force_is_spread_over_what_the_region_holds(void)
     pal_solve_options o = options_of("hex8_bbar", "linear");
     pal_solution *s = NULL;
     pal_solve_result r;
-    pal_note note = {""};
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
+    pal_diagnostic diag = {""};
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
     CHECK_NEAR(r.load_N[0], 2, 1e-10);
     CHECK_NEAR(ux(s, 3.4, 0.05, 0.05), 2 / (side_m * side_m) / young_Pa * length_m, 1e-10);
     pal_solution_free(s);
     /* half of the end: the same force all the same */
     l->region.high_m[1] = 0.05;
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
     CHECK_NEAR(r.area_m2[0], side_m * side_m / 2, 1e-12);
     CHECK_NEAR(r.load_N[0], 2, 1e-10);
     CHECK_NEAR(r.reaction_N[0], -2, 1e-8);
@@ -172,9 +172,9 @@ static void weight_points_and_moved_supports_are_exact(void)
     pal_solve_options o = options_of("hex8", "linear");
     pal_solution *s = NULL;
     pal_solve_result r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     *l = (pal_problem_load){.kind = PAL_LOAD_GRAVITY, .gravity_m_s2 = {3, 0, 0}};
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
     /* nodes of linear elements are exact under a uniform load: rho g (L x - x^2 / 2) / E */
     CHECK_NEAR(ux(s, 3.4, 0, 0), density_kg_m3 * 3 * length_m * length_m / 2 / young_Pa, 1e-9);
     CHECK_NEAR(ux(s, 3.2, 0, 0), density_kg_m3 * 3 * (length_m * 0.2 - 0.02) / young_Pa, 1e-9);
@@ -182,7 +182,7 @@ static void weight_points_and_moved_supports_are_exact(void)
     pal_solution_free(s);
 
     *l = (pal_problem_load){.kind = PAL_LOAD_POINT, .point_m = {3.4, 0.05, 0.05}, .force_N = {1, 0, 0}};
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
     CHECK_NEAR(r.load_N[0], 1, 1e-12);
     CHECK_NEAR(r.reaction_N[0], -1, 1e-8);
     CHECK_NEAR(r.work_J, ux(s, 3.4, 0.05, 0.05), 1e-9);
@@ -193,7 +193,7 @@ static void weight_points_and_moved_supports_are_exact(void)
     p.n_support = 2;
     p.support[1] = (pal_problem_support){.region = box_of(3.399999, 3.5), .moved = true, .move_m = {0.15, 0, 0}};
     l->force_N[0] = 0;
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
     CHECK_NEAR(ux(s, 3.4, 0.02, 0.03), 0.15, 1e-12);
     CHECK_NEAR(ux(s, 3.11, 0.02, 0.03), 0.15 / length_m * 0.11, 1e-9);
     CHECK_NEAR(r.energy_J, 0.5 * young_Pa * side_m * side_m / length_m * 0.15 * 0.15, 1e-6);
@@ -207,26 +207,26 @@ static void materials_hold_in_their_boxes(void)
     pal_solve_options o = options_of("hex8_bbar", "linear");
     pal_solution *s = NULL;
     pal_solve_result r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     p.n_material = 2;
     p.material[0].region = box_of(2.9, 3.2);
     p.material[1] = p.material[0];
     snprintf(p.material[1].id, PAL_NAME, "n");
     p.material[1].region = box_of(3.2, 3.5);
     p.material[1].young_Pa = 4 * young_Pa;
-    pal_err err = solve(&p, &o, &s, &r, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = solve(&p, &o, &s, &r, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     double strain = 200 / young_Pa;
     CHECK_NEAR(ux(s, 3.2, 0.05, 0.05), strain * 0.2, 1e-10);
     CHECK_NEAR(ux(s, 3.4, 0.05, 0.05), strain * (0.2 + 0.2 / 4), 1e-10);
     pal_solution_free(s);
     p.material[1].region = box_of(3.3, 3.5);
-    CHECK_INT(solve(&p, &o, &s, &r, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "materials: none of the 2 regions holds (3.2") != NULL);
+    CHECK_INT(solve(&p, &o, &s, &r, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "materials: none of the 2 regions holds (3.2") != NULL);
     o.young_Pa = 5;
-    CHECK_INT(solve(&p, &o, &s, &r, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "the problem has 2 materials") != NULL);
+    CHECK_INT(solve(&p, &o, &s, &r, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "the problem has 2 materials") != NULL);
 }
 
 static void files_hold_what_was_solved(void)
@@ -235,21 +235,21 @@ static void files_hold_what_was_solved(void)
     pal_solve_options o = options_of("hex8_bbar", "linear");
     pal_solution *s = NULL;
     pal_solve_result r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_samples back = {0};
     char csv[] = "/tmp/palpate_solve_XXXXXX", vtk[64], line[128] = "";
     int fd = mkstemp(csv);
     REQUIRE(fd >= 0);
     close(fd);
     snprintf(vtk, sizeof vtk, "%s.vtk", csv);
-    REQUIRE(!solve(&p, &o, &s, &r, &note));
-    CHECK_INT(pal_solution_csv(s, csv, &note), 0);
-    CHECK_INT(pal_samples_read(csv, &back, &note), 0);
+    REQUIRE(!solve(&p, &o, &s, &r, &diag));
+    CHECK_INT(pal_solution_csv(s, csv, &diag), 0);
+    CHECK_INT(pal_samples_read(csv, &back, &diag), 0);
     CHECK_INT(back.n, r.n_node);
     for (int k = 0; k < back.n; k++)
         CHECK_NEAR(ux(s, back.x[3 * k], back.x[3 * k + 1], back.x[3 * k + 2]), back.u[3 * k], 1e-12);
     pal_samples_free(&back);
-    CHECK_INT(pal_solution_vtk(s, vtk, &note), 0);
+    CHECK_INT(pal_solution_vtk(s, vtk, &diag), 0);
     FILE *file = fopen(vtk, "r");
     int n_point = 0, n_cell = 0, n_vector = 0, n_scalar = 0;
     double stress[4] = {0}, least = INFINITY, most = 0;
@@ -268,8 +268,8 @@ static void files_hold_what_was_solved(void)
     CHECK_INT(n_scalar, 1);
     CHECK_NEAR(least, 200, 1e-6); /* uniaxial: the traction itself */
     CHECK_NEAR(most, 200, 1e-6);
-    CHECK_INT(pal_solution_csv(s, "/nowhere/at/all.csv", &note), PAL_ERR_IO);
-    CHECK_INT(pal_solution_vtk(s, "/nowhere/at/all.vtk", &note), PAL_ERR_IO);
+    CHECK_INT(pal_solution_csv(s, "/nowhere/at/all.csv", &diag), PAL_ERR_IO);
+    CHECK_INT(pal_solution_vtk(s, "/nowhere/at/all.vtk", &diag), PAL_ERR_IO);
     pal_solution_free(s);
     unlink(csv);
     unlink(vtk);
@@ -302,7 +302,7 @@ static void faults_are_named_with_their_entry(void)
         pal_problem_load *l = &p.load_case[0].load[0];
         pal_solution *s = NULL;
         pal_solve_result r;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         int left = 2;
         if (k == 0) p.n_support = 0;
         if (k == 1) p.support[0].region = box_of(5, 6);
@@ -313,9 +313,9 @@ static void faults_are_named_with_their_entry(void)
         if (k == 6) o.poisson = -1;
         if (k == 7) o.young_Pa = 0;
         if (k == 8) o.progress = stop, o.user = &left;
-        CHECK_INT(solve(&p, &o, &s, &r, &note), want[k].err);
+        CHECK_INT(solve(&p, &o, &s, &r, &diag), want[k].err);
         CHECK(s == NULL);
-        if (!strstr(note.text, want[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, want[k].sentence);
+        if (!strstr(diag.text, want[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, want[k].sentence);
     }
 }
 
@@ -325,12 +325,12 @@ static void inertia_relief_balances_a_free_body(void)
     pal_solve_options o = options_of("hex8", "linear");
     pal_solution *s = NULL;
     pal_solve_result r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     p.n_support = 0;
     o.inertia_relief = true;
     o.tolerance = 1e-10;
-    pal_err err = solve(&p, &o, &s, &r, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = solve(&p, &o, &s, &r, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     REQUIRE(!err);
     /* stress grows linearly from the free end: strain t x / (E L) */
     double strain = 200 / young_Pa;

@@ -6,7 +6,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_shapes.h"
 #include "server/mesh/geometry/stomach.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/stability/hard_case.h"
@@ -22,11 +22,11 @@ typedef struct four {
     pal_body_def *def;
     pal_world *world;
     pal_body *body;
-    pal_note note;
+    pal_diagnostic diag;
 } four;
 
 /* the scene around what `mesh` and `cells` hold by now */
-static inline void four_scene(four *s, bool held)
+static inline void four_scene(four *s, bool fixed)
 {
     s->scene = calloc(1, sizeof *s->scene);
     if (!s->scene) abort();
@@ -37,52 +37,52 @@ static inline void four_scene(four *s, bool held)
         pal_body_default_cells(s->def, four_name[s->model], &s->mesh, &s->cells);
     else
         pal_body_default(s->def, four_name[s->model], &s->mesh);
-    pal_item_init(&s->def->model, "model", four_name[s->model]);
-    pal_item_init(&s->def->output, "output", "surface_out");
+    pal_entry_init(&s->def->model, "model", four_name[s->model]);
+    pal_entry_init(&s->def->output, "output", "surface_output");
     s->def->material = (pal_material){.young_Pa = 1e4, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
-    s->def->n_effect = 0, s->def->n_support = held;
-    s->def->support[0] = (pal_support){.lowest = true, .fraction = 0.08};
-    if (s->model == FOUR_ADAPTIVE) pal_item_put_number(&s->def->model, "levels", 3, NULL);
-    if (s->model == FOUR_FEM) pal_item_init(&s->def->solver, "solver", "implicit_euler");
+    s->def->n_effect = 0, s->def->n_support = fixed;
+    s->def->support[0] = (pal_support_def){.lowest = true, .fraction = 0.08};
+    if (s->model == FOUR_ADAPTIVE) pal_entry_put_number(&s->def->model, "levels", 3, NULL);
+    if (s->model == FOUR_FEM) pal_entry_init(&s->def->solver, "solver", "implicit_euler");
     if (s->model == FOUR_SOLID) {
-        pal_item_init(&s->def->solver, "solver", "implicit_euler");
-        pal_item_put_number(&s->def->model, "levels", 1, NULL);
+        pal_entry_init(&s->def->solver, "solver", "implicit_euler");
+        pal_entry_put_number(&s->def->model, "levels", 1, NULL);
     }
 }
 
 /* not yet open */
-static inline void four_take(four *s, int model, bool held)
+static inline void four_take(four *s, int model, bool fixed)
 {
     memset(s, 0, sizeof *s);
     s->model = model;
     pal_surface surface = {0};
     bool ok = true;
     if (model == FOUR_SPRINGS || model == FOUR_FEM) ok = !box_make(3, 3, 3, 0.01, &s->mesh);
-    if (model == FOUR_FEM) ok = ok && !pal_hexes_find(&s->mesh.tets, &s->mesh.hexes, &s->note);
+    if (model == FOUR_FEM) ok = ok && !pal_hexes_find(&s->mesh.tets, &s->mesh.hexes, &s->diag);
     if (model == FOUR_ADAPTIVE) ok = !pal_sphere_make(0.03, &s->mesh.surface);
     if (model == FOUR_SOLID) {
-        ok = !pal_cells_block((const int32_t[3]){2, 2, 2}, (const double[3]){0.04, 0.04, 0.04}, &s->cells, &s->note);
+        ok = !pal_cells_block((const int32_t[3]){2, 2, 2}, (const double[3]){0.04, 0.04, 0.04}, &s->cells, &s->diag);
         ok = ok && !pal_cells_boundary(&s->cells, &surface, NULL, NULL) && !pal_prepared_surface(&surface, &s->mesh);
         pal_surface_free(&surface);
     }
-    if (!ok) printf("  %s\n", s->note.text), abort();
-    four_scene(s, held);
+    if (!ok) printf("  %s\n", s->diag.text), abort();
+    four_scene(s, fixed);
 }
 
-static inline pal_item *four_effect(four *s, const char *name)
+static inline pal_config_entry *four_effect(four *s, const char *name)
 {
-    pal_item *item = &s->def->effect[s->def->n_effect];
+    pal_config_entry *item = &s->def->effect[s->def->n_effect];
     char path[32];
     snprintf(path, sizeof path, "effects[%d]", s->def->n_effect++);
-    pal_item_init(item, path, name);
+    pal_entry_init(item, path, name);
     return item;
 }
 
 static inline bool four_open(four *s)
 {
-    const pal_err err = pal_world_create(s->scene, &s->note, &s->world);
+    const pal_err err = pal_world_create(s->scene, &s->diag, &s->world);
     if (err)
-        printf("  %s: %s\n", four_name[s->model], s->note.text);
+        printf("  %s: %s\n", four_name[s->model], s->diag.text);
     else
         s->body = pal_world_body(s->world, 0);
     return !err;
@@ -117,7 +117,7 @@ static inline double four_off(const four *s)
         const int i = pal_body_point(s->body, k);
         sum += pow(pal_dist3(s->body->x + 3 * i, s->body->x_rest + 3 * i), 2);
     }
-    return 100 * sqrt(sum / s->body->n_active) / s->body->size_m;
+    return 100 * sqrt(sum / s->body->n_active) / s->body->length_scale_m;
 }
 
 /* the highest node in use, nearest to the axis */
@@ -126,7 +126,7 @@ static inline int four_top(const four *s)
     int best = -1;
     double most = -INFINITY;
     for (int k = 0; k < pal_body_nodes(s->body); k++) {
-        const int i = s->body->embed ? k : pal_body_point(s->body, k);
+        const int i = s->body->interpolation ? k : pal_body_point(s->body, k);
         const double *x = s->body->node_rest + 3 * i, at = x[2] - 0.01 * fabs(x[0] - x[1]);
         if (at > most) most = at, best = i;
     }
@@ -137,8 +137,8 @@ static inline int four_top(const four *s)
 static inline double four_energy_J(const four *s)
 {
     double work = 0;
-    for (int i = 0; i < 3 * s->body->n_node && s->body->outer; i++)
-        work += s->body->outer[i] * (s->body->d[i] - s->body->node_rest[i]);
+    for (int i = 0; i < 3 * s->body->n_node && s->body->external_force; i++)
+        work += s->body->external_force[i] * (s->body->d[i] - s->body->node_rest[i]);
     return pal_world_energy_J(s->world) - work;
 }
 
@@ -148,7 +148,7 @@ static inline void four_load(four *s, const double force_N[3])
     double low = INFINITY, high = -INFINITY, mass = 0;
     for (int pass = 0; pass < 3; pass++)
         for (int k = 0; k < pal_body_nodes(s->body); k++) {
-            const int i = s->body->embed ? k : pal_body_point(s->body, k);
+            const int i = s->body->interpolation ? k : pal_body_point(s->body, k);
             const double z = s->body->node_rest[3 * i + 2];
             double f[3];
             if (pass == 0) low = fmin(low, z), high = fmax(high, z);
@@ -167,6 +167,6 @@ static inline double four_apart(const four *a, const double *x)
         const int i = pal_body_point(a->body, k);
         most = fmax(most, pal_dist3(a->body->x + 3 * i, x + 3 * i));
     }
-    return 100 * most / a->body->size_m;
+    return 100 * most / a->body->length_scale_m;
 }
 #endif

@@ -44,10 +44,10 @@
                        unit);                                                                                          \
     } while (0)
 /* the case cannot be put to these models; why is a sentence */
-#define HARD_CASE_NONE(id, models, why)                                                                                \
+#define HARD_CASE_NONE(id, models, reason)                                                                             \
     do {                                                                                                               \
         check_count++;                                                                                                 \
-        hard_record("none", id, models, why, 0, 0, "");                                                                \
+        hard_record("none", id, models, reason, 0, 0, "");                                                             \
     } while (0)
 
 enum {

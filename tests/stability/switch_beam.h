@@ -3,7 +3,7 @@
 #define TESTS_STABILITY_SWITCH_BEAM_H
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_shapes.h"
-#include "server/sim/core/setting.h"
+#include "server/sim/core/configuration.h"
 #include "server/sim/transfer/transfer.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
@@ -16,7 +16,7 @@ enum { MOST = 8 };
 
 static bool table;
 
-static const pal_setting full[] = {
+static const pal_configuration full[] = {
     {.model = "fem", .element = "hex8_bbar", .size = 8},
     {.model = "fem", .element = "hex8_bbar", .size = 12},
     {.model = "fem", .element = "hex8", .law = "neo_hookean", .size = 8},
@@ -32,16 +32,16 @@ typedef struct beam {
     pal_cells cells;
     pal_scene *scene;
     int n;
-    pal_set_scene *set[MOST];
+    pal_configured_scene *set[MOST];
     double rest_m[MOST]; /* of the tip, upward */
     double right_m;      /* the same by a finer mesh */
 } beam;
 
 static inline pal_world *open_world(const pal_scene *scene)
 {
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_world *w = NULL;
-    if (pal_world_create(scene, &note, &w)) CHECK_FAIL("%s", note.text);
+    if (pal_world_create(scene, &diag, &w)) CHECK_FAIL("%s", diag.text);
     return w;
 }
 
@@ -57,46 +57,46 @@ static inline void make_cells(beam *b)
     pal_surface_free(&surface);
 }
 
-static inline void add_effects(pal_body_def *def, bool held)
+static inline void add_effects(pal_body_def *def, bool fixed)
 {
     def->n_effect = 0;
-    if (held) pal_item_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
-    pal_item_init(&def->effect[def->n_effect++], "effects[1]", "tool_push");
-    pal_item_init(&def->effect[def->n_effect++], "effects[2]", "tool_grab");
-    pal_item_init(&def->effect[def->n_effect++], "effects[3]", "finite_guard");
+    if (fixed) pal_entry_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[1]", "tool_push");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[2]", "tool_grasp");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "finite_guard");
 }
 
 /* clamped at x = 0 and under its weight, or free in space */
-static inline void begin(beam *b, bool cells, bool held, double damping_1_s)
+static inline void begin(beam *b, bool cells, bool fixed, double damping_1_s)
 {
     memset(b, 0, sizeof *b);
     if (cells)
         make_cells(b);
     else if (box_make(16, 4, 4, WIDTH / 4, &b->mesh))
         abort();
-    b->scene = box_scene(&b->mesh, held, false);
+    b->scene = box_scene(&b->mesh, fixed, false);
     if (cells) pal_body_default_cells(&b->scene->body[0], "beam", &b->mesh, &b->cells);
     pal_body_def *def = &b->scene->body[0];
     def->material = (pal_material){.young_Pa = 4e5, .poisson = 0.4, .density_kg_m3 = 1000, .damping_1_s = damping_1_s};
-    def->n_support = held;
-    def->support[0] = (pal_support){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
-    add_effects(def, held);
+    def->n_support = fixed;
+    def->support[0] = (pal_support_def){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
+    add_effects(def, fixed);
     b->scene->step_s = 1.0 / 60;
-    b->scene->most_substep = 20000;
+    b->scene->max_substep = 20000;
     pal_tools_default(b->scene, 2);
     for (int k = 0; k < 2; k++) b->scene->tool[k].radius_m = 0.015;
 }
 
-static inline void add_setting(beam *b, const pal_setting *s)
+static inline void add_setting(beam *b, const pal_configuration *s)
 {
-    pal_note note = {""};
-    if (pal_setting_make(b->scene, 0, s, &note, &b->set[b->n])) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_configuration_make(b->scene, 0, s, &diag, &b->set[b->n])) CHECK_FAIL("%s", diag.text);
     b->n++;
 }
 
 static inline void end(beam *b)
 {
-    for (int i = 0; i < b->n; i++) pal_set_scene_free(b->set[i]);
+    for (int i = 0; i < b->n; i++) pal_configured_scene_free(b->set[i]);
     pal_cells_free(&b->cells);
     free(b->scene);
     box_free(&b->mesh);
@@ -132,7 +132,7 @@ static inline void step(pal_world *w, double step_s, int n)
 {
     for (int k = 0; k < n; k++) {
         CHECK(!pal_world_step(w, step_s));
-        pal_world_tidy(w);
+        pal_world_remove_idle(w);
     }
 }
 

@@ -6,22 +6,22 @@
 enum { LEVELS_MOST_SWITCH = 24 };
 
 /* settings 0, 1 and 2: 1, 2 and 3 levels */
-static void begin_surface(beam *b, bool held, double young_Pa, double damping_1_s, pal_prepared *surface)
+static void begin_surface(beam *b, bool fixed, double young_Pa, double damping_1_s, pal_prepared *surface)
 {
-    begin(b, false, held, damping_1_s);
+    begin(b, false, fixed, damping_1_s);
     REQUIRE(!pal_prepared_surface(&b->mesh.surface, surface));
     b->scene->body[0].n_support = 1;
     b->scene->body[0].mesh = surface;
     b->scene->body[0].material.young_Pa = young_Pa;
-    pal_item_init(&b->scene->body[0].model, "model", "adaptive_springs");
-    pal_item_put_number(&b->scene->body[0].model, "thickness_m", 0.01, NULL);
-    for (int i = 1; i <= 3; i++) add_setting(b, &(pal_setting){.model = "adaptive_springs", .size = i});
+    pal_entry_init(&b->scene->body[0].model, "model", "adaptive_springs");
+    pal_entry_put_number(&b->scene->body[0].model, "thickness_m", 0.01, NULL);
+    for (int i = 1; i <= 3; i++) add_setting(b, &(pal_configuration){.model = "adaptive_springs", .size = i});
 }
 
 /* farthest that a vertex in use is from x [n][3], NAN: it was not in use; x is then where they are */
 static double farthest_vertex(pal_world *w, double *x, int n)
 {
-    const pal_body *body = pal_world_look(w, 0);
+    const pal_body *body = pal_world_view_body(w, 0);
     double most = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = body->active[k];
@@ -60,7 +60,7 @@ static void turn_body(pal_world *w)
 {
     pal_body *body = pal_world_body(w, 0);
     for (int k = 0; k < body->n_active; k++) turn_quarter(body->x + 3 * body->active[k]);
-    pal_world_moved(w, 0);
+    pal_world_invalidate_limits(w, 0);
     step(w, 1.0 / 60, 1); /* and is shown there */
 }
 
@@ -77,10 +77,10 @@ static pal_world *change_levels(const beam *b, int from, int to, pal_world *w, p
 {
     pal_world *next = open_world(&b->set[to]->scene);
     pal_transfer *change = NULL;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_transfer_report r;
-    if (pal_transfer_make(&b->set[from]->scene, &b->set[to]->scene, 0, &note, &change)) CHECK_FAIL("%s", note.text);
-    pal_transfer_carry(change, next, w, &r);
+    if (pal_transfer_make(&b->set[from]->scene, &b->set[to]->scene, 0, &diag, &change)) CHECK_FAIL("%s", diag.text);
+    pal_transfer_apply(change, next, w, &r);
     out->energy = fmax(out->energy, fabs(r.energy_after_J / r.energy_before_J - 1));
     out->shown_m = fmax(out->shown_m, r.frame_move_m);
     pal_transfer_free(change);
@@ -91,7 +91,7 @@ static pal_world *change_levels(const beam *b, int from, int to, pal_world *w, p
 static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
 {
     pal_world *w = open_world(&b->set[p->setting[0]]->scene), *finest = open_world(&b->set[2]->scene);
-    int n = pal_world_look(finest, 0)->n_node, k = 0;
+    int n = pal_world_view_body(finest, 0)->n_node, k = 0;
     double *x = calloc(3 * (size_t)n, sizeof *x);
     REQUIRE(x != NULL);
     pal_world_destroy(finest);
@@ -106,7 +106,7 @@ static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
             if (k > p->lift) out->frame_m = fmax(out->frame_m, frame_m);
             if (s > 0 && i == 0) out->force = fmax(out->force, fabs(grip_N(w) / was_N - 1));
         }
-        CHECK(pal_world_tools(w)->tool[0].holding && !pal_world_look(w, 0)->frozen);
+        CHECK(pal_world_tools(w)->tool[0].holding && !pal_world_view_body(w, 0)->frozen);
     }
     out->end_N = grip_N(w);
     free(x);

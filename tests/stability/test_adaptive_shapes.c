@@ -1,6 +1,6 @@
 /* Odd surfaces as adaptive springs: whatever can be split bears being pressed, pulled, blown about, reset and run again
  * on changing levels, on both laws of stiffness and of mass; two such bodies do not see each other. */
-#include "tests/fixtures/shells.h"
+#include "tests/fixtures/adaptive_worlds.h"
 #include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60, MOST = 64 };
@@ -158,11 +158,11 @@ static void take(shell_scene *s, int kind, bool other)
         shell_scene_text(s, "place", "butterfly");
     }
     s->scene->body[0].material.damping_1_s = 4;
-    pal_item_put_number(shell_scene_effect(s, "refine"), "dwell_s", 0.05, NULL);
+    pal_entry_put_number(shell_scene_effect(s, "refine"), "dwell_s", 0.05, NULL);
     if (kind == TETRAHEDRON || kind == TWO_PIECES || kind == SPINDLE || kind == TORUS)
-        pal_item_put_text(shell_scene_effect(s, "inflate"), "kind", "fluid", NULL);
+        pal_entry_put_text(shell_scene_effect(s, "inflate"), "kind", "fluid", NULL);
     shell_scene_effect(s, "tool_push");
-    shell_scene_effect(s, "tool_grab");
+    shell_scene_effect(s, "tool_grasp");
     shell_scene_effect(s, "finite_guard");
     pal_tools_default(s->scene, 2);
 }
@@ -191,12 +191,12 @@ static void watch(const shell_scene *s, double mass_kg, seen *w)
 static void pose_tools(shell_scene *s, int step)
 {
     const pal_body *b = s->body;
-    double t = (double)step / STEPS_A_SECOND, S = b->size_m;
+    double t = (double)step / STEPS_A_SECOND, S = b->length_scale_m;
     const double *first = b->x_rest, *last = b->x_rest + 3 * (size_t)(s->mesh.surface.n_vertex - 1);
-    pal_pose grab = {.position_m = {first[0], first[1], first[2] + 0.2 * S * t}, .quat = {1, 0, 0, 0}, .buttons = 1};
+    pal_pose grasp = {.position_m = {first[0], first[1], first[2] + 0.2 * S * t}, .quat = {1, 0, 0, 0}, .buttons = 1};
     pal_pose push = {.position_m = {last[0], last[1] + 0.1 * S * sin(9 * t), last[2] + S * (0.2 - 0.3 * t)},
                      .quat = {1, 0, 0, 0}};
-    pal_pose *pose[2] = {&grab, &push};
+    pal_pose *pose[2] = {&grasp, &push};
     for (int k = 0; k < 2; k++) CHECK_INT(pal_world_pose(s->world, k, t < 1 ? pose[k] : NULL), 0);
 }
 
@@ -221,7 +221,7 @@ static void whatever_can_be_split_is_borne(void)
             shell_scene s;
             take(&s, kind, other);
             REQUIRE(shell_scene_start(&s));
-            const double mass = s.body->shell->options.mass_kg;
+            const double mass = s.body->adaptive->options.mass_kg;
             seen a = handle(&s, mass);
             printf("  %s, %s: %d to %d nodes, mass off by %.1g\n", odd_of(kind).name,
                    other ? "paper's law" : "membrane", a.least, a.most, a.mass_off);

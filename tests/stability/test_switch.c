@@ -1,7 +1,7 @@
 /* A live switch (sim/transfer.h) in detail: momentum, forces that are let go, hashes, drift, grips, loads, levels of
  * surfaces, refusals. --table prints figures; --sweep N pulls a surface that adapts through nineteen switches at
  * random, with N seeds, and asserts nothing. */
-#include "server/sim/world/ease.h"
+#include "server/sim/world/blend_component.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_levels.h"
 
@@ -10,8 +10,8 @@
 static pal_transfer *make_transfer(const beam *b, int i, int j)
 {
     pal_transfer *x = NULL;
-    pal_note note = {""};
-    if (pal_transfer_make(&b->set[i]->scene, &b->set[j]->scene, 0, &note, &x)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_transfer_make(&b->set[i]->scene, &b->set[j]->scene, 0, &diag, &x)) CHECK_FAIL("%s", diag.text);
     return x;
 }
 
@@ -36,7 +36,7 @@ static void a_free_body_keeps_its_momentum(void)
     beam b;
     begin(&b, false, false, 0);
     for (int k = 0; k < 2; k++) {
-        pal_setting exact = full[k];
+        pal_configuration exact = full[k];
         exact.tolerance = 1e-9;
         add_setting(&b, &exact);
     }
@@ -52,13 +52,13 @@ static void a_free_body_keeps_its_momentum(void)
                 pal_set3(x, c * y[0] - s * y[1], s * y[0] + c * y[1], y[2]);
                 pal_set3(v, 0.3 - 2 * x[1], 2 * x[0], -0.1 + 3 * (y[0] - 0.1) * (y[0] - 0.1));
             }
-            pal_world_moved(w, 0);
+            pal_world_invalidate_limits(w, 0);
             step(w, 1.0 / 240, 2);
             double p[3], l[3], q[3], m[3];
             pal_transfer *x = make_transfer(&b, i, j);
             pal_transfer_report r;
             momenta(body, p, l);
-            pal_transfer_carry(x, next, w, &r);
+            pal_transfer_apply(x, next, w, &r);
             momenta(pal_world_body(next, 0), q, m);
             CHECK_LE(pal_dist3(p, q), 1e-9 * pal_norm3(p));
             CHECK_LE(pal_dist3(l, m), 1e-9 * pal_norm3(l));
@@ -83,31 +83,31 @@ static void forces_are_let_go_over_ten_steps(void)
     pal_transfer *x = make_transfer(&b, 0, 1);
     pal_transfer_report r;
     step(w, 1.0 / 60, 90);
-    int n_row = pal_world_rows(next);
+    int n_row = pal_world_component_count(next);
     size_t n_byte = pal_world_bytes(next);
     uint64_t rest = pal_world_hash(next);
-    pal_transfer_carry(x, next, w, &r);
+    pal_transfer_apply(x, next, w, &r);
     CHECK(pal_world_hash(next) != rest);
-    CHECK_INT(pal_world_rows(next), n_row + 1);
+    CHECK_INT(pal_world_component_count(next), n_row + 1);
     tip_of(next, still, speed);
     step(next, 1.0 / 60, 1);
     tip_of(next, move, speed);
     /* what rested goes on resting: without the row the first step would be some 30 times as long */
     CHECK_LE(pal_dist3(move, still), 2e-3 * pal_norm3(still));
-    step(next, 1.0 / 60, PAL_EASE_STEPS - 2);
-    CHECK_INT(pal_world_rows(next), n_row + 1);
+    step(next, 1.0 / 60, PAL_BLEND_STEPS - 2);
+    CHECK_INT(pal_world_component_count(next), n_row + 1);
     step(next, 1.0 / 60, 1);
-    CHECK_INT(pal_world_rows(next), n_row);
+    CHECK_INT(pal_world_component_count(next), n_row);
     CHECK_INT(pal_world_bytes(next), n_byte);
     /* and it comes to rest where the new method has it rest */
     step(next, 1.0 / 60, 80);
     tip_of(next, move, speed);
     CHECK_NEAR(move[2], find_rest(&b.set[1]->scene), 1e-3 * fabs(move[2]));
     /* a reset ends it at once */
-    pal_transfer_carry(x, next, w, &r);
+    pal_transfer_apply(x, next, w, &r);
     pal_world_reset(next);
-    pal_world_tidy(next);
-    CHECK_INT(pal_world_rows(next), n_row);
+    pal_world_remove_idle(next);
+    CHECK_INT(pal_world_component_count(next), n_row);
     CHECK(pal_world_hash(next) != 0);
     pal_transfer_free(x);
     pal_world_destroy(w), pal_world_destroy(next);
@@ -126,7 +126,7 @@ static void the_same_switch_gives_the_same_hash(void)
         pal_transfer *x = make_transfer(&b, 0, 1);
         pal_transfer_report r;
         (void)disturb(w, 1.0 / 60);
-        pal_transfer_carry(x, next, w, &r);
+        pal_transfer_apply(x, next, w, &r);
         hash[k][0] = pal_world_hash(next);
         step(next, 1.0 / 60, 15);
         hash[k][1] = pal_world_hash(next);
@@ -150,7 +150,7 @@ static void go_round(int first, int second, int n, int rest, double drift)
     double least = INFINITY, most = -INFINITY, begin_J = 0, z = tip_z(w);
     for (int k = 0; k < n; k++) {
         pal_world *next = open_world(&b.set[(k + 1) % 2]->scene);
-        pal_transfer_carry(x[k % 2], next, w, &r);
+        pal_transfer_apply(x[k % 2], next, w, &r);
         CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
         if (k == 0) begin_J = r.energy_before_J;
         step(next, 1.0 / 60, rest);
@@ -198,7 +198,7 @@ static void tools_hold_on(void)
         double force[3], z = tip_z(w);
         pal_copy3(force, before->mean_force_N);
         CHECK(before->holding && pal_norm3(force) > 0.3);
-        pal_transfer_carry(x, next, w, &r);
+        pal_transfer_apply(x, next, w, &r);
         step(next, 1.0 / 60, 1);
         CHECK(after->holding);
         if (table)
@@ -243,7 +243,7 @@ static void a_turning_grip_goes_on(void)
         beam b;
         begin(&b, false, false, 20);
         b.scene->body[0].n_support = 1;
-        b.scene->body[0].support[0] = (pal_support){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
+        b.scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
         add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene),
                   *right = open_world(&b.set[1]->scene);
@@ -252,9 +252,9 @@ static void a_turning_grip_goes_on(void)
         double force[3], tip[3], want[3], start[3], speed[3];
         for (int k = 0; k < 45; k++) lift_and_turn(w, k), lift_and_turn(right, k);
         const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0],
-                       *held = &pal_world_tools(right)->tool[0];
+                       *fixed = &pal_world_tools(right)->tool[0];
         pal_copy3(force, before->mean_force_N);
-        pal_transfer_carry(x, next, w, &r);
+        pal_transfer_apply(x, next, w, &r);
         tip_of(right, start, speed);
         lift_and_turn(next, 45), lift_and_turn(w, 45), lift_and_turn(right, 45);
         if (table)
@@ -268,11 +268,11 @@ static void a_turning_grip_goes_on(void)
         double way = pal_dist3(want, start), off = pal_dist3(tip, want);
         if (table)
             printf("    tip off by %.2f of %.2f mm, force %.3f of %.3f N, apart by %.3f N\n", 1e3 * off, 1e3 * way,
-                   pal_norm3(after->mean_force_N), pal_norm3(held->mean_force_N),
-                   pal_dist3(after->mean_force_N, held->mean_force_N));
+                   pal_norm3(after->mean_force_N), pal_norm3(fixed->mean_force_N),
+                   pal_dist3(after->mean_force_N, fixed->mean_force_N));
         CHECK(way > 0.003);
         CHECK_LE(off, 0.01 * way);
-        CHECK_LE(pal_dist3(after->mean_force_N, held->mean_force_N), 0.01 * pal_norm3(held->mean_force_N));
+        CHECK_LE(pal_dist3(after->mean_force_N, fixed->mean_force_N), 0.01 * pal_norm3(fixed->mean_force_N));
         pal_transfer_free(x);
         pal_world_destroy(w), pal_world_destroy(next), pal_world_destroy(right);
         end(&b);
@@ -283,7 +283,7 @@ static void a_turning_grip_goes_on(void)
  * it had always held that body */
 static void grips_go_between_surfaces(void)
 {
-    const pal_setting list[2] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"}, full[0]};
+    const pal_configuration list[2] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"}, full[0]};
     pal_world *w[2];
     beam b;
     begin(&b, true, false, 20);
@@ -302,7 +302,7 @@ static void grips_go_between_surfaces(void)
     const double right_N = pal_norm3(pal_world_tools(w[0])->tool[0].mean_force_N);
     for (int k = 0; k < 6; k++) {
         pal_world *next = open_world(&b.set[(k + 1) % 2]->scene);
-        pal_transfer_carry(x[k % 2], next, w[0], &r);
+        pal_transfer_apply(x[k % 2], next, w[0], &r);
         pal_world_destroy(w[0]);
         w[0] = next;
         step(w[0], 1.0 / 60, k < 5 ? 3 : 60);
@@ -324,7 +324,7 @@ static void friction_holds_on(void)
     for (int n = 0; n < 2; n++) {
         beam b;
         begin(&b, false, true, 20);
-        pal_item_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
+        pal_entry_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
         add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
@@ -339,7 +339,7 @@ static void friction_holds_on(void)
         }
         const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0];
         CHECK(fabs(before->mean_force_N[1]) > 0.05);
-        pal_transfer_carry(x, next, w, &r);
+        pal_transfer_apply(x, next, w, &r);
         step(w, 1.0 / 60, 6), step(next, 1.0 / 60, 6);
         const double *was = before->mean_force_N, *is = after->mean_force_N;
         if (table)
@@ -365,14 +365,14 @@ static void lasting_loads_stay(void)
     double sum[2][3] = {{0}}, turn[2][3] = {{0}};
     for (int i = 0; i < from->n_node; i++)
         if (from->x_rest[3 * i] > LENGTH - 1e-6) pal_world_load(w, 0, i, (double[3]){0.01, 0.02 * i, 0.05});
-    pal_transfer_carry(x, next, w, &r);
-    REQUIRE(to->outer != NULL);
+    pal_transfer_apply(x, next, w, &r);
+    REQUIRE(to->external_force != NULL);
     for (int k = 0; k < 2; k++) {
         const pal_body *body = k ? to : from;
         for (int i = 0; i < body->n_node; i++) {
             double t[3];
-            pal_cross3(t, body->x_rest + 3 * i, body->outer + 3 * i);
-            pal_add3(sum[k], sum[k], body->outer + 3 * i);
+            pal_cross3(t, body->x_rest + 3 * i, body->external_force + 3 * i);
+            pal_add3(sum[k], sum[k], body->external_force + 3 * i);
             pal_add3(turn[k], turn[k], t);
         }
     }
@@ -399,19 +399,19 @@ static void surfaces_go_between_levels(void)
             pal_transfer *x = make_transfer(&b, level[i] - 1, level[j] - 1);
             pal_transfer_report r;
             double z = tip_z(w);
-            pal_transfer_carry(x, next, w, &r);
+            pal_transfer_apply(x, next, w, &r);
             if (table)
                 printf("  levels %d -> %d: %d -> %d nodes, energy %+.1f %%, %+.3f %%, moved %.3f mm, tip %.2f -> %.2f "
                        "mm\n",
                        level[i], level[j], pal_world_body(w, 0)->n_active, pal_world_body(next, 0)->n_active,
                        100 * (r.interpolated_J / r.energy_before_J - 1),
-                       100 * (r.energy_after_J / r.energy_before_J - 1), 1e3 * r.most_move_m, 1e3 * z,
+                       100 * (r.energy_after_J / r.energy_before_J - 1), 1e3 * r.max_move_m, 1e3 * z,
                        1e3 * tip_z(next));
             HARD_CASE("switch", "adaptive_springs", "to other numbers of levels: energy jumps by",
                       100 * fabs(r.energy_after_J / r.energy_before_J - 1), 2, "%");
             /* more levels: the same surface to the bit */
             if (level[j] > level[i]) CHECK_INT(pal_world_body(next, 0)->n_active, pal_world_body(w, 0)->n_active);
-            if (level[j] > level[i]) CHECK_LE(r.most_move_m, 1e-3 * WIDTH);
+            if (level[j] > level[i]) CHECK_LE(r.max_move_m, 1e-3 * WIDTH);
             if (level[i] == 1) CHECK(r.n_smooth == 0 && r.scale == 1 && r.body_move_m == 0);
             step(next, 1.0 / 60, 12);
             CHECK(pal_body_finite(pal_world_body(next, 0)) && !pal_world_body(next, 0)->frozen);
@@ -492,7 +492,7 @@ static void a_surface_that_is_drawn_out_is_still(void)
     pal_world *w = open_world(&b.set[1]->scene);
     for (int k = 0; k < 120; k++) {
         pull_step(w, &plan, k);
-        if (k > 60) most_J = fmax(most_J, pal_body_kinetic_J(pal_world_look(w, 0)));
+        if (k > 60) most_J = fmax(most_J, pal_body_kinetic_J(pal_world_view_body(w, 0)));
     }
     if (table) printf("  drawn out: kinetic %.2g of %.2g J at most\n", most_J, pal_world_energy_J(w));
     CHECK(grip_N(w) > 4);
@@ -515,8 +515,8 @@ static void a_grip_finds_its_fine_vertices_again(void)
     beam b;
     pal_prepared surface;
     begin_surface(&b, false, 4e5, 20, &surface);
-    add_setting(&b, &(pal_setting){.model = "adaptive_springs", .element = "refined", .size = 2});
-    for (int i = 0; i < 4; i++) pal_item_put_number(&b.set[i]->scene.body[0].effect[1], "reach_m", 0.004, NULL);
+    add_setting(&b, &(pal_configuration){.model = "adaptive_springs", .element = "refined", .size = 2});
+    for (int i = 0; i < 4; i++) pal_entry_put_number(&b.set[i]->scene.body[0].effect[1], "reach_m", 0.004, NULL);
     pull_and_switch(&b, &plan, &worst);
     double alone_N = pull_alone_N(&b, &plan);
     if (table) printf("  fine vertices: %.4f N in the end, %.4f N without\n", worst.end_N, alone_N);
@@ -558,12 +558,12 @@ static void what_does_not_fit_is_refused(void)
     pal_prepared surface;
     REQUIRE(!pal_prepared_surface(&b.mesh.surface, &surface));
     other->body[0].mesh = &surface;
-    pal_item_init(&other->body[0].model, "model", "adaptive_springs");
-    pal_item_init(&other->body[0].solver, "solver", "");
-    pal_note note = {""};
+    pal_entry_init(&other->body[0].model, "model", "adaptive_springs");
+    pal_entry_init(&other->body[0].solver, "solver", "");
+    pal_diagnostic diag = {""};
     pal_transfer *x = NULL;
-    CHECK_INT(pal_transfer_make(&b.set[0]->scene, other, 0, &note, &x), PAL_ERR_REFUSED);
-    CHECK(!x && strstr(note.text, "adapts"));
+    CHECK_INT(pal_transfer_make(&b.set[0]->scene, other, 0, &diag, &x), PAL_ERR_REFUSED);
+    CHECK(!x && strstr(diag.text, "adapts"));
     pal_prepared_free(&surface);
     free(other);
     end(&b);
@@ -572,8 +572,8 @@ static void what_does_not_fit_is_refused(void)
 /* a handle that lifts the end of a solid goes on lifting it: as far, and with as much energy in it */
 static void handles_hold_on(void)
 {
-    const pal_setting s[] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"},
-                             {.model = "subdivision_fem", .size = 2, .solver = "implicit_euler"}};
+    const pal_configuration s[] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"},
+                                   {.model = "subdivision_fem", .size = 2, .solver = "implicit_euler"}};
     for (int n = 0; n < CHECK_REPEATS(2, 1); n++) {
         const pal_brush handle = {.kind = PAL_BRUSH_CURVE,
                                   .at_m = {0.13, 0.025, WIDTH},
@@ -584,20 +584,20 @@ static void handles_hold_on(void)
                                   .stiffness_N_m = 60};
         beam b;
         pal_transfer_report r;
-        pal_note note = {""};
+        pal_diagnostic diag = {""};
         double tip[3], u[3], v[3];
         begin(&b, true, false, 20);
         b.scene->body[0].n_support = 1;
         for (int k = 0; k < 2; k++) add_setting(&b, &s[(n + k) % 2]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
-        if (pal_world_brush(w, 0, 0, &handle, &note)) CHECK_FAIL("%s", note.text);
+        if (pal_world_brush(w, 0, 0, &handle, &diag)) CHECK_FAIL("%s", diag.text);
         step(w, 1.0 / 60, 40);
         tip_of(w, tip, v);
         CHECK(tip[2] > 0.003);
-        int n_row = pal_world_rows(next);
-        pal_transfer_carry(x, next, w, &r);
-        CHECK_INT(pal_world_rows(next), n_row + 2); /* ease and brush */
+        int n_row = pal_world_component_count(next);
+        pal_transfer_apply(x, next, w, &r);
+        CHECK_INT(pal_world_component_count(next), n_row + 2); /* ease and brush */
         double least = INFINITY, most = -INFINITY;
         for (int k = 0; k < 30; k++) {
             step(next, 1.0 / 60, 1);
@@ -608,11 +608,11 @@ static void handles_hold_on(void)
         CHECK_LE(fabs(least - tip[2]), 0.2 * tip[2]);
         CHECK_LE(fabs(most - tip[2]), 0.2 * tip[2]);
         /* and lets go */
-        CHECK(!pal_world_brush(next, 0, 0, NULL, &note));
+        CHECK(!pal_world_brush(next, 0, 0, NULL, &diag));
         step(next, 1.0 / 60, 50);
         tip_of(next, u, v);
         CHECK_LE(fabs(u[2]), 0.3 * tip[2]);
-        CHECK_INT(pal_world_rows(next), n_row);
+        CHECK_INT(pal_world_component_count(next), n_row);
         pal_transfer_free(x);
         pal_world_destroy(w), pal_world_destroy(next);
         end(&b);
@@ -633,14 +633,14 @@ static void a_rehearsed_carry_takes_few_rounds(void)
         pal_transfer *x = make_transfer(&b, 0, 1), *y = make_transfer(&b, 0, 1);
         (void)disturb(w, 1.0 / 60);
         uint64_t hash = pal_world_hash(w);
-        CHECK(pal_transfer_look(x, w) && pal_world_hash(w) == hash);
-        CHECK(pal_transfer_gone_m(x, w) == 0);
+        CHECK(pal_transfer_snapshot(x, w) && pal_world_hash(w) == hash);
+        CHECK(pal_transfer_drift_m(x, w) == 0);
         pal_transfer_rehearse(x, next);
         step(w, 1.0 / 60, 3); /* it goes on */
-        CHECK(pal_transfer_gone_m(x, w) > 1e-5);
-        pal_transfer_carry(x, next, w, &warm);
+        CHECK(pal_transfer_drift_m(x, w) > 1e-5);
+        pal_transfer_apply(x, next, w, &warm);
         tip_of(next, then, speed);
-        pal_transfer_carry(y, next, w, &cold);
+        pal_transfer_apply(y, next, w, &cold);
         tip_of(next, first, speed);
         if (table)
             printf("  rounds %d, rehearsed %d; energy %+.3f %%, %+.3f %%; tip %.4f, %.4f mm\n", cold.n_smooth,

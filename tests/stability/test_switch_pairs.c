@@ -3,31 +3,31 @@
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
 
-static const pal_setting solid[] = {
+static const pal_configuration solid[] = {
     {.model = "subdivision_fem", .size = 1},
     {.model = "subdivision_fem", .size = 2, .solver = "implicit_euler"},
     {.model = "fem", .element = "hex8_bbar", .size = 8},
     {.model = "fem", .element = "tet4", .size = 12},
 };
 
-static void make_all(beam *b, const pal_setting *list, int n, bool cells)
+static void make_all(beam *b, const pal_configuration *list, int n, bool cells)
 {
-    const pal_setting fine = {.model = "fem", .element = "hex8_bbar", .size = cells ? 12 : 16};
+    const pal_configuration fine = {.model = "fem", .element = "hex8_bbar", .size = cells ? 12 : 16};
     begin(b, cells, true, 2);
     b->scene->tool[0].force_cap_N = 3;
     for (int i = 0; i < n; i++) add_setting(b, &list[i]);
     add_setting(b, &fine);
     for (int i = 0; i < n; i++) b->rest_m[i] = find_rest(&b->set[i]->scene);
     b->right_m = find_rest(&b->set[n]->scene);
-    pal_set_scene_free(b->set[--b->n]);
+    pal_configured_scene_free(b->set[--b->n]);
 }
 
 static void print_row(const beam *b, int i, int j, const pal_transfer_report *r, const double tip[2])
 {
-    char from[PAL_SETTING_TEXT], to[PAL_SETTING_TEXT];
-    pal_setting s;
-    pal_setting_of(&b->set[i]->scene, 0, &s), pal_setting_text(&s, from);
-    pal_setting_of(&b->set[j]->scene, 0, &s), pal_setting_text(&s, to);
+    char from[PAL_CONFIGURATION_TEXT], to[PAL_CONFIGURATION_TEXT];
+    pal_configuration s;
+    pal_configuration_of(&b->set[i]->scene, 0, &s), pal_configuration_text(&s, from);
+    pal_configuration_of(&b->set[j]->scene, 0, &s), pal_configuration_text(&s, to);
     printf("  %-40.40s -> %-40.40s energy %+6.1f %% by interpolation, %+6.3f %%; %2d rounds, scale %.4f; tip %.1f -> "
            "%.1f mm; of both methods' errors %.2f\n",
            from, to, 100 * (r->interpolated_J / r->energy_before_J - 1),
@@ -41,13 +41,13 @@ static void check_pair(const beam *b, int i, int j, pal_world *before)
 {
     pal_transfer *x = NULL;
     pal_transfer_report r;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     double u[3], v[3], to_u[3], to_v[3], step_s = b->set[j]->scene.step_s;
-    if (pal_transfer_make(&b->set[i]->scene, &b->set[j]->scene, 0, &note, &x)) CHECK_FAIL("%s", note.text);
+    if (pal_transfer_make(&b->set[i]->scene, &b->set[j]->scene, 0, &diag, &x)) CHECK_FAIL("%s", diag.text);
     pal_world *next = open_world(&b->set[j]->scene);
     uint64_t hash = pal_world_hash(before);
     tip_of(before, u, v);
-    pal_transfer_carry(x, next, before, &r);
+    pal_transfer_apply(x, next, before, &r);
     tip_of(next, to_u, to_v);
     if (table) print_row(b, i, j, &r, (double[2]){u[2], to_u[2]});
     CHECK(pal_world_hash(before) == hash);
@@ -59,9 +59,9 @@ static void check_pair(const beam *b, int i, int j, pal_world *before)
     HARD_CASE("switch", model, "tip jumps by, over the bound of both methods' errors",
               fabs(to_u[2] - u[2]) / ((bound / fabs(b->right_m) + 0.01) * fabs(u[2])), 1, "");
     HARD_CASE("switch", model, "farthest move of the surface, over the same bound",
-              r.most_move_m / ((bound / fabs(b->right_m) + 0.01) * pal_norm3(u)), 1, "");
+              r.max_move_m / ((bound / fabs(b->right_m) + 0.01) * pal_norm3(u)), 1, "");
     if (table)
-        printf("      most %.2f of %.2f mm\n", 1e3 * r.most_move_m,
+        printf("      most %.2f of %.2f mm\n", 1e3 * r.max_move_m,
                1e3 * (bound / fabs(b->right_m) + 0.01) * pal_norm3(u));
     CHECK_NEAR(to_v[2] / v[2], 1, 0.1);
     /* it goes on: finite, nothing frozen, no faster than that energy allows */
@@ -72,7 +72,7 @@ static void check_pair(const beam *b, int i, int j, pal_world *before)
     pal_transfer_free(x);
 }
 
-static void check_pairs(const pal_setting *list, int n, bool cells)
+static void check_pairs(const pal_configuration *list, int n, bool cells)
 {
     beam b;
     make_all(&b, list, n, cells);

@@ -42,19 +42,19 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
     /* the frame of the switch shows what was shown */
     double first_m = check_farthest(from->shown, to->shown, to->n_shown);
     CHECK_LE(first_m, 1e-7);
-    CHECK(to->lag_m != NULL && r.frame_move_m > 0);
-    CHECK_NEAR(r.frame_move_m, r.most_move_m / 10, 1e-12);
+    CHECK(to->display_offset_m != NULL && r.frame_move_m > 0);
+    CHECK_NEAR(r.frame_move_m, r.max_move_m / 10, 1e-12);
     if (table) printf("  %d -> %d: N", i, j);
     watch(next, set[j]->scene.step_s, first_m, &s);
     if (table)
         printf("; lag %.3f mm, of a frame at most %.3f, bound %.3f; force %.3f, then %.3f to %.3f, %.3f\n",
-               1e3 * r.most_move_m, 1e3 * s.frame_m, 1e3 * bound_m, was_N, s.least_N, s.most_N, s.is_N);
+               1e3 * r.max_move_m, 1e3 * s.frame_m, 1e3 * bound_m, was_N, s.least_N, s.most_N, s.is_N);
     HARD_CASE("switch", list[j].model,
               "under a press: farthest move of the surface in a frame, over the errors of both", s.frame_m / bound_m, 1,
               "");
     HARD_CASE("switch", list[j].model, "under a press: force beyond those at rest before and after",
               100 * fmax(s.most_N / fmax(was_N, s.is_N) - 1, 1 - s.least_N / fmin(was_N, s.is_N)), 20, "%");
-    CHECK(to->lag_m == NULL && pal_body_finite(to) && !to->frozen);
+    CHECK(to->display_offset_m == NULL && pal_body_finite(to) && !to->frozen);
     pal_world_destroy(next);
     pal_transfer_free(x);
 }

@@ -12,7 +12,7 @@ enum { SWITCHES = 20, SETTINGS = 4 };
 
 static bool sweep;
 
-static const pal_setting list[SETTINGS] = {
+static const pal_configuration list[SETTINGS] = {
     {.model = "tet_springs", .size = 9, .k_area_J = -1},
     {.model = "fem", .element = "hex8_bbar", .size = 7},
     {.model = "fem", .element = "tet4", .size = 8, .step_s = 1.0 / 120},
@@ -22,7 +22,7 @@ static const pal_setting list[SETTINGS] = {
 /* what is pulled, where and by how much, and how far each setting rests from the right one when it is */
 typedef struct pulled {
     pal_scene *scene;
-    pal_set_scene *set[SETTINGS + 1]; /* the last is the right one */
+    pal_configured_scene *set[SETTINGS + 1]; /* the last is the right one */
     double from_m[3], by_m[3], error_m[SETTINGS];
     bool at_once; /* the tool comes with its button down, so that it holds what it did not press before */
 } pulled;
@@ -46,7 +46,7 @@ static void pull(const pulled *p, pal_world *w, double step_s)
 /* largest length of a shown edge over that at rest */
 static double longest_edge(const pal_world *w)
 {
-    const pal_body *b = pal_world_look(w, 0);
+    const pal_body *b = pal_world_view_body(w, 0);
     pal_shown shown;
     double most = 0;
     pal_world_shown(w, 0, &shown);
@@ -71,7 +71,7 @@ static double find_errors(pulled *p)
     pull(p, right, 1.0 / 60);
     for (int i = 0; i < SETTINGS; i++) {
         pal_world *w = open_world(&p->set[i]->scene);
-        const pal_body *a = pal_world_look(w, 0), *b = pal_world_look(right, 0);
+        const pal_body *a = pal_world_view_body(w, 0), *b = pal_world_view_body(right, 0);
         pull(p, w, p->set[i]->scene.step_s);
         if (a->n_shown != b->n_shown) abort();
         p->error_m[i] = check_farthest(a->shown, b->shown, b->n_shown);
@@ -97,7 +97,7 @@ typedef struct seen {
 static void watch(const pulled *p, pal_world *w, double step_s, int n, double bound_m, float *last, double *part,
                   seen *out)
 {
-    const pal_body *b = pal_world_look(w, 0);
+    const pal_body *b = pal_world_view_body(w, 0);
     const double *force_N = pal_world_tools(w)->tool[0].mean_force_N;
     for (int k = 0; k < n; k++) {
         *part = fmin(1.2, *part + 0.002);
@@ -112,17 +112,17 @@ static void watch(const pulled *p, pal_world *w, double step_s, int n, double bo
     }
 }
 
-static pal_world *change(const pulled *p, int from, int to, bool rehearsed, pal_world *w, pal_transfer_report *out)
+static pal_world *change(const pulled *p, int from, int to, bool has_rehearsed, pal_world *w, pal_transfer_report *out)
 {
     pal_transfer *x = NULL;
-    pal_note note = {""};
-    if (pal_transfer_make(&p->set[from]->scene, &p->set[to]->scene, 0, &note, &x)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_transfer_make(&p->set[from]->scene, &p->set[to]->scene, 0, &diag, &x)) CHECK_FAIL("%s", diag.text);
     pal_world *next = open_world(&p->set[to]->scene);
-    if (rehearsed) {
-        CHECK(pal_transfer_look(x, w));
+    if (has_rehearsed) {
+        CHECK(pal_transfer_snapshot(x, w));
         pal_transfer_rehearse(x, next);
     }
-    pal_transfer_carry(x, next, w, out);
+    pal_transfer_apply(x, next, w, out);
     if (!sweep) CHECK_NEAR(out->energy_after_J / out->energy_before_J, 1, 0.02);
     pal_transfer_free(x);
     pal_world_destroy(w);
@@ -184,10 +184,10 @@ static worst slide(pulled *p, uint64_t seed)
     worst all = {0};
     pal_world *w = open_world(&p->set[0]->scene);
     pull(p, w, p->set[0]->scene.step_s);
-    const size_t n_byte = 3 * sizeof(float) * (size_t)pal_world_look(w, 0)->n_shown;
+    const size_t n_byte = 3 * sizeof(float) * (size_t)pal_world_view_body(w, 0)->n_shown;
     float *last = malloc(n_byte);
     if (!last) abort();
-    memcpy(last, pal_world_look(w, 0)->shown, n_byte);
+    memcpy(last, pal_world_view_body(w, 0)->shown, n_byte);
     for (uint64_t k = 0; k < SWITCHES; k++) {
         int to = (at_setting + 1 + (int)(pal_random_unit(seed, 3 * k) * (SETTINGS - 1))) % SETTINGS;
         int n = 2 + (int)(12 * pal_random_unit(seed, 3 * k + 1));
@@ -196,7 +196,7 @@ static worst slide(pulled *p, uint64_t seed)
         seen s = {.least_N = before_N, .most_N = before_N};
         double bound_m = sweep ? 1 : p->error_m[at_setting] + p->error_m[to];
         w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
-        CHECK_LE(check_farthest(last, pal_world_look(w, 0)->shown, pal_world_look(w, 0)->n_shown), 1e-6);
+        CHECK_LE(check_farthest(last, pal_world_view_body(w, 0)->shown, pal_world_view_body(w, 0)->n_shown), 1e-6);
         watch(p, w, p->set[to]->scene.step_s, n, bound_m, last, &part, &s);
         double energy = r.energy_after_J / r.energy_before_J - 1;
         if (table)
@@ -227,12 +227,12 @@ typedef struct how {
 
 static void make_pulled(const pal_surface *surface, const how *h, pal_prepared *mesh, pulled *out)
 {
-    const pal_setting right = {.model = "fem", .element = "hex8_bbar", .size = 12};
+    const pal_configuration right = {.model = "fem", .element = "hex8_bbar", .size = 12};
     const pal_voxel_options options = {.resolution = 9, .border = true};
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     pal_prepare_report report;
     *out = (pulled){.by_m = {0, 0, h->by_m}, .at_once = h->at_once};
-    if (pal_prepared_make(surface, &options, mesh, &report, &note)) abort();
+    if (pal_prepared_make(surface, &options, mesh, &report, &diag)) abort();
     pal_scene *scene = out->scene = malloc(sizeof *scene);
     if (!scene) abort();
     pal_scene_default(scene);
@@ -251,13 +251,13 @@ static void make_pulled(const pal_surface *surface, const how *h, pal_prepared *
         if (surface->x[3 * i + h->along] > surface->x[3 * top + h->along]) top = i;
     pal_copy3(out->from_m, surface->x + 3 * (size_t)top);
     for (int i = 0; i <= SETTINGS; i++)
-        if (pal_setting_make(scene, 0, i < SETTINGS ? &list[i] : &right, &note, &out->set[i]))
-            CHECK_FAIL("%s", note.text);
+        if (pal_configuration_make(scene, 0, i < SETTINGS ? &list[i] : &right, &diag, &out->set[i]))
+            CHECK_FAIL("%s", diag.text);
 }
 
 static void free_pulled(pulled *p, pal_prepared *mesh)
 {
-    for (int i = 0; i <= SETTINGS; i++) pal_set_scene_free(p->set[i]);
+    for (int i = 0; i <= SETTINGS; i++) pal_configured_scene_free(p->set[i]);
     pal_prepared_free(mesh);
     free(p->scene);
 }
@@ -305,9 +305,9 @@ static void crushed_cubes_come_to_rest(void)
     make_pulled(&organ, &(how){.along = 2, .by_m = 0.04}, &mesh, &p);
     pal_world *w = open_world(&p.set[COARSE]->scene);
     pull(&p, w, 1.0 / 60);
-    const pal_rescues *r = &pal_world_look(w, 0)->rescue;
+    const pal_safeguards *r = &pal_world_view_body(w, 0)->safeguards;
     const uint64_t before = r->n_split;
-    CHECK(r->n_tangled > 0);
+    CHECK(r->n_inversion > 0);
     step(w, 1.0 / 60, 120);
     if (table) printf("  %d changes in a second, %d in the next two\n", (int)before, (int)(r->n_split - before));
     CHECK_LE((double)(r->n_split - before), 2); /* some 200 when cubes were tried whenever they were whole */

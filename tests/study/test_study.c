@@ -24,7 +24,8 @@ static double noise(unsigned *state)
 static pal_study_point *put(pal_study *s, const char *element, int size, double ms, double error_m)
 {
     pal_study_point *p = &s->point[s->n_point++];
-    p->priced = (pal_priced_setting){.setting = {.size = size, .step_s = 1.0 / 60}, .ms = ms, .error_m = error_m};
+    p->priced =
+        (pal_measured_configuration){.setting = {.size = size, .step_s = 1.0 / 60}, .ms = ms, .error_m = error_m};
     snprintf(p->priced.setting.model, PAL_NAME, "fem");
     snprintf(p->priced.setting.element, PAL_NAME, "%s", element);
     return p;
@@ -59,7 +60,7 @@ static int brute(const pal_study *s, double within, double budget)
 {
     int best = -1;
     for (int i = 0; i < s->n_point; i++) {
-        const pal_priced_setting *p = &s->point[i].priced, *b = best < 0 ? NULL : &s->point[best].priced;
+        const pal_measured_configuration *p = &s->point[i].priced, *b = best < 0 ? NULL : &s->point[best].priced;
         if (s->point[i].err || isnan(p->error_m)) continue;
         if (!isnan(within) && p->error_m + s->reference_m > within) continue;
         if (!isnan(budget) && p->ms > budget) continue;
@@ -95,7 +96,7 @@ static void the_reference_bounds_what_is_named(void)
     pal_study *s = new_study();
     const double ms[] = {1, 2, 4, 8}, error_m[] = {5e-4, 1.5e-4, 1e-4, 2e-5};
     for (int i = 0; i < 4; i++) put(s, "hex8_bbar", i + 6, ms[i], error_m[i]);
-    s->most_m = 1e-2, s->reference_m = 2e-4;
+    s->max_m = 1e-2, s->reference_m = 2e-4;
     pal_study_front(s);
     CHECK(s->point[0].priced.front && s->point[1].priced.front);
     CHECK(!s->point[2].priced.front && !s->point[3].priced.front);
@@ -123,7 +124,7 @@ static void power_laws_are_foreseen_exactly(void)
         }
         double ms, error_m;
         for (int n = 6; n <= 48; n += 7) {
-            pal_setting at = s->point[0].priced.setting;
+            pal_configuration at = s->point[0].priced.setting;
             at.size = n;
             CHECK(pal_study_foresee(s, &at, -1, &ms, &error_m));
             double should = overhead[k] + 2e-4 * pow(n, 2.7);
@@ -134,7 +135,7 @@ static void power_laws_are_foreseen_exactly(void)
         s->point[4].priced.ms *= 3;
         CHECK(pal_study_foresee(s, &s->point[4].priced.setting, 4, &ms, &error_m));
         CHECK_NEAR(ms / (overhead[k] + 2e-4 * pow(16, 2.7)), 1, 1e-6);
-        pal_setting other = s->point[0].priced.setting;
+        pal_configuration other = s->point[0].priced.setting;
         snprintf(other.model, PAL_NAME, "tet_springs");
         CHECK(!pal_study_foresee(s, &other, -1, &ms, &error_m));
         other = s->point[0].priced.setting;
@@ -163,12 +164,12 @@ static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
     s->point[7].priced.ms *= 5;
     for (int k = 0; k < 20; k++) {
         int nodes = 50 + 400 * k, substeps = 1 + 7 * k;
-        pal_setting at = s->point[k % 2].priced.setting;
+        pal_configuration at = s->point[k % 2].priced.setting;
         s->point[8].err = PAL_ERR_FROZEN;
         CHECK(pal_study_foresee_cost(s, &at, nodes, 0, substeps, 0, 7, &ms));
         CHECK_NEAR(ms / ((overhead + node * nodes * substeps) * s->step_s / at.step_s), 1, 1e-4);
     }
-    pal_setting at = s->point[0].priced.setting;
+    pal_configuration at = s->point[0].priced.setting;
     CHECK(!pal_study_foresee_cost(s, &at, 0, 0, 3, 0, -1, &ms) &&
           !pal_study_foresee_cost(s, &at, 300, 0, 0, 0, -1, &ms));
     snprintf(at.element, PAL_NAME, "tet10");
@@ -235,11 +236,11 @@ typedef struct calls {
     int n_done, n_reference, most;
 } calls;
 
-static bool count_done(const pal_study *study, int n_all, void *user)
+static bool count_done(const pal_study *study, int n_finest, void *user)
 {
     calls *c = user;
     c->n_done++;
-    CHECK(study->n_point <= n_all);
+    CHECK(study->n_point <= n_finest);
     return c->most == 0 || study->n_point < c->most;
 }
 
@@ -255,7 +256,7 @@ static bool count_progress(const char *what, double fraction, void *user)
 static double between(const pal_problem *p, const pal_surface *beam, int size, int other)
 {
     pal_solution *s[2] = {NULL, NULL};
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     double most = 0;
     for (int k = 0; k < 2; k++) {
         pal_solve_result r;
@@ -266,7 +267,7 @@ static double between(const pal_problem *p, const pal_surface *beam, int size, i
                                .align = true,
                                .young_Pa = NAN,
                                .poisson = NAN};
-        if (pal_solve(p, &p->load_case[0], beam, &o, &s[k], &r, &note)) CHECK_FAIL("%s", note.text);
+        if (pal_solve(p, &p->load_case[0], beam, &o, &s[k], &r, &diag)) CHECK_FAIL("%s", diag.text);
     }
     for (int i = 0; i < beam->n_vertex && s[0] && s[1]; i++) {
         double x[3], u[2][3];
@@ -286,7 +287,7 @@ static void check_errors(const pal_study *s, const pal_problem *p, const pal_sur
     if (at) reference = (int)strtol(at + 2, NULL, 10);
     CHECK_INT(reference, 40);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_setting *q = &s->point[i].priced.setting;
+        const pal_configuration *q = &s->point[i].priced.setting;
         bool base = !strcmp(q->element, "hex8_bbar") && !strcmp(q->solver, "implicit_euler") && q->step_s > 0.016;
         if (!base) continue;
         double solved = between(p, beam, q->size, reference);
@@ -307,9 +308,9 @@ static void check_points(const pal_study *s)
         if (!strcmp(p->priced.setting.model, "tet_springs")) best[fitted] = fmin(best[fitted], p->static_most_m);
     }
     /* calibration is what springs are worth something by: at rest from 18 % to a per mille of the tip's way */
-    CHECK(best[0] > 0.1 * s->most_m && best[1] < 0.005 * s->most_m);
-    CHECK(s->reference_m > 0 && s->reference_m < 0.02 * s->most_m);
-    CHECK(s->most_m > 0.009 && s->most_m < 0.012 && s->step_s > 0 && s->machine[0]);
+    CHECK(best[0] > 0.1 * s->max_m && best[1] < 0.005 * s->max_m);
+    CHECK(s->reference_m > 0 && s->reference_m < 0.02 * s->max_m);
+    CHECK(s->max_m > 0.009 && s->max_m < 0.012 && s->step_s > 0 && s->machine[0]);
 }
 
 /* the steps of a beam of a few voxels take microseconds, on a machine that does other things as well: a factor of 4.
@@ -328,11 +329,11 @@ static void check_foreseen(const pal_study *s)
     }
     CHECK(n >= 2 && n_cost > n);
     /* between the two sizes that were measured: errors between theirs, within a third */
-    pal_setting between = s->point[0].priced.setting, last = between;
+    pal_configuration between = s->point[0].priced.setting, last = between;
     double ms, error_m, low = s->point[0].priced.error_m, high = low;
     for (int i = 0; i < s->n_point; i++) {
         last.size = s->point[i].priced.setting.size;
-        if (!pal_setting_same(&last, &s->point[i].priced.setting)) continue;
+        if (!pal_configuration_equal(&last, &s->point[i].priced.setting)) continue;
         low = fmin(low, s->point[i].priced.error_m), high = fmax(high, s->point[i].priced.error_m);
     }
     between.size = 20;
@@ -344,17 +345,17 @@ static void check_foreseen(const pal_study *s)
 static void check_resumed(const pal_study *s, const pal_problem *p, const pal_surface *beam)
 {
     pal_study *again = new_study(), *part = new_study();
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     calls c = {0};
     pal_study_options o = {
         .quick = 1, .seconds = 0.1, .before = s, .done = count_done, .progress = count_progress, .user = &c};
-    CHECK(!pal_study_problem(p, &p->load_case[0], beam, &o, again, &note));
+    CHECK(!pal_study_problem(p, &p->load_case[0], beam, &o, again, &diag));
     CHECK_INT(c.n_reference, 0);
     CHECK_INT(c.n_done, s->n_point);
     CHECK(!memcmp(again->point, s->point, sizeof s->point) && again->reference_m == s->reference_m);
     c = (calls){.most = 2};
     o.before = NULL;
-    CHECK(pal_study_problem(p, &p->load_case[0], beam, &o, part, &note) == PAL_ERR_STATE);
+    CHECK(pal_study_problem(p, &p->load_case[0], beam, &o, part, &diag) == PAL_ERR_STATE);
     CHECK_INT(part->n_point, 2);
     CHECK_INT(c.n_done, 2);
     for (int i = 0; i < 2; i++) {
@@ -370,11 +371,11 @@ static void a_beam_is_swept_and_taken_up_again(void)
     pal_surface beam;
     pal_problem *p = malloc(sizeof *p);
     pal_study *s = new_study();
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     REQUIRE(p && make_beam(&beam, p));
     pal_study_options o = {.quick = 1, .seconds = 0.1};
-    pal_err err = pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note);
-    if (err) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
     CHECK_INT(s->n_point, 7);
     check_points(s);
     check_errors(s, p, &beam);
@@ -394,7 +395,7 @@ static void nearly_incompressible_and_against_samples(void)
     pal_study *s = new_study();
     pal_solution *solution = NULL;
     pal_solve_result r;
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     REQUIRE(p && make_beam(&beam, p));
     p->material[0].poisson = 0.4999;
     pal_solve_options solve = {.element = "hex8_bbar",
@@ -404,20 +405,20 @@ static void nearly_incompressible_and_against_samples(void)
                                .align = true,
                                .young_Pa = NAN,
                                .poisson = NAN};
-    REQUIRE(!pal_solve(p, &p->load_case[0], &beam, &solve, &solution, &r, &note));
+    REQUIRE(!pal_solve(p, &p->load_case[0], &beam, &solve, &solution, &r, &diag));
     double x[2][3] = {{1.32, 0.02, 0.02}, {1.16, 0.02, 0.02}}, u[2][3];
     for (int i = 0; i < 2; i++) pal_solution_at(solution, x[i], u[i]);
     const pal_samples samples = {2, x[0], u[0]};
     pal_study_options o = {.quick = 1, .seconds = 0.1, .method = method, .n_method = 1, .samples = &samples};
-    pal_err err = pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note);
-    if (err) CHECK_FAIL("%s", note.text);
-    CHECK_NEAR(s->most_m, pal_norm3(u[0]), 1e-9);
+    pal_err err = pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
+    CHECK_NEAR(s->max_m, pal_norm3(u[0]), 1e-9);
     CHECK(s->n_point > 3 && s->reference_m == 0 && strstr(s->reference, "given"));
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *q = &s->point[i];
         bool locks = !strcmp(q->priced.setting.element, "tet4");
         CHECK(!q->err);
-        CHECK(locks ? q->static_most_m > 0.2 * s->most_m : q->static_most_m < 0.05 * s->most_m);
+        CHECK(locks ? q->static_most_m > 0.2 * s->max_m : q->static_most_m < 0.05 * s->max_m);
     }
     pal_solution_free(solution);
     pal_surface_free(&beam);
@@ -430,18 +431,18 @@ static void problems_that_no_live_body_can_be_are_refused(void)
     pal_surface beam;
     pal_problem *p = malloc(sizeof *p);
     pal_study *s = new_study();
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     pal_study_options o = {.quick = 1};
     REQUIRE(p && make_beam(&beam, p));
     p->support[0].moved = true, p->support[0].move_m[0] = 0.01;
-    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note) == PAL_ERR_REFUSED && strstr(note.text, "moves"));
+    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag) == PAL_ERR_REFUSED && strstr(diag.text, "moves"));
     p->support[0].moved = false, p->load_case[0].load[0].region.low_m[0] = 1.5;
-    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note) == PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "meets no surface"));
+    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag) == PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "meets no surface"));
     p->n_support = 0;
-    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note) == PAL_ERR_REFUSED && strstr(note.text, "held"));
+    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag) == PAL_ERR_REFUSED && strstr(diag.text, "held"));
     p->load_case[0].n_load = 0;
-    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &note) == PAL_ERR_REFUSED && strstr(note.text, "load"));
+    CHECK(pal_study_problem(p, &p->load_case[0], &beam, &o, s, &diag) == PAL_ERR_REFUSED && strstr(diag.text, "load"));
     pal_surface_free(&beam);
     free(p);
     free(s);

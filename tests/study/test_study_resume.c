@@ -45,10 +45,10 @@ static void remember(uint64_t key, const pal_study_answer *answer, const double 
     memcpy(to->value, value, sizeof *value * (size_t)n);
 }
 
-static bool done(const pal_study *study, int n_all, void *user)
+static bool done(const pal_study *study, int n_finest, void *user)
 {
     run *r = user;
-    (void)n_all;
+    (void)n_finest;
     *r->so_far = *study;
     return true;
 }
@@ -66,7 +66,7 @@ static pal_err go(run *r, const pal_problem *p, const pal_surface *beam, int lef
 {
     static const char *const method[] = {"fem"};
     static pal_study before;
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     before = *r->so_far;
     pal_study_options o = {.quick = 1,
                            .seconds = 0.05,
@@ -79,8 +79,8 @@ static pal_err go(run *r, const pal_problem *p, const pal_surface *beam, int lef
                            .goes_on = goes_on,
                            .user = r};
     r->left = left, r->n_looks = 0;
-    pal_err err = pal_study_problem(p, &p->load_case[0], beam, &o, out, &note);
-    if (err && err != PAL_ERR_STATE) CHECK_FAIL("%s", note.text);
+    pal_err err = pal_study_problem(p, &p->load_case[0], beam, &o, out, &diag);
+    if (err && err != PAL_ERR_STATE) CHECK_FAIL("%s", diag.text);
     return err;
 }
 
@@ -89,10 +89,10 @@ static void check_same(const pal_study *a, const pal_study *b)
 {
     CHECK_INT(a->n_point, b->n_point);
     CHECK_TEXT(a->reference, b->reference);
-    CHECK(a->reference_m == b->reference_m && a->most_m == b->most_m && a->size_m == b->size_m);
+    CHECK(a->reference_m == b->reference_m && a->max_m == b->max_m && a->length_scale_m == b->length_scale_m);
     for (int i = 0; i < a->n_point; i++) {
         const pal_study_point *p = &a->point[i], *q = &b->point[i];
-        CHECK(pal_setting_same(&p->priced.setting, &q->priced.setting) && p->err == q->err);
+        CHECK(pal_configuration_equal(&p->priced.setting, &q->priced.setting) && p->err == q->err);
         CHECK(p->priced.error_m == q->priced.error_m && p->static_rms_m == q->static_rms_m);
         CHECK(p->way_most_m == q->way_most_m && p->way_rms_m == q->way_rms_m);
         CHECK(p->n_node == q->n_node && p->n_substep == q->n_substep);

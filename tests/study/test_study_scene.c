@@ -7,7 +7,7 @@
 #include "server/robustness/torture.h"
 #include "server/study/study_parts.h"
 #include "tests/check.h"
-#include "tests/fixtures/solid_scene.h"
+#include "tests/fixtures/subdivision_scene.h"
 
 /* an ellipsoid of 20 x 14 x 9 cm, full, held below; or its surface alone */
 typedef struct organ {
@@ -15,12 +15,12 @@ typedef struct organ {
     pal_prepared mesh;
     pal_scene *scene;
     pal_study *study;
-    pal_note note;
+    pal_diagnostic diag;
 } organ;
 
 static void organ_make(organ *o, bool full)
 {
-    const double size_m[3] = {0.2, 0.14, 0.09};
+    const double length_scale_m[3] = {0.2, 0.14, 0.09};
     double low[3], high[3];
     memset(o, 0, sizeof *o);
     o->scene = calloc(1, sizeof *o->scene);
@@ -28,18 +28,18 @@ static void organ_make(organ *o, bool full)
     if (!o->scene || !o->study || pal_sphere_make(0.1, &o->surface)) abort();
     pal_surface_box(&o->surface, low, high);
     for (int i = 0; i < 3 * o->surface.n_vertex; i++)
-        o->surface.x[i] = (o->surface.x[i] - low[i % 3]) / (high[i % 3] - low[i % 3]) * size_m[i % 3];
-    pal_voxel_options voxel = {.resolution = 10, .border = true, .least_fill = 0.25, .fill = true};
-    pal_err err = full ? pal_prepared_make(&o->surface, &voxel, &o->mesh, NULL, &o->note)
+        o->surface.x[i] = (o->surface.x[i] - low[i % 3]) / (high[i % 3] - low[i % 3]) * length_scale_m[i % 3];
+    pal_voxel_options voxel = {.resolution = 10, .border = true, .min_fill = 0.25, .fill = true};
+    pal_err err = full ? pal_prepared_make(&o->surface, &voxel, &o->mesh, NULL, &o->diag)
                        : pal_prepared_surface(&o->surface, &o->mesh);
-    if (err) printf("  %s\n", o->note.text), abort();
+    if (err) printf("  %s\n", o->diag.text), abort();
     pal_scene_default(o->scene);
     o->scene->n_body = 1;
     pal_body_def *def = &o->scene->body[0];
     pal_body_default(def, "organ", &o->mesh);
     def->n_effect = 0;
     def->support[0].fraction = 0.4;
-    if (!full) pal_item_init(&def->model, "model", "adaptive_springs");
+    if (!full) pal_entry_init(&def->model, "model", "adaptive_springs");
 }
 
 static void organ_free(organ *o)
@@ -52,32 +52,32 @@ static void organ_free(organ *o)
 
 static void show(const pal_study *s)
 {
-    char name[PAL_SETTING_TEXT];
-    printf("  %s: most %.3g mm, own error %.3g mm\n", s->reference, 1e3 * s->most_m, 1e3 * s->reference_m);
+    char name[PAL_CONFIGURATION_TEXT];
+    printf("  %s: most %.3g mm, own error %.3g mm\n", s->reference, 1e3 * s->max_m, 1e3 * s->reference_m);
     for (int i = 0; i < s->n_point; i++)
         printf("  %c %s: %d nodes, %.3f ms, rest %.3g mm, way %.3g mm %s\n", s->point[i].priced.front ? '*' : ' ',
-               pal_setting_text(&s->point[i].priced.setting, name), s->point[i].n_node, s->point[i].priced.ms,
-               1e3 * s->point[i].static_most_m, 1e3 * s->point[i].way_most_m, s->point[i].why);
+               pal_configuration_text(&s->point[i].priced.setting, name), s->point[i].n_node, s->point[i].priced.ms,
+               1e3 * s->point[i].static_most_m, 1e3 * s->point[i].way_most_m, s->point[i].reason);
 }
 
 /* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
  * it being laid flat leaves them elsewhere for good */
-static void check_survives(const organ *o, const pal_setting *setting)
+static void check_survives(const organ *o, const pal_configuration *setting)
 {
     static const char *const insult[] = {"flat"};
-    pal_set_scene *set = NULL;
-    pal_note note = {{0}};
+    pal_configured_scene *set = NULL;
+    pal_diagnostic diag = {{0}};
     pal_torture_report *r = calloc(1, sizeof *r);
-    REQUIRE(r && !pal_setting_make(o->scene, 0, setting, &note, &set));
+    REQUIRE(r && !pal_configuration_make(o->scene, 0, setting, &diag, &set));
     for (int k = 0; k < 1; k++) {
         pal_torture_options options;
         pal_torture_default(&options);
         options.only = insult[k], options.most_s = 2;
-        CHECK(!pal_torture(&set->scene, &options, r, &note));
+        CHECK(!pal_torture(&set->scene, &options, r, &diag));
         CHECK_INT(r->n_failed, 0);
-        if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].note);
+        if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].diag);
     }
-    pal_set_scene_free(set);
+    pal_configured_scene_free(set);
     free(r);
 }
 
@@ -88,18 +88,18 @@ static void a_full_organ_is_pressed(void)
     organ o;
     organ_make(&o, true);
     pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = CHECK_REPEATS(2, 1)};
-    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
-    if (err) CHECK_FAIL("%s", o.note.text);
+    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.diag);
+    if (err) CHECK_FAIL("%s", o.diag.text);
     const pal_study *s = o.study;
     show(s);
     /* the pull goes about as far as a hand does */
-    CHECK(s->most_m > 0.05 * s->size_m && s->most_m < 0.15 * s->size_m);
-    CHECK(s->reference_m > 0 && s->reference_m < 0.15 * s->most_m);
+    CHECK(s->max_m > 0.05 * s->length_scale_m && s->max_m < 0.15 * s->length_scale_m);
+    CHECK(s->reference_m > 0 && s->reference_m < 0.15 * s->max_m);
     double coarse = NAN, fine = NAN, fitted = NAN, plain = NAN;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
-        const pal_setting *q = &p->priced.setting;
-        CHECK(!p->err && p->priced.ms > 0 && p->priced.error_m > 0 && p->priced.error_m < 0.6 * s->most_m);
+        const pal_configuration *q = &p->priced.setting;
+        CHECK(!p->err && p->priced.ms > 0 && p->priced.error_m > 0 && p->priced.error_m < 0.6 * s->max_m);
         if (!strcmp(q->element, "hex8_bbar")) coarse = isnan(coarse) ? p->static_rms_m : coarse, fine = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && q->k_distance_J > 0) fitted = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && !(q->k_distance_J > 0)) plain = p->static_rms_m;
@@ -108,7 +108,7 @@ static void a_full_organ_is_pressed(void)
     int n_sprung = 0;
     CHECK(pal_study_pick(s, NAN, 1e9) >= 0);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_setting *q = &s->point[i].priced.setting;
+        const pal_configuration *q = &s->point[i].priced.setting;
         if (!(q->k_distance_J > 0)) continue;
         n_sprung++;
         CHECK(q->k_volume_J > 0.3 * q->k_distance_J);
@@ -145,15 +145,15 @@ static int most_moved(const double *u, int n_value)
 }
 
 /* three times in by about 2 % of its diagonal, then out by no more than 7.5 %, at the place of the first press */
-static void check_loads(const rests *r, double size_m)
+static void check_loads(const rests *r, double length_scale_m)
 {
     CHECK(r->n >= 4);
     if (r->n < 4) return;
     const double *first = r->u[0], *pull = r->u[r->n - 1];
     for (int k = 0; k < r->n; k++) {
         double moved = pal_norm3(r->u[k] + 3 * most_moved(r->u[k], r->n_value));
-        printf("  load %d moves it by %.2f %% of its diagonal\n", k, 100 * moved / size_m);
-        if (k == r->n - 1) CHECK(moved > 0.03 * size_m && moved < 0.075 * size_m);
+        printf("  load %d moves it by %.2f %% of its diagonal\n", k, 100 * moved / length_scale_m);
+        if (k == r->n - 1) CHECK(moved > 0.03 * length_scale_m && moved < 0.075 * length_scale_m);
     }
     const int at = 3 * most_moved(pull, r->n_value);
     CHECK(pal_dot3(pull + at, first + at) < 0);
@@ -166,8 +166,8 @@ static void a_hollow_organ_is_pressed_and_pulled(void)
     rests *found = calloc(1, sizeof *found);
     REQUIRE(found);
     pal_study_options options = {.quick = 1, .seconds = 0.1, .remember = take_rest, .user = found};
-    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.note);
-    if (err) CHECK_FAIL("%s", o.note.text);
+    pal_err err = pal_study_scene(o.scene, &options, o.study, &o.diag);
+    if (err) CHECK_FAIL("%s", o.diag.text);
     show(o.study);
     CHECK_INT(o.study->n_point, 3);
     for (int i = 0; i < o.study->n_point; i++) {
@@ -176,7 +176,7 @@ static void a_hollow_organ_is_pressed_and_pulled(void)
     }
     /* the finest that is swept, wholly refined, is nearer than the coarse surface */
     CHECK(o.study->point[2].static_most_m < o.study->point[0].static_most_m);
-    check_loads(found, o.study->size_m);
+    check_loads(found, o.study->length_scale_m);
     free(found);
     organ_free(&o);
 }
@@ -185,19 +185,19 @@ static void cells_are_pressed(void)
 {
     static const char *const method[] = {"subdivision_fem"};
     const int32_t n[3] = {3, 2, 2};
-    const double size_m[3] = {0.15, 0.1, 0.1};
+    const double length_scale_m[3] = {0.15, 0.1, 0.1};
     solid_scene s;
     pal_study *study = calloc(1, sizeof *study);
     REQUIRE(study);
-    solid_scene_take(&s, solid_scene_box(n, size_m, true), 1, "central_cg", "polar");
+    solid_scene_take(&s, solid_scene_box(n, length_scale_m, true), 1, "central_cg", "polar");
     solid_scene_hold(&s, 0, 1e-9);
     pal_study_options options = {.quick = 1, .seconds = 0.1, .method = method, .n_method = 1};
-    pal_err err = pal_study_scene(s.scene, &options, study, &s.note);
-    if (err) CHECK_FAIL("%s", s.note.text);
+    pal_err err = pal_study_scene(s.scene, &options, study, &s.diag);
+    if (err) CHECK_FAIL("%s", s.diag.text);
     show(study);
     CHECK_INT(study->n_point, 4);
     for (int i = 0; i < study->n_point; i++)
-        CHECK(!study->point[i].err && study->point[i].static_most_m < 0.7 * study->most_m);
+        CHECK(!study->point[i].err && study->point[i].static_most_m < 0.7 * study->max_m);
     solid_scene_close(&s);
     free(study);
 }
@@ -214,7 +214,7 @@ static void the_step_of_the_scene_is_the_one_that_is_swept(void)
         for (int k = 0; k < 10; k++) {
             double own = own_s[k % 5];
             pal_study_options options = {.quick = k < 5};
-            pal_study_job job = {.scene = o.scene, .options = &options, .law = "corotational", .shell = !full};
+            pal_study_job job = {.scene = o.scene, .options = &options, .law = "corotational", .adaptive = !full};
             job.reference = full ? 64 : 4, job.slender = 1;
             o.scene->step_s = own;
             int n = pal_study_list(&job, wish), n_own = 0, n_other = 0;
@@ -226,7 +226,7 @@ static void the_step_of_the_scene_is_the_one_that_is_swept(void)
                 CHECK(times <= 1 || wish[i].setting.step_s < 1.0001 / 60);
                 for (int j = 0; j < i; j++)
                     CHECK(wish[i].calibrate != wish[j].calibrate ||
-                          !pal_setting_same(&wish[i].setting, &wish[j].setting));
+                          !pal_configuration_equal(&wish[i].setting, &wish[j].setting));
             }
             CHECK(n_own > 2 && (full ? n_other > 0 : n_other == 0) && n < PAL_STUDY_POINTS);
         }
@@ -237,10 +237,10 @@ static void the_step_of_the_scene_is_the_one_that_is_swept(void)
 
 static void check_refused(organ *o, const pal_study_options *options, const char *word)
 {
-    o->note.text[0] = 0;
-    CHECK(pal_study_scene(o->scene, options, o->study, &o->note) == PAL_ERR_REFUSED);
-    CHECK(strstr(o->note.text, word));
-    if (!strstr(o->note.text, word)) printf("  \"%s\" has no \"%s\"\n", o->note.text, word);
+    o->diag.text[0] = 0;
+    CHECK(pal_study_scene(o->scene, options, o->study, &o->diag) == PAL_ERR_REFUSED);
+    CHECK(strstr(o->diag.text, word));
+    if (!strstr(o->diag.text, word)) printf("  \"%s\" has no \"%s\"\n", o->diag.text, word);
 }
 
 static void what_makes_no_sense_is_refused_in_a_sentence(void)

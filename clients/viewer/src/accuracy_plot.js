@@ -20,55 +20,55 @@ export const METHOD_COLOURS = Object.freeze(["#5cb8ff", "#ffb45c", "#62d39a", "#
  * @param {number[]} values @param {number} span @returns {Range}
  */
 export function logRange(values, span = 10) {
-  const good = values.filter(positive);
-  if (good.length === 0) return { low: 1, high: span };
-  const step = (/** @type {number} */ v, /** @type {boolean} */ up) => {
-    const ten = 10 ** Math.floor(Math.log10(v) + 1e-9),
-      all = [1, 2, 5, 10].map((s) => s * ten);
-    return up
-      ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten)
-      : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
-  };
-  let low = step(Math.min(...good) / 1.15, false),
-    high = step(Math.max(...good) * 1.15, true);
-  while (high / low < span * (1 - 1e-9)) {
-    high = step(high * 1.01, true);
-    if (high / low < span * (1 - 1e-9)) low = step(low / 1.01, false);
-  }
-  return { low, high };
+    const good = values.filter(positive);
+    if (good.length === 0) return { low: 1, high: span };
+    const step = (/** @type {number} */ v, /** @type {boolean} */ up) => {
+        const ten = 10 ** Math.floor(Math.log10(v) + 1e-9),
+            all = [1, 2, 5, 10].map((s) => s * ten);
+        return up
+            ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten)
+            : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
+    };
+    let low = step(Math.min(...good) / 1.15, false),
+        high = step(Math.max(...good) * 1.15, true);
+    while (high / low < span * (1 - 1e-9)) {
+        high = step(high * 1.01, true);
+        if (high / low < span * (1 - 1e-9)) low = step(low / 1.01, false);
+    }
+    return { low, high };
 }
 
 /** position of a value on an axis from a to b @param {number} v @param {Range} range @param {number} a @param {number} b */
 export function logPosition(v, range, a, b) {
-  const at = Math.log(v / range.low) / Math.log(range.high / range.low);
-  return a + (b - a) * Math.min(1, Math.max(0, at));
+    const at = Math.log(v / range.low) / Math.log(range.high / range.low);
+    return a + (b - a) * Math.min(1, Math.max(0, at));
 }
 
 /** ticks of an axis: 1, 2 and 5 where they fit, else powers of ten @param {Range} range @param {number} max */
 export function logTicks(range, max = 6) {
-  /** @param {number[]} steps */
-  const among = (steps) => {
-    const ticks = [];
-    for (let ten = 10 ** Math.floor(Math.log10(range.low) + 1e-9); ten <= range.high * 1.001; ten *= 10)
-      for (const s of steps) {
-        const v = Number((s * ten).toPrecision(3));
-        if (v >= range.low * 0.999 && v <= range.high * 1.001) ticks.push(v);
-      }
-    return ticks;
-  };
-  for (const steps of [[1, 2, 5], [1, 3], [1]]) {
-    const ticks = among(steps);
-    if (ticks.length <= max && ticks.length > 1) return ticks;
-  }
-  const all = among([1]);
-  return all.length > 1 ? all.filter((_, i) => i % Math.ceil(all.length / max) === 0) : among([1, 2, 5]);
+    /** @param {number[]} steps */
+    const among = (steps) => {
+        const ticks = [];
+        for (let ten = 10 ** Math.floor(Math.log10(range.low) + 1e-9); ten <= range.high * 1.001; ten *= 10)
+            for (const s of steps) {
+                const v = Number((s * ten).toPrecision(3));
+                if (v >= range.low * 0.999 && v <= range.high * 1.001) ticks.push(v);
+            }
+        return ticks;
+    };
+    for (const steps of [[1, 2, 5], [1, 3], [1]]) {
+        const ticks = among(steps);
+        if (ticks.length <= max && ticks.length > 1) return ticks;
+    }
+    const all = among([1]);
+    return all.length > 1 ? all.filter((_, i) => i % Math.ceil(all.length / max) === 0) : among([1, 2, 5]);
 }
 
 /** the Pareto front in the order of cost: the positions of the slider @param {StudyPoint[]} points @returns {StudyPoint[]} */
 export function frontOf(points) {
-  return points
-    .filter((p) => p.front && positive(p.ms) && positive(p.error_m))
-    .sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
+    return points
+        .filter((p) => p.front && positive(p.ms) && positive(p.error_m))
+        .sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
 }
 
 /**
@@ -76,12 +76,12 @@ export function frontOf(points) {
  * @param {StudyPoint[]} front @param {Estimate | null} estimate @returns {number} -1: none
  */
 export function positionOn(front, estimate) {
-  if (front.length === 0 || !estimate) return -1;
-  const own = front.findIndex((p) => p.index === estimate.point);
-  if (own >= 0) return own;
-  if (!positive(estimate.ms)) return -1;
-  const distances = front.map((p) => Math.abs(Math.log(p.ms / /** @type {number} */ (estimate.ms))));
-  return distances.indexOf(Math.min(...distances));
+    if (front.length === 0 || !estimate) return -1;
+    const own = front.findIndex((p) => p.index === estimate.point);
+    if (own >= 0) return own;
+    if (!positive(estimate.ms)) return -1;
+    const distances = front.map((p) => Math.abs(Math.log(p.ms / /** @type {number} */ (estimate.ms))));
+    return distances.indexOf(Math.min(...distances));
 }
 
 /**
@@ -89,47 +89,47 @@ export function positionOn(front, estimate) {
  * @param {StudyPoint[]} points @param {Estimate | null} estimate @param {{left: number, right: number, top: number, bottom: number}} box
  */
 export function layOutPlot(points, estimate, box) {
-  const good = points.filter((p) => positive(p.ms) && positive(p.error_m)),
-    near = estimate?.neighbours ?? [];
-  const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) =>
-    p !== null && positive(p.ms) && positive(p.error_m);
-  const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
-  const msRange = logRange([
-    ...shown.map((p) => /** @type {number} */ (p?.ms)),
-    ...(positive(estimate?.ms) ? [estimate.ms] : []),
-  ]);
-  // the error of a body at rest is far below the studied ones: it is drawn at the foot of the plot
-  const min = Math.max(ERROR_MIN_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
-  const errorRange = logRange(shown.map((p) => 1e3 * Math.max(min, /** @type {number} */ (p?.error_m))));
-  const x = (/** @type {number} */ ms) => logPosition(ms, msRange, box.left, box.right);
-  const y = (/** @type {number} */ m) => logPosition(1e3 * Math.max(min, m), errorRange, box.bottom, box.top);
-  const methods = [...new Set(good.map((p) => p.method))];
-  return {
-    methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),
-    xTicks: logTicks(msRange).map((v) => ({ at: logPosition(v, msRange, box.left, box.right), text: short(v) })),
-    yTicks: logTicks(errorRange, 5).map((v) => ({
-      at: logPosition(v, errorRange, box.bottom, box.top),
-      text: short(v),
-    })),
-    marks: good.map((p) => ({
-      x: x(p.ms),
-      y: y(p.error_m),
-      point: p,
-      colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length],
-    })),
-    front: frontOf(good).map((p) => ({ x: x(p.ms), y: y(p.error_m) })),
-    neighbours: near.flatMap((n) =>
-      positive(n.ms) && positive(n.error_m) ? [{ x: x(n.ms), y: y(n.error_m), of: n }] : [],
-    ),
-    // without an error estimate the body is a vertical line at its cost
-    live: positive(estimate?.ms)
-      ? { x: x(estimate.ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
-      : null,
-    x,
-    y,
-    msRange,
-    errorRange,
-  };
+    const good = points.filter((p) => positive(p.ms) && positive(p.error_m)),
+        near = estimate?.neighbours ?? [];
+    const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) =>
+        p !== null && positive(p.ms) && positive(p.error_m);
+    const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
+    const msRange = logRange([
+        ...shown.map((p) => /** @type {number} */ (p?.ms)),
+        ...(positive(estimate?.ms) ? [estimate.ms] : []),
+    ]);
+    // the error of a body at rest is far below the studied ones: it is drawn at the foot of the plot
+    const min = Math.max(ERROR_MIN_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
+    const errorRange = logRange(shown.map((p) => 1e3 * Math.max(min, /** @type {number} */ (p?.error_m))));
+    const x = (/** @type {number} */ ms) => logPosition(ms, msRange, box.left, box.right);
+    const y = (/** @type {number} */ m) => logPosition(1e3 * Math.max(min, m), errorRange, box.bottom, box.top);
+    const methods = [...new Set(good.map((p) => p.method))];
+    return {
+        methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),
+        xTicks: logTicks(msRange).map((v) => ({ at: logPosition(v, msRange, box.left, box.right), text: short(v) })),
+        yTicks: logTicks(errorRange, 5).map((v) => ({
+            at: logPosition(v, errorRange, box.bottom, box.top),
+            text: short(v),
+        })),
+        marks: good.map((p) => ({
+            x: x(p.ms),
+            y: y(p.error_m),
+            point: p,
+            colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length],
+        })),
+        front: frontOf(good).map((p) => ({ x: x(p.ms), y: y(p.error_m) })),
+        neighbours: near.flatMap((n) =>
+            positive(n.ms) && positive(n.error_m) ? [{ x: x(n.ms), y: y(n.error_m), of: n }] : [],
+        ),
+        // without an error estimate the body is a vertical line at its cost
+        live: positive(estimate?.ms)
+            ? { x: x(estimate.ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
+            : null,
+        x,
+        y,
+        msRange,
+        errorRange,
+    };
 }
 
 /**
@@ -137,10 +137,10 @@ export function layOutPlot(points, estimate, box) {
  * @param {import("./control_table.js").Neighbour} near @returns {Record<string, number> | null} null: only a point of the study does
  */
 export function neighbourArgs(near) {
-  /** @type {Record<string, number>} */
-  const args = {};
-  if (near.size) args.size = near.size;
-  if (near.step_ms) args.step_ms = near.step_ms;
-  if (near.tolerance) args.tolerance = near.tolerance;
-  return near.knob === "method" || Object.keys(args).length === 0 ? null : args;
+    /** @type {Record<string, number>} */
+    const args = {};
+    if (near.size) args.size = near.size;
+    if (near.step_ms) args.step_ms = near.step_ms;
+    if (near.tolerance) args.tolerance = near.tolerance;
+    return near.knob === "method" || Object.keys(args).length === 0 ? null : args;
 }

@@ -1,7 +1,7 @@
 // The keyboard: the page's buttons, and the camera for users without a pointer.
 
 const TURN_PX = 40,
-  ZOOM_STEP = 0.85;
+    ZOOM_STEP = 0.85;
 
 /**
  * @typedef {{orbit: (dx: number, dy: number) => void, zoom: (factor: number) => void, home: () => void}} View
@@ -10,25 +10,25 @@ const TURN_PX = 40,
 
 /** @param {View} view @returns {Record<string, () => void>} keys that repeat while they are held */
 function viewKeys(view) {
-  return {
-    arrowleft: () => view.orbit(-TURN_PX, 0),
-    arrowright: () => view.orbit(TURN_PX, 0),
-    arrowup: () => view.orbit(0, -TURN_PX),
-    arrowdown: () => view.orbit(0, TURN_PX),
-    "+": () => view.zoom(ZOOM_STEP),
-    "=": () => view.zoom(ZOOM_STEP),
-    "-": () => view.zoom(1 / ZOOM_STEP),
-    0: () => view.home(),
-  };
+    return {
+        arrowleft: () => view.orbit(-TURN_PX, 0),
+        arrowright: () => view.orbit(TURN_PX, 0),
+        arrowup: () => view.orbit(0, -TURN_PX),
+        arrowdown: () => view.orbit(0, TURN_PX),
+        "+": () => view.zoom(ZOOM_STEP),
+        "=": () => view.zoom(ZOOM_STEP),
+        "-": () => view.zoom(1 / ZOOM_STEP),
+        0: () => view.home(),
+    };
 }
 
 /** does the focused element use this key itself? @param {unknown} focused @param {string} key */
 function usedBy(focused, key) {
-  const target = /** @type {{tagName?: string, type?: string} | null} */ (focused);
-  const name = target?.tagName;
-  if (name === "INPUT") return target?.type !== "checkbox" || key === " ";
-  if (name === "SELECT") return true; // arrows and letters choose
-  return name === "BUTTON" && (key === " " || key === "enter");
+    const target = /** @type {{tagName?: string, type?: string} | null} */ (focused);
+    const name = target?.tagName;
+    if (name === "INPUT") return target?.type !== "checkbox" || key === " ";
+    if (name === "SELECT") return true; // arrows and letters choose
+    return name === "BUTTON" && (key === " " || key === "enter");
 }
 
 /**
@@ -37,10 +37,10 @@ function usedBy(focused, key) {
  * @returns {(press: Press) => (() => void) | null}
  */
 export function keyMap(actions, view) {
-  const camera = viewKeys(view);
-  return (press) => {
-    const key = press.key.toLowerCase();
-    if (press.ctrlKey || press.metaKey || press.altKey || usedBy(press.target, key)) return null;
-    return camera[key] ?? (press.repeat ? null : (actions[key] ?? null));
-  };
+    const camera = viewKeys(view);
+    return (press) => {
+        const key = press.key.toLowerCase();
+        if (press.ctrlKey || press.metaKey || press.altKey || usedBy(press.target, key)) return null;
+        return camera[key] ?? (press.repeat ? null : (actions[key] ?? null));
+    };
 }

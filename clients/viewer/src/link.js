@@ -10,7 +10,7 @@ import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } f
 
 export const REPEAT_MS = 50; // period of repeated poses of a resting tool: the server releases a silent one
 const RETRY_MS = 500, // pause before the first reconnection, doubled with each failure
-  RETRY_MAX_MS = 5000;
+    RETRY_MAX_MS = 5000;
 const PAGE_SILENCE_MS = 3000; // a page that has been silent for longer no longer holds its tool
 const PING_MS = 1000;
 const FIGURES_MS = 500;
@@ -20,12 +20,12 @@ const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page can
 
 /** close codes after which reconnection is useless, with the text for the user */
 const FINAL = new Map([
-  [1002, "the server rejected a message of this page"],
-  [1008, "access denied"],
-  [1009, "the server rejected a message of this page"],
-  [4001, "this page sent too many messages"],
-  [4003, "the session is full"],
-  [4004, "this session does not exist"],
+    [1002, "the server rejected a message of this page"],
+    [1008, "access denied"],
+    [1009, "the server rejected a message of this page"],
+    [4001, "this page sent too many messages"],
+    [4003, "the session is full"],
+    [4004, "this session does not exist"],
 ]);
 
 /**
@@ -70,327 +70,330 @@ const FINAL = new Map([
 
 /** close reason: at most 123 bytes of ASCII @param {unknown} error */
 const closeReason = (error) =>
-  String(error)
-    .replace(/[^ -~]/g, "?")
-    .slice(0, 100);
+    String(error)
+        .replace(/[^ -~]/g, "?")
+        .slice(0, 100);
 
 export class Link {
-  /** @type {WebSocket | null} */
-  socket = null;
-  /** @type {{url: string, name: string, role: import("./control_table.js").Role}} */
-  options = { url: "", name: "Guest", role: "trainee" };
-  tries = 0;
-  generation = 0; // of the connection: events of older ones are ignored
-  poseSeq = 0;
-  /** @type {ToolPose | null} of the held tool */
-  lastPose = null;
-  poseFromPageAt = 0; // ms
-  poseSentAt = 0; // ms
-  /** @type {number[]} */
-  lastPosition = [0, 0, 0];
-  figuresAt = 0;
-  /** @type {Map<number, Part>} */
-  parts = new Map();
-  /** @type {Map<number, number>} epoch of the asset requested last */
-  requested = new Map();
-  /** @type {Map<number, Uint8Array>} newest frame of a part whose asset has not arrived */
-  earlyFrames = new Map();
-  /** @type {Map<number, Uint8Array>} newest field of such a part */
-  earlyFields = new Map();
-  /** @type {Map<number, Uint8Array[]>} all patches of such a part: each is relative to the one before */
-  earlyPatches = new Map();
-  decodeUs = 0;
-  nDecoded = 0;
-  decodeSum = 0;
-  bytes = 0;
-  ownTool = -1;
-  latency = 0;
-  rtt = 0;
-  echo = 0;
+    /** @type {WebSocket | null} */
+    socket = null;
+    /** @type {{url: string, name: string, role: import("./control_table.js").Role}} */
+    options = { url: "", name: "Guest", role: "trainee" };
+    tries = 0;
+    generation = 0; // of the connection: events of older ones are ignored
+    poseSeq = 0;
+    /** @type {ToolPose | null} of the held tool */
+    lastPose = null;
+    poseFromPageAt = 0; // ms
+    poseSentAt = 0; // ms
+    /** @type {number[]} */
+    lastPosition = [0, 0, 0];
+    figuresAt = 0;
+    /** @type {Map<number, Part>} */
+    parts = new Map();
+    /** @type {Map<number, number>} epoch of the asset requested last */
+    requested = new Map();
+    /** @type {Map<number, Uint8Array>} newest frame of a part whose asset has not arrived */
+    earlyFrames = new Map();
+    /** @type {Map<number, Uint8Array>} newest field of such a part */
+    earlyFields = new Map();
+    /** @type {Map<number, Uint8Array[]>} all patches of such a part: each is relative to the one before */
+    earlyPatches = new Map();
+    decodeUs = 0;
+    nDecoded = 0;
+    decodeSum = 0;
+    bytes = 0;
+    ownTool = -1;
+    latency = 0;
+    rtt = 0;
+    echo = 0;
 
-  /** @param {Environment} env */
-  constructor(env) {
-    this.env = env;
-    this.figuresAt = env.now();
-  }
-
-  reset() {
-    this.lastPose = null;
-    this.parts.clear();
-    this.requested.clear();
-    this.earlyFrames.clear();
-    this.earlyFields.clear();
-    this.earlyPatches.clear();
-    this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
-    this.latency = this.rtt = this.echo = 0;
-    this.ownTool = -1;
-  }
-
-  /** @param {{url: string, name: string, role: import("./control_table.js").Role}} options */
-  connect(options) {
-    this.options = options;
-    this.tries = 0;
-    const old = this.socket;
-    this.socket = null;
-    this.generation++;
-    old?.close(1000);
-    this.dial();
-  }
-
-  dial() {
-    const generation = this.generation;
-    this.reset();
-    this.report("connecting", this.tries ? "reconnecting" : "connecting");
-    const socket = this.env.open(this.options.url, PROTOCOL);
-    socket.binaryType = "arraybuffer";
-    this.socket = socket;
-    socket.onopen = () => {
-      if (generation !== this.generation) return;
-      this.send({
-        type: "join",
-        name: this.options.name,
-        role: this.options.role,
-        tool: this.options.role === "viewer" ? null : -1,
-        patches: true,
-      });
-    };
-    socket.onmessage = (event) => {
-      if (generation !== this.generation) return;
-      try {
-        this.receive(event.data);
-      } catch (error) {
-        // an unreadable message is an error of the server: close with the reason and reconnect
-        socket.close(CLOSE_UNREADABLE, closeReason(error));
-      }
-    };
-    socket.onclose = (event) => {
-      if (generation !== this.generation) return;
-      this.generation++;
-      this.socket = null;
-      const text = FINAL.get(event.code);
-      if (text) {
-        this.report("refused", event.reason ? `${text}: ${event.reason}` : text);
-        return;
-      }
-      const pause = Math.min(RETRY_MAX_MS, RETRY_MS * 2 ** this.tries++);
-      this.report("lost", "connection lost, reconnecting");
-      const next = this.generation;
-      this.env.later(() => next === this.generation && this.dial(), pause);
-    };
-  }
-
-  /** @param {ConnectionState} state @param {string} text */
-  report(state, text) {
-    this.env.post({ type: "state", state, text });
-  }
-
-  /** @param {ClientMessage} message */
-  send(message) {
-    if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(message));
-  }
-
-  /** @param {ToolPose} pose */
-  pose(pose) {
-    this.lastPose = pose.away ? null : pose;
-    this.poseFromPageAt = this.env.now();
-    this.sendPose(pose);
-  }
-
-  /** called every REPEAT_MS: drawing may block the page for longer than the server waits for a tool */
-  repeatPose() {
-    const now = this.env.now();
-    if (!this.lastPose || now - this.poseSentAt < 0.8 * REPEAT_MS) return;
-    if (now - this.poseFromPageAt < PAGE_SILENCE_MS) this.sendPose(this.lastPose);
-    else this.pose({ ...this.lastPose, position: null, grab: false, away: true });
-  }
-
-  /** @param {ToolPose} pose */
-  sendPose(pose) {
-    if (this.socket?.readyState !== 1) return;
-    this.poseSentAt = this.env.now();
-    this.lastPosition = pose.position ?? this.lastPosition;
-    this.socket.send(
-      writePose({
-        tool: pose.tool,
-        seq: ++this.poseSeq,
-        flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
-        stampUs: Math.round(this.env.now() * 1000),
-        position: this.lastPosition,
-        buttons: pose.grab ? 1 : 0,
-      }),
-    );
-  }
-
-  /** @param {string | ArrayBuffer} data */
-  receive(data) {
-    if (typeof data === "string") {
-      this.bytes += data.length;
-      this.control(readControl(data));
-      return;
+    /** @param {Environment} env */
+    constructor(env) {
+        this.env = env;
+        this.figuresAt = env.now();
     }
-    const bytes = new Uint8Array(data);
-    this.bytes += bytes.length;
-    const head = readHead(bytes);
-    if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
-    else if (head.kind === KIND.TOOLS) this.tools(bytes);
-    else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
-    else if (head.kind === KIND.PATCH) this.patch(head.index, bytes);
-  }
 
-  /** @param {ServerMessage} message */
-  control(message) {
-    if (message.type === "hello") {
-      this.ownTool = message.you.tool ?? -1;
-      message.parts.forEach((part, i) => this.loadPart(i, part));
-      this.report("live", "live");
-      this.ping();
-    } else if (message.type === "topology") message.parts.forEach((part, i) => this.loadPart(i, part));
-    else if (message.type === "pong") this.rtt = this.env.now() - message.stamp_ms;
-    this.env.post({ type: "control", message });
-  }
-
-  ping() {
-    const generation = this.generation;
-    this.send({ type: "ping", stamp_ms: this.env.now() });
-    this.env.later(() => generation === this.generation && this.ping(), PING_MS);
-  }
-
-  /** @param {number} index @param {{epoch: number, asset: string}} info */
-  async loadPart(index, info) {
-    if (this.requested.get(index) === info.epoch) return;
-    this.requested.set(index, info.epoch);
-    const generation = this.generation;
-    const address = new URL(info.asset, this.options.url.replace(/^ws/, "http")).href;
-    try {
-      const asset = await decodeAsset(new Uint8Array(await this.env.get(address)));
-      // responses may arrive out of order: only the newest epoch counts
-      if (generation !== this.generation || this.requested.get(index) !== info.epoch) return;
-      // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
-      this.tries = 0;
-      const n = asset.rest.length / 3,
-        shown = shownOf(asset.triangles, n);
-      this.parts.set(index, {
-        decoder: new FrameDecoder(asset),
-        table: asset.triangles,
-        shown,
-        patched: false,
-        epoch: info.epoch,
-        n,
-        spare: [],
-      });
-      this.env.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
-      this.decodeEarly(index);
-    } catch (error) {
-      if (generation === this.generation && this.requested.get(index) === info.epoch)
-        this.socket?.close(CLOSE_UNREADABLE, closeReason(error));
+    reset() {
+        this.lastPose = null;
+        this.parts.clear();
+        this.requested.clear();
+        this.earlyFrames.clear();
+        this.earlyFields.clear();
+        this.earlyPatches.clear();
+        this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
+        this.latency = this.rtt = this.echo = 0;
+        this.ownTool = -1;
     }
-  }
 
-  /** messages that arrived before the asset @param {number} index of the part */
-  decodeEarly(index) {
-    const kept = this.earlyFrames.get(index),
-      patches = this.earlyPatches.get(index) ?? [];
-    this.earlyFrames.delete(index);
-    this.earlyPatches.delete(index);
-    for (const patch of patches) this.patch(index, patch);
-    if (kept) this.frame(index, kept);
-    const keptField = this.earlyFields.get(index);
-    this.earlyFields.delete(index);
-    if (keptField) this.field(index, keptField);
-  }
-
-  /** @param {number} index @param {Uint8Array} bytes */
-  field(index, bytes) {
-    const part = this.parts.get(index),
-      { epoch } = readFieldHead(bytes);
-    if (!part || epoch > part.epoch) {
-      this.earlyFields.set(index, bytes.slice());
-      return;
+    /** @param {{url: string, name: string, role: import("./control_table.js").Role}} options */
+    connect(options) {
+        this.options = options;
+        this.tries = 0;
+        const old = this.socket;
+        this.socket = null;
+        this.generation++;
+        old?.close(1000);
+        this.dial();
     }
-    if (epoch < part.epoch) return;
-    const level = new Uint8Array(part.n),
-      head = decodeField(bytes, level);
-    this.env.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
-      level.buffer,
-    ]);
-  }
 
-  /**
-   * Applied to the table at once, shown together with the next frame.
-   * @param {number} index @param {Uint8Array} bytes
-   */
-  patch(index, bytes) {
-    const part = this.parts.get(index),
-      { epoch } = readPatchHead(bytes);
-    if (!part || epoch > part.epoch) {
-      const before = this.earlyPatches.get(index) ?? [];
-      this.earlyPatches.set(index, [...before.filter((older) => readPatchHead(older).epoch === epoch), bytes.slice()]);
-      // an earlier frame lacks the new vertices
-      this.earlyFrames.delete(index);
-      return;
+    dial() {
+        const generation = this.generation;
+        this.reset();
+        this.report("connecting", this.tries ? "reconnecting" : "connecting");
+        const socket = this.env.open(this.options.url, PROTOCOL);
+        socket.binaryType = "arraybuffer";
+        this.socket = socket;
+        socket.onopen = () => {
+            if (generation !== this.generation) return;
+            this.send({
+                type: "join",
+                name: this.options.name,
+                role: this.options.role,
+                tool: this.options.role === "viewer" ? null : -1,
+                patches: true,
+            });
+        };
+        socket.onmessage = (event) => {
+            if (generation !== this.generation) return;
+            try {
+                this.receive(event.data);
+            } catch (error) {
+                // an unreadable message is an error of the server: close with the reason and reconnect
+                socket.close(CLOSE_UNREADABLE, closeReason(error));
+            }
+        };
+        socket.onclose = (event) => {
+            if (generation !== this.generation) return;
+            this.generation++;
+            this.socket = null;
+            const text = FINAL.get(event.code);
+            if (text) {
+                this.report("refused", event.reason ? `${text}: ${event.reason}` : text);
+                return;
+            }
+            const pause = Math.min(RETRY_MAX_MS, RETRY_MS * 2 ** this.tries++);
+            this.report("lost", "connection lost, reconnecting");
+            const next = this.generation;
+            this.env.later(() => next === this.generation && this.dial(), pause);
+        };
     }
-    if (epoch < part.epoch) return;
-    applyPatch(bytes, part.table, part.n);
-    part.patched = true;
-  }
 
-  /** @param {number} index @param {Uint8Array} bytes */
-  frame(index, bytes) {
-    const part = this.parts.get(index),
-      { epoch } = readFrameHead(bytes);
-    if (!part || epoch > part.epoch) {
-      this.earlyFrames.set(index, bytes.slice());
-      return;
+    /** @param {ConnectionState} state @param {string} text */
+    report(state, text) {
+        this.env.post({ type: "state", state, text });
     }
-    if (epoch < part.epoch) return;
-    const begin = this.env.now();
-    const { positions, normals } = part.spare.pop() ?? {
-      positions: new Float32Array(3 * part.n),
-      normals: new Float32Array(3 * part.n),
-    };
-    part.decoder.decode(bytes, positions);
-    const ms = this.env.now() - begin,
-      shown = part.patched ? shownOf(part.table, part.n) : null;
-    if (shown) part.shown = shown;
-    part.patched = false;
-    vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
-    this.decodeUs += Math.round(1000 * ms);
-    this.decodeSum += ms;
-    this.nDecoded++;
-    this.env.post({ type: "frame", part: index, positions, normals, shown }, [positions.buffer, normals.buffer]);
-  }
 
-  /** arrays returned by the page @param {{part: number} & FrameArrays} old */
-  reuse(old) {
-    const part = this.parts.get(old.part);
-    if (part && part.spare.length < SPARE_MAX && old.positions.length === 3 * part.n)
-      part.spare.push({ positions: old.positions, normals: old.normals });
-  }
+    /** @param {ClientMessage} message */
+    send(message) {
+        if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(message));
+    }
 
-  /** @param {Uint8Array} bytes */
-  tools(bytes) {
-    const message = readTools(bytes);
-    this.socket?.send(writeAck({ cycle: message.cycle, decodeUs: this.decodeUs }));
-    this.decodeUs = 0;
-    const mine = message.tools[this.ownTool];
-    const now = this.env.now();
-    if (mine && mine.held && mine.echoSeq && mine.echoSeq !== this.echo && mine.echoSeq <= this.poseSeq) {
-      this.echo = mine.echoSeq;
-      const latency = now - mine.echoStampUs / 1000;
-      if (latency >= 0 && latency < LATENCY_MAX_MS)
-        this.latency = this.latency ? 0.9 * this.latency + 0.1 * latency : latency;
+    /** @param {ToolPose} pose */
+    pose(pose) {
+        this.lastPose = pose.away ? null : pose;
+        this.poseFromPageAt = this.env.now();
+        this.sendPose(pose);
     }
-    this.env.post({ type: "tools", tools: message.tools });
-    if (now - this.figuresAt > FIGURES_MS) {
-      const figures = {
-        latency_ms: this.latency,
-        rtt_ms: this.rtt,
-        decode_ms: this.nDecoded ? this.decodeSum / this.nDecoded : 0,
-        bytes_s: (1000 * this.bytes) / (now - this.figuresAt),
-      };
-      this.env.post({ type: "figures", figures });
-      this.figuresAt = now;
-      this.bytes = this.nDecoded = this.decodeSum = 0;
+
+    /** called every REPEAT_MS: drawing may block the page for longer than the server waits for a tool */
+    repeatPose() {
+        const now = this.env.now();
+        if (!this.lastPose || now - this.poseSentAt < 0.8 * REPEAT_MS) return;
+        if (now - this.poseFromPageAt < PAGE_SILENCE_MS) this.sendPose(this.lastPose);
+        else this.pose({ ...this.lastPose, position: null, grab: false, away: true });
     }
-  }
+
+    /** @param {ToolPose} pose */
+    sendPose(pose) {
+        if (this.socket?.readyState !== 1) return;
+        this.poseSentAt = this.env.now();
+        this.lastPosition = pose.position ?? this.lastPosition;
+        this.socket.send(
+            writePose({
+                tool: pose.tool,
+                seq: ++this.poseSeq,
+                flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
+                stampUs: Math.round(this.env.now() * 1000),
+                position: this.lastPosition,
+                buttons: pose.grab ? 1 : 0,
+            }),
+        );
+    }
+
+    /** @param {string | ArrayBuffer} data */
+    receive(data) {
+        if (typeof data === "string") {
+            this.bytes += data.length;
+            this.control(readControl(data));
+            return;
+        }
+        const bytes = new Uint8Array(data);
+        this.bytes += bytes.length;
+        const head = readHead(bytes);
+        if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
+        else if (head.kind === KIND.TOOLS) this.tools(bytes);
+        else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
+        else if (head.kind === KIND.PATCH) this.patch(head.index, bytes);
+    }
+
+    /** @param {ServerMessage} message */
+    control(message) {
+        if (message.type === "hello") {
+            this.ownTool = message.you.tool ?? -1;
+            message.parts.forEach((part, i) => this.loadPart(i, part));
+            this.report("live", "live");
+            this.ping();
+        } else if (message.type === "topology") message.parts.forEach((part, i) => this.loadPart(i, part));
+        else if (message.type === "pong") this.rtt = this.env.now() - message.stamp_ms;
+        this.env.post({ type: "control", message });
+    }
+
+    ping() {
+        const generation = this.generation;
+        this.send({ type: "ping", stamp_ms: this.env.now() });
+        this.env.later(() => generation === this.generation && this.ping(), PING_MS);
+    }
+
+    /** @param {number} index @param {{epoch: number, asset: string}} info */
+    async loadPart(index, info) {
+        if (this.requested.get(index) === info.epoch) return;
+        this.requested.set(index, info.epoch);
+        const generation = this.generation;
+        const address = new URL(info.asset, this.options.url.replace(/^ws/, "http")).href;
+        try {
+            const asset = await decodeAsset(new Uint8Array(await this.env.get(address)));
+            // responses may arrive out of order: only the newest epoch counts
+            if (generation !== this.generation || this.requested.get(index) !== info.epoch) return;
+            // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
+            this.tries = 0;
+            const n = asset.rest.length / 3,
+                shown = shownOf(asset.triangles, n);
+            this.parts.set(index, {
+                decoder: new FrameDecoder(asset),
+                table: asset.triangles,
+                shown,
+                patched: false,
+                epoch: info.epoch,
+                n,
+                spare: [],
+            });
+            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
+            this.decodeEarly(index);
+        } catch (error) {
+            if (generation === this.generation && this.requested.get(index) === info.epoch)
+                this.socket?.close(CLOSE_UNREADABLE, closeReason(error));
+        }
+    }
+
+    /** messages that arrived before the asset @param {number} index of the part */
+    decodeEarly(index) {
+        const kept = this.earlyFrames.get(index),
+            patches = this.earlyPatches.get(index) ?? [];
+        this.earlyFrames.delete(index);
+        this.earlyPatches.delete(index);
+        for (const patch of patches) this.patch(index, patch);
+        if (kept) this.frame(index, kept);
+        const keptField = this.earlyFields.get(index);
+        this.earlyFields.delete(index);
+        if (keptField) this.field(index, keptField);
+    }
+
+    /** @param {number} index @param {Uint8Array} bytes */
+    field(index, bytes) {
+        const part = this.parts.get(index),
+            { epoch } = readFieldHead(bytes);
+        if (!part || epoch > part.epoch) {
+            this.earlyFields.set(index, bytes.slice());
+            return;
+        }
+        if (epoch < part.epoch) return;
+        const level = new Uint8Array(part.n),
+            head = decodeField(bytes, level);
+        this.env.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
+            level.buffer,
+        ]);
+    }
+
+    /**
+     * Applied to the table at once, shown together with the next frame.
+     * @param {number} index @param {Uint8Array} bytes
+     */
+    patch(index, bytes) {
+        const part = this.parts.get(index),
+            { epoch } = readPatchHead(bytes);
+        if (!part || epoch > part.epoch) {
+            const before = this.earlyPatches.get(index) ?? [];
+            this.earlyPatches.set(index, [
+                ...before.filter((older) => readPatchHead(older).epoch === epoch),
+                bytes.slice(),
+            ]);
+            // an earlier frame lacks the new vertices
+            this.earlyFrames.delete(index);
+            return;
+        }
+        if (epoch < part.epoch) return;
+        applyPatch(bytes, part.table, part.n);
+        part.patched = true;
+    }
+
+    /** @param {number} index @param {Uint8Array} bytes */
+    frame(index, bytes) {
+        const part = this.parts.get(index),
+            { epoch } = readFrameHead(bytes);
+        if (!part || epoch > part.epoch) {
+            this.earlyFrames.set(index, bytes.slice());
+            return;
+        }
+        if (epoch < part.epoch) return;
+        const begin = this.env.now();
+        const { positions, normals } = part.spare.pop() ?? {
+            positions: new Float32Array(3 * part.n),
+            normals: new Float32Array(3 * part.n),
+        };
+        part.decoder.decode(bytes, positions);
+        const ms = this.env.now() - begin,
+            shown = part.patched ? shownOf(part.table, part.n) : null;
+        if (shown) part.shown = shown;
+        part.patched = false;
+        vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
+        this.decodeUs += Math.round(1000 * ms);
+        this.decodeSum += ms;
+        this.nDecoded++;
+        this.env.post({ type: "frame", part: index, positions, normals, shown }, [positions.buffer, normals.buffer]);
+    }
+
+    /** arrays returned by the page @param {{part: number} & FrameArrays} old */
+    reuse(old) {
+        const part = this.parts.get(old.part);
+        if (part && part.spare.length < SPARE_MAX && old.positions.length === 3 * part.n)
+            part.spare.push({ positions: old.positions, normals: old.normals });
+    }
+
+    /** @param {Uint8Array} bytes */
+    tools(bytes) {
+        const message = readTools(bytes);
+        this.socket?.send(writeAck({ cycle: message.cycle, decodeUs: this.decodeUs }));
+        this.decodeUs = 0;
+        const mine = message.tools[this.ownTool];
+        const now = this.env.now();
+        if (mine && mine.held && mine.echoSeq && mine.echoSeq !== this.echo && mine.echoSeq <= this.poseSeq) {
+            this.echo = mine.echoSeq;
+            const latency = now - mine.echoStampUs / 1000;
+            if (latency >= 0 && latency < LATENCY_MAX_MS)
+                this.latency = this.latency ? 0.9 * this.latency + 0.1 * latency : latency;
+        }
+        this.env.post({ type: "tools", tools: message.tools });
+        if (now - this.figuresAt > FIGURES_MS) {
+            const figures = {
+                latency_ms: this.latency,
+                rtt_ms: this.rtt,
+                decode_ms: this.nDecoded ? this.decodeSum / this.nDecoded : 0,
+                bytes_s: (1000 * this.bytes) / (now - this.figuresAt),
+            };
+            this.env.post({ type: "figures", figures });
+            this.figuresAt = now;
+            this.bytes = this.nDecoded = this.decodeSum = 0;
+        }
+    }
 }

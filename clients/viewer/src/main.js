@@ -33,7 +33,7 @@ const layout = new Layout();
 const stage = makeStage();
 layout.stage = stage;
 const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
-  post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
+    post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
 );
 const poses = new PoseSender(state, post);
 const fields = new FieldDisplay(state, stage, send, layout);
@@ -42,14 +42,14 @@ const panel = new PlanPanel(document, sendCommand);
 const accuracy = new AccuracyPanel(document, sendCommand);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
-  stage,
-  (ray) => bodies.pick(ray),
-  (target) => {
-    state.target = target;
-    if (!target && layout.pending) layout.place(false);
-    stage.dirty = true;
-    poses.send(true);
-  },
+    stage,
+    (ray) => bodies.pick(ray),
+    (target) => {
+        state.target = target;
+        if (!target && layout.pending) layout.place(false);
+        stage.dirty = true;
+        poses.send(true);
+    },
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
@@ -61,85 +61,90 @@ worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */
 
 /** @returns {Stage} */
 function makeStage() {
-  try {
-    return new Stage(byId("view", HTMLCanvasElement));
-  } catch (error) {
-    layout.connection("refused", "no WebGL 2");
-    layout.notice("This browser does not provide WebGL 2, so the organ cannot be drawn.");
-    throw error;
-  }
+    try {
+        return new Stage(byId("view", HTMLCanvasElement));
+    } catch (error) {
+        layout.connection("refused", "no WebGL 2");
+        layout.notice("This browser does not provide WebGL 2, so the organ cannot be drawn.");
+        throw error;
+    }
 }
 
 /** downloads the shown surfaces as a file @param {string} format key of WRITERS */
 function save(format) {
-  const surfaces = [...state.bodies.values()].map((body) => body.surface());
-  const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
-  const href = URL.createObjectURL(new Blob([WRITERS[format](surfaces)]));
-  Object.assign(document.createElement("a"), { href, download: `${name}.${format}` }).click();
-  setTimeout(() => URL.revokeObjectURL(href), 10000);
+    const surfaces = [...state.bodies.values()].map((body) => body.surface());
+    const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
+    const href = URL.createObjectURL(new Blob([WRITERS[format](surfaces)]));
+    Object.assign(document.createElement("a"), { href, download: `${name}.${format}` }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 10000);
 }
 
 function showForce() {
-  const tool = state.ownToolState();
-  const force = tool && !tool.away ? Math.hypot(...tool.force) : 0;
-  htmlById("force").hidden = !(state.target || force > FORCE_MIN_N);
-  htmlById("force-value").textContent = force.toFixed(2);
+    const tool = state.ownToolState();
+    const force = tool && !tool.away ? Math.hypot(...tool.force) : 0;
+    htmlById("force").hidden = !(state.target || force > FORCE_MIN_N);
+    htmlById("force-value").textContent = force.toFixed(2);
 }
 
 let nDrawn = 0;
 let countedAt = performance.now();
 function draw() {
-  requestAnimationFrame(draw);
-  input.tick();
-  poses.send(false);
-  const now = performance.now();
-  if (stage.ready()) {
-    if (bodies.applyFrames()) {
-      stage.dirty = true;
-      nDrawn++;
+    requestAnimationFrame(draw);
+    input.tick();
+    poses.send(false);
+    const now = performance.now();
+    if (stage.ready()) {
+        if (bodies.applyFrames()) {
+            stage.dirty = true;
+            nDrawn++;
+        }
+        for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
+        if (stage.dirty) {
+            marks.update(
+                state.tools,
+                (id) => state.members.get(id)?.name ?? "",
+                state.ownTool,
+                MARK_RADIUS * stage.size,
+            );
+            stage.draw();
+            bodies.disposeRetired();
+            marks.placeLabels();
+            showForce();
+        }
     }
-    for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
-    if (stage.dirty) {
-      marks.update(state.tools, (id) => state.members.get(id)?.name ?? "", state.ownTool, MARK_RADIUS * stage.size);
-      stage.draw();
-      bodies.disposeRetired();
-      marks.placeLabels();
-      showForce();
+    if (now - countedAt > 1000) {
+        state.figures.fps = (1000 * nDrawn) / (now - countedAt);
+        nDrawn = 0;
+        countedAt = now;
     }
-  }
-  if (now - countedAt > 1000) {
-    state.figures.fps = (1000 * nDrawn) / (now - countedAt);
-    nDrawn = 0;
-    countedAt = now;
-  }
 }
 
 /** @returns {string} */
 function storedName() {
-  try {
-    return localStorage.getItem("palpate.name") ?? "Guest";
-  } catch {
-    return "Guest";
-  }
+    try {
+        return localStorage.getItem("palpate.name") ?? "Guest";
+    } catch {
+        return "Guest";
+    }
 }
 
 function connect() {
-  const query = new URLSearchParams(location.search);
-  const session = query.get("session");
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
-  const role = ROLES.find((known) => known === query.get("role")) ?? "trainee";
-  post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role });
+    const query = new URLSearchParams(location.search);
+    const session = query.get("session");
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
+    const role = ROLES.find((known) => known === query.get("role")) ?? "trainee";
+    post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role });
 }
 
 inputById("name").value = new URLSearchParams(location.search).get("name") ?? storedName();
 inputById("name").onchange = () => {
-  try {
-    localStorage.setItem("palpate.name", inputById("name").value.trim());
-  } catch {
-    // without storage the name lasts as long as the page
-  }
-  connect();
+    try {
+        localStorage.setItem("palpate.name", inputById("name").value.trim());
+    } catch {
+        // without storage the name lasts as long as the page
+    }
+    connect();
 };
 // read-only access for tests and for the console
 Object.defineProperty(window, "palpate", { value: { state, stage, input, accuracy } });

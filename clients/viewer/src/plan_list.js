@@ -18,7 +18,7 @@ const count = (n) => (n < 10000 ? String(n) : n.toLocaleString("en"));
 
 /** @param {number} bytes per second */
 export function rateText(bytes) {
-  return bytes >= 1e6 ? (bytes / 1e6).toFixed(2) + " MB/s" : (bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0) + " kB/s";
+    return bytes >= 1e6 ? (bytes / 1e6).toFixed(2) + " MB/s" : (bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0) + " kB/s";
 }
 
 /**
@@ -26,10 +26,10 @@ export function rateText(bytes) {
  * @param {import("./control_table.js").Activity[]} active @param {{name: string}[]} parts of `hello`
  */
 export function activeText(active, parts) {
-  return active.map((a) => {
-    const name = parts.length > 1 ? `${parts[a.part]?.name ?? a.part}: ` : "";
-    return `${name}${count(a.nodes)} of ${count(a.of_nodes)} nodes, ${count(a.springs)} of ${count(a.of_springs)} springs`;
-  });
+    return active.map((a) => {
+        const name = parts.length > 1 ? `${parts[a.part]?.name ?? a.part}: ` : "";
+        return `${name}${count(a.nodes)} of ${count(a.of_nodes)} nodes, ${count(a.springs)} of ${count(a.of_springs)} springs`;
+    });
 }
 
 /**
@@ -38,22 +38,22 @@ export function activeText(active, parts) {
  * @returns {Component[]}
  */
 export function componentsOf(plan, status) {
-  const key = (/** @type {string} */ name, /** @type {number} */ part) => `${name} ${part}`;
-  const planned = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), i]));
-  const component = (/** @type {string} */ name, /** @type {number} */ part) => {
-    const i = planned.get(key(name, part));
-    // a component that the scene does not plan exists while something needs it, and cannot be disabled
-    if (i === undefined) return { name, part, reason: "", fixed: plan.row_fixed !== undefined, planned: false };
-    return { name, part, reason: plan.row_whys?.[i] ?? "", fixed: plan.row_fixed?.[i] === 1, planned: true };
-  };
-  const now = status?.rows?.length ? status : plan;
-  const on = (now.rows ?? []).map((name, i) => ({
-    ...component(name, now.row_parts?.[i] ?? 0),
-    on: true,
-    index: i,
-  }));
-  const off = (status?.off ?? []).map(({ row, part }) => ({ ...component(row, part), on: false, index: null }));
-  return [...on, ...off];
+    const key = (/** @type {string} */ name, /** @type {number} */ part) => `${name} ${part}`;
+    const planned = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), i]));
+    const component = (/** @type {string} */ name, /** @type {number} */ part) => {
+        const i = planned.get(key(name, part));
+        // a component that the scene does not plan exists while something needs it, and cannot be disabled
+        if (i === undefined) return { name, part, reason: "", fixed: plan.row_fixed !== undefined, planned: false };
+        return { name, part, reason: plan.row_whys?.[i] ?? "", fixed: plan.row_fixed?.[i] === 1, planned: true };
+    };
+    const now = status?.rows?.length ? status : plan;
+    const on = (now.rows ?? []).map((name, i) => ({
+        ...component(name, now.row_parts?.[i] ?? 0),
+        on: true,
+        index: i,
+    }));
+    const off = (status?.off ?? []).map(({ row, part }) => ({ ...component(row, part), on: false, index: null }));
+    return [...on, ...off];
 }
 
 /**
@@ -62,15 +62,17 @@ export function componentsOf(plan, status) {
  * @returns {BodyRemark[]}
  */
 export function bodyRemarks(states, parts) {
-  return states.map(({ part, frozen = false, asleep, why, rescues = 0, rescue_ms = 0 }) => {
-    const text = frozen ? [why || "It left its bounds."] : [];
-    if (rescues) {
-      const ms = rescue_ms.toFixed(rescue_ms < 1 ? 3 : 1);
-      text.push(`${count(rescues)} ${rescues === 1 ? "step" : "steps"} corrected by a safeguard, ${ms} ms in total.`);
-    }
-    const state = frozen ? "stopped" : asleep ? "asleep" : "";
-    return { name: parts[part]?.name ?? String(part), frozen, state, text };
-  });
+    return states.map(({ part, frozen = false, asleep, why, rescues = 0, rescue_ms = 0 }) => {
+        const text = frozen ? [why || "It left its bounds."] : [];
+        if (rescues) {
+            const ms = rescue_ms.toFixed(rescue_ms < 1 ? 3 : 1);
+            text.push(
+                `${count(rescues)} ${rescues === 1 ? "step" : "steps"} corrected by a safeguard, ${ms} ms in total.`,
+            );
+        }
+        const state = frozen ? "stopped" : asleep ? "asleep" : "";
+        return { name: parts[part]?.name ?? String(part), frozen, state, text };
+    });
 }
 
 /**
@@ -78,21 +80,21 @@ export function bodyRemarks(states, parts) {
  * @param {{field: boolean, estimate: boolean, estimates: boolean, unwatched: number}} shown
  */
 export function idleText({ field, estimate, estimates, unwatched }) {
-  const idle = [...(field ? [] : ["field values"]), ...(estimate || !estimates ? [] : ["error estimates"])];
-  const now = idle.length ? `Not displayed, therefore not computed: ${idle.join(", ")}.` : "";
-  const before = unwatched > 0 ? `${count(unwatched)} steps were simulated without any viewer.` : "";
-  return [now, before].filter(Boolean).join(" ");
+    const idle = [...(field ? [] : ["field values"]), ...(estimate || !estimates ? [] : ["error estimates"])];
+    const now = idle.length ? `Not displayed, therefore not computed: ${idle.join(", ")}.` : "";
+    const before = unwatched > 0 ? `${count(unwatched)} steps were simulated without any viewer.` : "";
+    return [now, before].filter(Boolean).join(" ");
 }
 
 /** lengths of bars as shares of the full bar; 0: no bar @param {number[]} ms of components */
 export function barLengths(ms) {
-  const max = Math.max(BAR_MIN_MS, ...ms);
-  return ms.map((v) => (v < SHOWN_MIN_MS ? 0 : v / max));
+    const max = Math.max(BAR_MIN_MS, ...ms);
+    return ms.map((v) => (v < SHOWN_MIN_MS ? 0 : v / max));
 }
 
 /** why a component cannot be disabled @param {Component} component */
 export function fixedReason({ planned }) {
-  return planned
-    ? "Cannot be disabled: it moves the body, outputs it, or is the only one that holds it together."
-    : "Cannot be disabled: it runs while something else needs it.";
+    return planned
+        ? "Cannot be disabled: it moves the body, outputs it, or is the only one that holds it together."
+        : "Cannot be disabled: it runs while something else needs it.";
 }

@@ -14,156 +14,156 @@ const ANSWER_MS = 3000; // a switch is enabled again if the server has not answe
 export const cssColour = (colour) => "#" + colour.toString(16).padStart(6, "0");
 
 export class PlanPanel {
-  /** @param {Document} page @param {(command: Command) => void} send */
-  constructor(page, send) {
-    this.page = page;
-    this.send = send;
-    this.shownRemarks = "";
-    this.figures = htmlById("figures", page);
-    this.bodies = htmlById("bodies", page);
-    this.components = /** @type {HTMLTableSectionElement} */ (page.querySelector("#components tbody"));
-    this.active = htmlById("active", page);
-    this.members = htmlById("members", page);
-    /** @type {Map<string, HTMLElement>} */
-    this.values = new Map();
-    /** @type {{bar: HTMLElement, value: HTMLElement, index: number | null}[]} */
-    this.bars = [];
-  }
-
-  /** @param {string} name @param {string} text */
-  figure(name, text) {
-    let value = this.values.get(name);
-    if (!value) {
-      const term = document.createElement("dt");
-      value = document.createElement("dd");
-      term.textContent = name;
-      this.figures.append(term, value);
-      this.values.set(name, value);
+    /** @param {Document} page @param {(command: Command) => void} send */
+    constructor(page, send) {
+        this.page = page;
+        this.send = send;
+        this.shownRemarks = "";
+        this.figures = htmlById("figures", page);
+        this.bodies = htmlById("bodies", page);
+        this.components = /** @type {HTMLTableSectionElement} */ (page.querySelector("#components tbody"));
+        this.active = htmlById("active", page);
+        this.members = htmlById("members", page);
+        /** @type {Map<string, HTMLElement>} */
+        this.values = new Map();
+        /** @type {{bar: HTMLElement, value: HTMLElement, index: number | null}[]} */
+        this.bars = [];
     }
-    value.textContent = text;
-  }
 
-  /** @param {Component[]} components @param {{name: string}[]} parts @param {boolean} switches may be used */
-  showComponents(components, parts, switches) {
-    this.components.replaceChildren();
-    this.bars = components.map((component) => {
-      const { name, part, reason, on, index } = component;
-      const row = this.components.insertRow();
-      row.title = reason && `Required by ${reason}`;
-      row.className = on ? "" : "off";
-      if (switches) row.append(this.switchOf(component));
-      const title = row.insertCell();
-      title.textContent = name.replaceAll("_", " ");
-      if (parts.length > 1 && parts[part])
-        title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
-      const cell = row.insertCell();
-      cell.className = "bar";
-      const bar = document.createElement("i");
-      if (on) cell.append(bar);
-      const value = row.insertCell();
-      value.textContent = on ? "–" : "off";
-      return { bar, value, index };
-    });
-  }
-
-  /** @param {Component} component */
-  switchOf(component) {
-    const { name, part, on, fixed } = component;
-    const cell = document.createElement("td");
-    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
-    const action = on ? "Disable" : "Enable";
-    cell.className = "switch";
-    box.setAttribute("aria-label", `Component ${name}`);
-    box.disabled = fixed;
-    cell.title = box.title = fixed ? fixedReason(component) : action;
-    box.onchange = () => {
-      this.send({ verb: "row", target: name, args: { part, on: box.checked ? 1 : 0 } });
-      // the box shows the state of the server, which may refuse
-      box.checked = on;
-      box.disabled = true;
-      box.title = "Waiting for the server";
-      setTimeout(() => {
-        box.disabled = false;
-        box.title = action;
-      }, ANSWER_MS);
-    };
-    cell.append(box);
-    return cell;
-  }
-
-  /** @param {import("./plan_list.js").BodyRemark[]} remarks */
-  showBodies(remarks) {
-    const key = JSON.stringify(remarks);
-    if (key === this.shownRemarks) return;
-    this.shownRemarks = key;
-    this.bodies.replaceChildren(
-      ...remarks.map(({ name, frozen, state, text }) => {
-        const item = document.createElement("li");
-        const title = document.createElement("b");
-        item.className = state;
-        if (frozen) item.classList.add("frozen");
-        title.textContent = name;
-        item.append(title, state ? ` ${state}` : "");
-        item.append(...text.map((line) => Object.assign(document.createElement("p"), { textContent: line })));
-        if (frozen) {
-          const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
-          reset.onclick = () => this.send({ verb: "reset", target: name, args: {} });
-          item.append(reset);
+    /** @param {string} name @param {string} text */
+    figure(name, text) {
+        let value = this.values.get(name);
+        if (!value) {
+            const term = document.createElement("dt");
+            value = document.createElement("dd");
+            term.textContent = name;
+            this.figures.append(term, value);
+            this.values.set(name, value);
         }
-        return item;
-      }),
-    );
-  }
-
-  /**
-   * @param {import("./control_table.js").Status} status
-   * @param {import("./app_state.js").AppState["figures"]} figures of this page
-   * @param {{name: string}[]} parts of `hello`
-   */
-  showStatus(status, figures, parts) {
-    const { paused, slowdown } = status;
-    this.figure("steps per second", paused ? "paused" : status.step_rate_hz.toFixed(0));
-    this.figure("speed", paused ? "–" : slowdown <= 1.02 ? "real time" : slowdown.toFixed(2) + " × slower");
-    this.figure("time per step", status.step_ms.toFixed(2) + " ms");
-    this.figure("sub-steps", String(status.substeps));
-    this.figure("round trip", figures.rtt_ms > 0 ? figures.rtt_ms.toFixed(1) + " ms" : "–");
-    this.figure("tool to frame", figures.latency_ms > 0 ? figures.latency_ms.toFixed(1) + " ms" : "–");
-    this.figure("frames drawn", figures.fps.toFixed(0) + " /s");
-    this.figure("frame decoding", figures.decode_ms.toFixed(2) + " ms");
-    this.figure("received", rateText(figures.bytes_s));
-    this.figure("visible vertices", figures.vertices.toLocaleString("en"));
-    this.showActivity(activeText(status.active ?? [], parts));
-    this.showBodies(bodyRemarks(status.parts ?? [], parts));
-    const lengths = barLengths(status.row_ms);
-    for (const { bar, value, index } of this.bars) {
-      if (index === null) continue;
-      bar.style.width = 100 * (lengths[index] ?? 0) + "%";
-      bar.hidden = !lengths[index];
-      value.textContent = (status.row_ms[index] ?? 0).toFixed(3);
+        value.textContent = text;
     }
-  }
 
-  /** @param {string[]} lines */
-  showActivity(lines) {
-    while (this.active.children.length > lines.length) this.active.lastElementChild?.remove();
-    while (this.active.children.length < lines.length) this.active.append(document.createElement("p"));
-    lines.forEach((line, i) => (this.active.children[i].textContent = line));
-  }
+    /** @param {Component[]} components @param {{name: string}[]} parts @param {boolean} switches may be used */
+    showComponents(components, parts, switches) {
+        this.components.replaceChildren();
+        this.bars = components.map((component) => {
+            const { name, part, reason, on, index } = component;
+            const row = this.components.insertRow();
+            row.title = reason && `Required by ${reason}`;
+            row.className = on ? "" : "off";
+            if (switches) row.append(this.switchOf(component));
+            const title = row.insertCell();
+            title.textContent = name.replaceAll("_", " ");
+            if (parts.length > 1 && parts[part])
+                title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
+            const cell = row.insertCell();
+            cell.className = "bar";
+            const bar = document.createElement("i");
+            if (on) cell.append(bar);
+            const value = row.insertCell();
+            value.textContent = on ? "–" : "off";
+            return { bar, value, index };
+        });
+    }
 
-  /** @param {import("./control_table.js").Member[]} members @param {number} ownId */
-  showMembers(members, ownId) {
-    this.members.replaceChildren(
-      ...members.map(({ id, name, role, tool, colour }) => {
-        const item = document.createElement("li");
-        const title = document.createElement("span");
-        const note = document.createElement("small");
-        const holds = (tool ?? -1) >= 0;
-        item.style.color = cssColour(colour);
-        title.textContent = name + (id === ownId ? " (you)" : "");
-        note.textContent = "  " + (holds ? role : role === "viewer" ? "watching" : "no tool");
-        item.append(title, note);
-        return item;
-      }),
-    );
-  }
+    /** @param {Component} component */
+    switchOf(component) {
+        const { name, part, on, fixed } = component;
+        const cell = document.createElement("td");
+        const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
+        const action = on ? "Disable" : "Enable";
+        cell.className = "switch";
+        box.setAttribute("aria-label", `Component ${name}`);
+        box.disabled = fixed;
+        cell.title = box.title = fixed ? fixedReason(component) : action;
+        box.onchange = () => {
+            this.send({ verb: "row", target: name, args: { part, on: box.checked ? 1 : 0 } });
+            // the box shows the state of the server, which may refuse
+            box.checked = on;
+            box.disabled = true;
+            box.title = "Waiting for the server";
+            setTimeout(() => {
+                box.disabled = false;
+                box.title = action;
+            }, ANSWER_MS);
+        };
+        cell.append(box);
+        return cell;
+    }
+
+    /** @param {import("./plan_list.js").BodyRemark[]} remarks */
+    showBodies(remarks) {
+        const key = JSON.stringify(remarks);
+        if (key === this.shownRemarks) return;
+        this.shownRemarks = key;
+        this.bodies.replaceChildren(
+            ...remarks.map(({ name, frozen, state, text }) => {
+                const item = document.createElement("li");
+                const title = document.createElement("b");
+                item.className = state;
+                if (frozen) item.classList.add("frozen");
+                title.textContent = name;
+                item.append(title, state ? ` ${state}` : "");
+                item.append(...text.map((line) => Object.assign(document.createElement("p"), { textContent: line })));
+                if (frozen) {
+                    const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
+                    reset.onclick = () => this.send({ verb: "reset", target: name, args: {} });
+                    item.append(reset);
+                }
+                return item;
+            }),
+        );
+    }
+
+    /**
+     * @param {import("./control_table.js").Status} status
+     * @param {import("./app_state.js").AppState["figures"]} figures of this page
+     * @param {{name: string}[]} parts of `hello`
+     */
+    showStatus(status, figures, parts) {
+        const { paused, slowdown } = status;
+        this.figure("steps per second", paused ? "paused" : status.step_rate_hz.toFixed(0));
+        this.figure("speed", paused ? "–" : slowdown <= 1.02 ? "real time" : slowdown.toFixed(2) + " × slower");
+        this.figure("time per step", status.step_ms.toFixed(2) + " ms");
+        this.figure("sub-steps", String(status.substeps));
+        this.figure("round trip", figures.rtt_ms > 0 ? figures.rtt_ms.toFixed(1) + " ms" : "–");
+        this.figure("tool to frame", figures.latency_ms > 0 ? figures.latency_ms.toFixed(1) + " ms" : "–");
+        this.figure("frames drawn", figures.fps.toFixed(0) + " /s");
+        this.figure("frame decoding", figures.decode_ms.toFixed(2) + " ms");
+        this.figure("received", rateText(figures.bytes_s));
+        this.figure("visible vertices", figures.vertices.toLocaleString("en"));
+        this.showActivity(activeText(status.active ?? [], parts));
+        this.showBodies(bodyRemarks(status.parts ?? [], parts));
+        const lengths = barLengths(status.row_ms);
+        for (const { bar, value, index } of this.bars) {
+            if (index === null) continue;
+            bar.style.width = 100 * (lengths[index] ?? 0) + "%";
+            bar.hidden = !lengths[index];
+            value.textContent = (status.row_ms[index] ?? 0).toFixed(3);
+        }
+    }
+
+    /** @param {string[]} lines */
+    showActivity(lines) {
+        while (this.active.children.length > lines.length) this.active.lastElementChild?.remove();
+        while (this.active.children.length < lines.length) this.active.append(document.createElement("p"));
+        lines.forEach((line, i) => (this.active.children[i].textContent = line));
+    }
+
+    /** @param {import("./control_table.js").Member[]} members @param {number} ownId */
+    showMembers(members, ownId) {
+        this.members.replaceChildren(
+            ...members.map(({ id, name, role, tool, colour }) => {
+                const item = document.createElement("li");
+                const title = document.createElement("span");
+                const note = document.createElement("small");
+                const holds = (tool ?? -1) >= 0;
+                item.style.color = cssColour(colour);
+                title.textContent = name + (id === ownId ? " (you)" : "");
+                note.textContent = "  " + (holds ? role : role === "viewer" ? "watching" : "no tool");
+                item.append(title, note);
+                return item;
+            }),
+        );
+    }
 }

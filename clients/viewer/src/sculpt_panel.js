@@ -10,244 +10,246 @@ const SLIDER_STEPS = 200;
 const STIFFNESS_N_M = 60; // of the spring that pulls a curve
 
 export class SculptPanel {
-  /**
-   * @param {Document} page
-   * @param {(command: Command) => void} send
-   * @param {(format: string) => void} save
-   */
-  constructor(page, send, save) {
-    this.page = page;
-    this.send = send;
-    this.offered = false;
-    this.tool = "extrude";
-    /** @type {number[][]} clicked so far, m */
-    this.points = [];
-    /** @type {Command | null} not answered yet */
-    this.pending = null;
-    this.sentAt = 0;
-    /** @type {Command | null} newest cut, sent when the pending command is answered */
-    this.nextCut = null;
-    /** @type {import("./sculpt_commands.js").Box} */
-    this.box = { low: [0, 0, 0], high: [0, 0, 0] };
-    this.size = 0;
-    /** @type {{tool: string, points: number[][], settings: import("./sculpt_commands.js").Settings} | null} acting force */
-    this.force = null;
-    this.forceChanged = false; // by its slider, since it was sent
-    this.message = htmlById("sculpt-message", page);
-    this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
-    this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
-    this.mark(this.paints, "stiffer");
-    for (const verb of ["keep", "undo", "redo"]) this.button(verb).onclick = () => this.submit({ verb, args: {} });
-    for (const format of ["obj", "stl", "ply"]) this.button(format).onclick = () => save(format);
-    for (const id of ["distance", "radius", "sharp"]) this.slider(id).oninput = () => this.showValues();
-    for (const id of ["pressure", "lift"]) this.slider(id).oninput = () => this.changeForce();
-    this.button("release").onclick = () => this.submit({ verb: "release", args: {} });
-    this.axis = selectById("sculpt-axis", page);
-    this.axis.onchange = this.slider("cut").oninput = () => this.cut();
-    this.choose(this.tool);
-  }
-
-  /** @param {string} name */
-  button(name) {
-    return buttonById("sculpt-" + name, this.page);
-  }
-
-  /** @param {string} name */
-  slider(name) {
-    return inputById("sculpt-" + name, this.page);
-  }
-
-  /**
-   * Creates the buttons of a radio group.
-   * @param {string} id @param {Record<string, {title: string}>} choices @param {(name: string) => void} onChoice
-   * @returns {Map<string, HTMLButtonElement>}
-   */
-  fill(id, choices, onChoice) {
-    const group = htmlById(id, this.page);
-    const buttons = new Map();
-    for (const [name, { title }] of Object.entries(choices)) {
-      const button = this.page.createElement("button");
-      button.textContent = title;
-      button.dataset.name = name;
-      button.setAttribute("role", "radio");
-      button.onclick = () => onChoice(name);
-      group.append(button);
-      buttons.set(name, button);
+    /**
+     * @param {Document} page
+     * @param {(command: Command) => void} send
+     * @param {(format: string) => void} save
+     */
+    constructor(page, send, save) {
+        this.page = page;
+        this.send = send;
+        this.offered = false;
+        this.tool = "extrude";
+        /** @type {number[][]} clicked so far, m */
+        this.points = [];
+        /** @type {Command | null} not answered yet */
+        this.pending = null;
+        this.sentAt = 0;
+        /** @type {Command | null} newest cut, sent when the pending command is answered */
+        this.nextCut = null;
+        /** @type {import("./sculpt_commands.js").Box} */
+        this.box = { low: [0, 0, 0], high: [0, 0, 0] };
+        this.size = 0;
+        /** @type {{tool: string, points: number[][], settings: import("./sculpt_commands.js").Settings} | null} acting force */
+        this.force = null;
+        this.forceChanged = false; // by its slider, since it was sent
+        this.message = htmlById("sculpt-message", page);
+        this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
+        this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
+        this.mark(this.paints, "stiffer");
+        for (const verb of ["keep", "undo", "redo"]) this.button(verb).onclick = () => this.submit({ verb, args: {} });
+        for (const format of ["obj", "stl", "ply"]) this.button(format).onclick = () => save(format);
+        for (const id of ["distance", "radius", "sharp"]) this.slider(id).oninput = () => this.showValues();
+        for (const id of ["pressure", "lift"]) this.slider(id).oninput = () => this.changeForce();
+        this.button("release").onclick = () => this.submit({ verb: "release", args: {} });
+        this.axis = selectById("sculpt-axis", page);
+        this.axis.onchange = this.slider("cut").oninput = () => this.cut();
+        this.choose(this.tool);
     }
-    chooseByArrows(group, () => [...buttons.values()]);
-    return buttons;
-  }
 
-  /** @param {Map<string, HTMLButtonElement>} buttons @param {string} chosen */
-  mark(buttons, chosen) {
-    for (const [name, button] of buttons) markRadio(button, name === chosen);
-  }
-
-  /** @param {string} tool */
-  choose(tool) {
-    this.tool = tool;
-    this.points = [];
-    this.mark(this.tools, tool);
-    for (const row of this.page.querySelectorAll("#sculpt [data-for]"))
-      if (row instanceof HTMLElement) row.hidden = !row.dataset.for?.split(" ").includes(tool);
-    this.hint();
-  }
-
-  hint() {
-    this.message.textContent = TOOLS[this.tool].hints[this.points.length];
-  }
-
-  /** after `hello`, with the box of the scene @param {number[]} low @param {number[]} high */
-  begin(low, high) {
-    this.box = { low, high };
-    this.size = Math.hypot(...low.map((v, i) => high[i] - v));
-    this.pending = this.nextCut = null;
-    this.setForce(null);
-    this.showBusy();
-    this.showValues();
-  }
-
-  /** extends the box by a surface @param {Float32Array} rest [n][3] */
-  grow(rest) {
-    this.box = boxAround(this.box, rest);
-  }
-
-  /** @returns {import("./sculpt_commands.js").Settings} */
-  settings() {
-    const share = (/** @type {string} */ name) => Number(this.slider(name).value) / SLIDER_STEPS;
-    const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
-    return {
-      distance_m: share("distance") * 0.5 * this.size,
-      scale: 1,
-      radius_m: share("radius") * 0.5 * this.size,
-      paint,
-      sharp: Math.round(share("sharp") * 10) / 2,
-      sharpWhat: Number(selectById("sculpt-what", this.page).value),
-      pressure_Pa: 10 ** (1 + 3 * share("pressure")),
-      lift_m: share("lift") * 0.5 * this.size,
-      stiffness_N_m: STIFFNESS_N_M,
-      middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
-    };
-  }
-
-  showValues() {
-    const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
-    const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
-    const show = (/** @type {string} */ name, /** @type {string} */ text) => {
-      htmlById(`sculpt-${name}-value`, this.page).textContent = text;
-    };
-    show("distance", mm(distance_m));
-    show("radius", mm(radius_m));
-    show("sharp", String(sharp));
-    show("pressure", Math.round(pressure_Pa) + " Pa");
-    show("lift", mm(lift_m));
-  }
-
-  /** @param {number[]} point of the surface, m */
-  click(point) {
-    if (this.isBusy()) return;
-    this.points.push(point);
-    const command = commandOf(this.tool, this.settings(), this.points);
-    if (!command) {
-      this.hint();
-      return;
+    /** @param {string} name */
+    button(name) {
+        return buttonById("sculpt-" + name, this.page);
     }
-    if (FORCES.includes(this.tool)) this.setForce({ tool: this.tool, points: this.points, settings: this.settings() });
-    this.points = [];
-    this.submit(command);
-  }
 
-  /** @param {SculptPanel["force"]} force that acts from now on, null: none */
-  setForce(force) {
-    this.force = force;
-    this.forceChanged = false;
-    this.button("release").disabled = !force;
-  }
+    /** @param {string} name */
+    slider(name) {
+        return inputById("sculpt-" + name, this.page);
+    }
 
-  /** a slider changes the acting force: the server takes the same points again as the same brush */
-  changeForce() {
-    this.showValues();
-    if (!this.force) return;
-    const { pressure_Pa, lift_m } = this.settings();
-    Object.assign(this.force.settings, { pressure_Pa, lift_m });
-    this.forceChanged = true;
-    this.sendForce();
-  }
+    /**
+     * Creates the buttons of a radio group.
+     * @param {string} id @param {Record<string, {title: string}>} choices @param {(name: string) => void} onChoice
+     * @returns {Map<string, HTMLButtonElement>}
+     */
+    fill(id, choices, onChoice) {
+        const group = htmlById(id, this.page);
+        const buttons = new Map();
+        for (const [name, { title }] of Object.entries(choices)) {
+            const button = this.page.createElement("button");
+            button.textContent = title;
+            button.dataset.name = name;
+            button.setAttribute("role", "radio");
+            button.onclick = () => onChoice(name);
+            group.append(button);
+            buttons.set(name, button);
+        }
+        chooseByArrows(group, () => [...buttons.values()]);
+        return buttons;
+    }
 
-  sendForce() {
-    if (!this.force || !this.forceChanged || this.isBusy()) return;
-    this.forceChanged = false;
-    const command = commandOf(this.force.tool, this.force.settings, this.force.points);
-    if (command) this.submit(command);
-  }
+    /** @param {Map<string, HTMLButtonElement>} buttons @param {string} chosen */
+    mark(buttons, chosen) {
+        for (const [name, button] of buttons) markRadio(button, name === chosen);
+    }
 
-  /** is a command pending? */
-  isBusy() {
-    return this.pending !== null && performance.now() - this.sentAt < WAIT_MS;
-  }
+    /** @param {string} tool */
+    choose(tool) {
+        this.tool = tool;
+        this.points = [];
+        this.mark(this.tools, tool);
+        for (const row of this.page.querySelectorAll("#sculpt [data-for]"))
+            if (row instanceof HTMLElement) row.hidden = !row.dataset.for?.split(" ").includes(tool);
+        this.hint();
+    }
 
-  /** @param {Command} command */
-  submit(command) {
-    if (this.isBusy()) return;
-    if (command.verb === "release") this.setForce(null);
-    this.pending = command;
-    this.sentAt = performance.now();
-    this.send(command);
-    this.showBusy();
-  }
+    hint() {
+        this.message.textContent = TOOLS[this.tool].hints[this.points.length];
+    }
 
-  cut() {
-    const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
-    const command = cutCommand(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box);
-    this.slider("cut").disabled = command.verb === "uncut";
-    if (this.isBusy()) this.nextCut = command;
-    else this.submit(command);
-  }
+    /** after `hello`, with the box of the scene @param {number[]} low @param {number[]} high */
+    begin(low, high) {
+        this.box = { low, high };
+        this.size = Math.hypot(...low.map((v, i) => high[i] - v));
+        this.pending = this.nextCut = null;
+        this.setForce(null);
+        this.showBusy();
+        this.showValues();
+    }
 
-  /** after `topology`, caused by any member: there may be something to undo, and clicked points mean other faces */
-  changed() {
-    this.points = [];
-    this.setForce(null);
-    this.button("undo").disabled = this.button("redo").disabled = false;
-  }
+    /** extends the box by a surface @param {Float32Array} rest [n][3] */
+    grow(rest) {
+        this.box = boxAround(this.box, rest);
+    }
 
-  /** @param {import("./control_table.js").Answer} answer */
-  answer(answer) {
-    this.finish(answerText(answer));
-    if (answer.args?.can_undo === undefined) return;
-    this.button("undo").disabled = answer.args.can_undo === 0;
-    this.button("redo").disabled = answer.args.can_redo === 0;
-  }
+    /** @returns {import("./sculpt_commands.js").Settings} */
+    settings() {
+        const share = (/** @type {string} */ name) => Number(this.slider(name).value) / SLIDER_STEPS;
+        const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
+        return {
+            distance_m: share("distance") * 0.5 * this.size,
+            scale: 1,
+            radius_m: share("radius") * 0.5 * this.size,
+            paint,
+            sharp: Math.round(share("sharp") * 10) / 2,
+            sharpWhat: Number(selectById("sculpt-what", this.page).value),
+            pressure_Pa: 10 ** (1 + 3 * share("pressure")),
+            lift_m: share("lift") * 0.5 * this.size,
+            stiffness_N_m: STIFFNESS_N_M,
+            middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
+        };
+    }
 
-  /** @param {string} text of an error @returns {boolean} it belongs to this panel */
-  refused(text) {
-    if (!this.pending) return false;
-    if (FORCES.includes(this.pending.verb)) this.setForce(null);
-    this.finish(text);
-    return true;
-  }
+    showValues() {
+        const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
+        const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
+        const show = (/** @type {string} */ name, /** @type {string} */ text) => {
+            htmlById(`sculpt-${name}-value`, this.page).textContent = text;
+        };
+        show("distance", mm(distance_m));
+        show("radius", mm(radius_m));
+        show("sharp", String(sharp));
+        show("pressure", Math.round(pressure_Pa) + " Pa");
+        show("lift", mm(lift_m));
+    }
 
-  /** @param {string} text */
-  finish(text) {
-    this.pending = null;
-    this.showBusy();
-    this.message.textContent = text;
-    const cut = this.nextCut;
-    this.nextCut = null;
-    if (cut) this.submit(cut);
-    else this.sendForce();
-  }
+    /** @param {number[]} point of the surface, m */
+    click(point) {
+        if (this.isBusy()) return;
+        this.points.push(point);
+        const command = commandOf(this.tool, this.settings(), this.points);
+        if (!command) {
+            this.hint();
+            return;
+        }
+        if (FORCES.includes(this.tool))
+            this.setForce({ tool: this.tool, points: this.points, settings: this.settings() });
+        this.points = [];
+        this.submit(command);
+    }
 
-  showBusy() {
-    htmlById("sculpt", this.page).setAttribute("aria-busy", String(this.pending !== null));
-  }
+    /** @param {SculptPanel["force"]} force that acts from now on, null: none */
+    setForce(force) {
+        this.force = force;
+        this.forceChanged = false;
+        this.button("release").disabled = !force;
+    }
 
-  /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} the key is one of them */
-  key(e) {
-    const typing = e.target instanceof HTMLInputElement && e.target.type !== "range";
-    if (!this.offered || !(e.ctrlKey || e.metaKey) || e.altKey || e.repeat || e.key.toLowerCase() !== "z") return false;
-    if (typing) return false;
-    this.submit({ verb: e.shiftKey ? "redo" : "undo", args: {} });
-    return true;
-  }
+    /** a slider changes the acting force: the server takes the same points again as the same brush */
+    changeForce() {
+        this.showValues();
+        if (!this.force) return;
+        const { pressure_Pa, lift_m } = this.settings();
+        Object.assign(this.force.settings, { pressure_Pa, lift_m });
+        this.forceChanged = true;
+        this.sendForce();
+    }
+
+    sendForce() {
+        if (!this.force || !this.forceChanged || this.isBusy()) return;
+        this.forceChanged = false;
+        const command = commandOf(this.force.tool, this.force.settings, this.force.points);
+        if (command) this.submit(command);
+    }
+
+    /** is a command pending? */
+    isBusy() {
+        return this.pending !== null && performance.now() - this.sentAt < WAIT_MS;
+    }
+
+    /** @param {Command} command */
+    submit(command) {
+        if (this.isBusy()) return;
+        if (command.verb === "release") this.setForce(null);
+        this.pending = command;
+        this.sentAt = performance.now();
+        this.send(command);
+        this.showBusy();
+    }
+
+    cut() {
+        const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
+        const command = cutCommand(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box);
+        this.slider("cut").disabled = command.verb === "uncut";
+        if (this.isBusy()) this.nextCut = command;
+        else this.submit(command);
+    }
+
+    /** after `topology`, caused by any member: there may be something to undo, and clicked points mean other faces */
+    changed() {
+        this.points = [];
+        this.setForce(null);
+        this.button("undo").disabled = this.button("redo").disabled = false;
+    }
+
+    /** @param {import("./control_table.js").Answer} answer */
+    answer(answer) {
+        this.finish(answerText(answer));
+        if (answer.args?.can_undo === undefined) return;
+        this.button("undo").disabled = answer.args.can_undo === 0;
+        this.button("redo").disabled = answer.args.can_redo === 0;
+    }
+
+    /** @param {string} text of an error @returns {boolean} it belongs to this panel */
+    refused(text) {
+        if (!this.pending) return false;
+        if (FORCES.includes(this.pending.verb)) this.setForce(null);
+        this.finish(text);
+        return true;
+    }
+
+    /** @param {string} text */
+    finish(text) {
+        this.pending = null;
+        this.showBusy();
+        this.message.textContent = text;
+        const cut = this.nextCut;
+        this.nextCut = null;
+        if (cut) this.submit(cut);
+        else this.sendForce();
+    }
+
+    showBusy() {
+        htmlById("sculpt", this.page).setAttribute("aria-busy", String(this.pending !== null));
+    }
+
+    /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} the key is one of them */
+    key(e) {
+        const typing = e.target instanceof HTMLInputElement && e.target.type !== "range";
+        if (!this.offered || !(e.ctrlKey || e.metaKey) || e.altKey || e.repeat || e.key.toLowerCase() !== "z")
+            return false;
+        if (typing) return false;
+        this.submit({ verb: e.shiftKey ? "redo" : "undo", args: {} });
+        return true;
+    }
 }

@@ -10,32 +10,32 @@ import { Link, REPEAT_MS } from "./link.js";
  */
 const scope = /** @type {WorkerScope} */ (/** @type {unknown} */ (globalThis));
 const link = new Link({
-  open: (url, protocol) => new WebSocket(url, protocol),
-  get: async (url) => {
-    const response = await fetch(url);
-    if (!response.ok) throw new Error(`${url}: ${response.status}`);
-    return response.arrayBuffer();
-  },
-  post: (message, transfer) => scope.postMessage(message, transfer ?? []),
-  now: () => performance.now(),
-  later: (call, ms) => setTimeout(call, ms),
+    open: (url, protocol) => new WebSocket(url, protocol),
+    get: async (url) => {
+        const response = await fetch(url);
+        if (!response.ok) throw new Error(`${url}: ${response.status}`);
+        return response.arrayBuffer();
+    },
+    post: (message, transfer) => scope.postMessage(message, transfer ?? []),
+    now: () => performance.now(),
+    later: (call, ms) => setTimeout(call, ms),
 });
 setInterval(() => link.repeatPose(), REPEAT_MS);
 
 scope.onmessage = (/** @type {MessageEvent<WorkerMessage>} */ { data }) => {
-  switch (data.type) {
-    case "connect":
-      link.connect(data);
-      break;
-    case "pose":
-      link.ownTool = data.tool;
-      link.pose(data);
-      break;
-    case "control":
-      link.send(data.message);
-      break;
-    case "reuse":
-      link.reuse(data);
-      break;
-  }
+    switch (data.type) {
+        case "connect":
+            link.connect(data);
+            break;
+        case "pose":
+            link.ownTool = data.tool;
+            link.pose(data);
+            break;
+        case "control":
+            link.send(data.message);
+            break;
+        case "reuse":
+            link.reuse(data);
+            break;
+    }
 };

@@ -23,7 +23,7 @@ typedef struct builder {
     int32_t *stamp; /* per vertex: scratch                                             */
     int32_t *last;  /* per edge, per edge use and per loop: scratch                    */
     size_t mask;
-    pal_note *note;
+    pal_diagnostic *diag;
 } builder;
 
 /* ---- messages ---- */
@@ -63,28 +63,28 @@ static place place_of(const int64_t *line, int32_t i)
 static pal_err __attribute__((format(printf, 3, 4)))
 refuse_loop(const builder *b, int32_t loop, const char *format, ...)
 {
-    if (!b->note) return PAL_ERR_REFUSED;
+    if (!b->diag) return PAL_ERR_REFUSED;
     char sentence[320];
     va_list list;
     va_start(list, format);
     vsnprintf(sentence, sizeof sentence, format, list);
     va_end(list);
     int32_t cell = cell_of_loop(b->in, loop);
-    return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: cell %d, face %d: %s", place_of(b->in->line, loop).text,
-                        shown(b, cell), shown(b, loop - b->in->cell[cell]), sentence);
+    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d, face %d: %s", place_of(b->in->line, loop).text,
+                              shown(b, cell), shown(b, loop - b->in->cell[cell]), sentence);
 }
 
 static pal_err __attribute__((format(printf, 3, 4)))
 refuse_cell(const builder *b, int32_t cell, const char *format, ...)
 {
-    if (!b->note) return PAL_ERR_REFUSED;
+    if (!b->diag) return PAL_ERR_REFUSED;
     char sentence[320];
     va_list list;
     va_start(list, format);
     vsnprintf(sentence, sizeof sentence, format, list);
     va_end(list);
-    return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: cell %d %s", place_of(b->in->line, b->in->cell[cell]).text,
-                        shown(b, cell), sentence);
+    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d %s", place_of(b->in->line, b->in->cell[cell]).text,
+                              shown(b, cell), sentence);
 }
 
 /* ---- what is given ---- */
@@ -92,17 +92,17 @@ refuse_cell(const builder *b, int32_t cell, const char *format, ...)
 static pal_err check_counts(const builder *b)
 {
     const pal_cell_loops *in = b->in;
-    pal_note *note = b->note;
+    pal_diagnostic *diag = b->diag;
     if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > MOST_ITEMS || in->n_cell > MOST_ITEMS)
-        return pal_note_set(note, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
-                            in->n_vertex, in->n_cell, MOST_ITEMS);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
+                                  in->n_vertex, in->n_cell, MOST_ITEMS);
     for (int32_t c = 0; c < in->n_cell; c++)
         if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > MOST_ITEMS)
-            return pal_note_set(note, PAL_ERR_REFUSED, "cells: cell %d has no faces", shown(b, c));
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", shown(b, c));
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
-        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MOST || in->loop[l + 1] > MOST_ITEMS)
-            return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MOST);
+        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > MOST_ITEMS)
+            return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
     }
     return PAL_ERR_OK;
 }
@@ -119,9 +119,9 @@ static pal_err check_corners(const builder *b)
     for (int32_t v = 0; v < in->n_vertex; v++) {
         const double *x = in->x + 3 * (size_t)v;
         if (!in_reach(x))
-            return pal_note_set(b->note, PAL_ERR_REFUSED,
-                                "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
-                                place_of(in->vertex_line, v).text, shown(b, v), x[0], x[1], x[2], FARTHEST_M);
+            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED,
+                                      "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
+                                      place_of(in->vertex_line, v).text, shown(b, v), x[0], x[1], x[2], FARTHEST_M);
         b->stamp[v] = -1;
     }
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
@@ -134,14 +134,14 @@ static pal_err check_corners(const builder *b)
         }
     for (int32_t v = 0; v < in->n_vertex; v++)
         if (b->stamp[v] < 0)
-            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
-                                place_of(in->vertex_line, v).text, shown(b, v));
+            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
+                                      place_of(in->vertex_line, v).text, shown(b, v));
     return PAL_ERR_OK;
 }
 
 static bool sharp_fits(float s)
 {
-    return s >= 0 && s <= PAL_SHARP_EVER;
+    return s >= 0 && s <= PAL_SHARPNESS_MAX;
 }
 
 /* ---- memory ---- */
@@ -157,7 +157,7 @@ static pal_err get_memory(builder *b)
     b->mask--;
     b->last = malloc(n_corner * sizeof *b->last);
     c->x = malloc(n_vertex * 3 * sizeof *c->x);
-    c->vertex_sharp = calloc(n_vertex, sizeof *c->vertex_sharp);
+    c->vertex_sharpness = calloc(n_vertex, sizeof *c->vertex_sharpness);
     c->vertex_boundary = calloc(n_vertex, sizeof *c->vertex_boundary);
     c->vertex_pinched = calloc(n_vertex, sizeof *c->vertex_pinched);
     c->edge = malloc(n_corner * sizeof *c->edge);
@@ -165,7 +165,7 @@ static pal_err get_memory(builder *b)
     c->cell_use = malloc(((size_t)in->n_cell + 1) * sizeof *c->cell_use);
     c->face_use = malloc((n_loop + 1) * sizeof *c->face_use);
     c->edge_use = malloc(n_corner * sizeof *c->edge_use);
-    return b->table && b->last && c->x && c->vertex_sharp && c->vertex_boundary && c->vertex_pinched && c->edge &&
+    return b->table && b->last && c->x && c->vertex_sharpness && c->vertex_boundary && c->vertex_pinched && c->edge &&
                    c->face && c->cell_use && c->face_use && c->edge_use
                ? PAL_ERR_OK
                : PAL_ERR_MEMORY;
@@ -324,7 +324,7 @@ static pal_err join_radials(builder *b, int32_t cell)
             continue;
         }
         pal_edge_use *o = &c->edge_use[other];
-        int32_t v = shown(b, use->vertex), w = shown(b, pal_cells_far(c, u));
+        int32_t v = shown(b, use->vertex), w = shown(b, pal_cells_end_vertex(c, u));
         if (o->radial >= 0)
             return refuse_loop(b, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
         if (o->vertex == use->vertex)
@@ -337,7 +337,7 @@ static pal_err join_radials(builder *b, int32_t cell)
         if (c->edge_use[u].radial < 0)
             return refuse_loop(b, c->edge_use[u].face_use,
                                "no other face of the cell at the edge of vertices %d and %d: it is not closed",
-                               shown(b, c->edge_use[u].vertex), shown(b, pal_cells_far(c, u)));
+                               shown(b, c->edge_use[u].vertex), shown(b, pal_cells_end_vertex(c, u)));
     return PAL_ERR_OK;
 }
 
@@ -507,7 +507,7 @@ static void find_pinched(builder *b)
         int32_t v = c->edge_use[u].vertex, at = u;
         do {
             seen[at] = 1;
-            at = pal_cells_over(c, pal_cells_prev(c, at));
+            at = pal_cells_across_edge(c, pal_cells_prev(c, at));
         } while (at != u);
         if (b->stamp[v]++) c->vertex_pinched[v] = true;
     }
@@ -569,12 +569,12 @@ static pal_err set_sharpness(builder *b)
 {
     const pal_cell_loops *in = b->in;
     pal_cells *c = b->c;
-    for (int32_t v = 0; in->vertex_sharp && v < c->n_vertex; v++) {
-        c->vertex_sharp[v] = in->vertex_sharp[v];
-        if (!sharp_fits(in->vertex_sharp[v]))
-            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
-                                place_of(in->vertex_line, v).text, shown(b, v), (double)in->vertex_sharp[v],
-                                (double)PAL_SHARP_EVER);
+    for (int32_t v = 0; in->vertex_sharpness && v < c->n_vertex; v++) {
+        c->vertex_sharpness[v] = in->vertex_sharpness[v];
+        if (!sharp_fits(in->vertex_sharpness[v]))
+            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
+                                      place_of(in->vertex_line, v).text, shown(b, v), (double)in->vertex_sharpness[v],
+                                      (double)PAL_SHARPNESS_MAX);
     }
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t e = 0; in->n_edge_tag > 0 && e < c->n_edge; e++)
@@ -583,19 +583,20 @@ static pal_err set_sharpness(builder *b)
         const pal_cell_tag *tag = &in->edge_tag[k];
         int32_t e = b->table[edge_place(b, tag->a, tag->b)] - 1;
         if (e < 0 || !sharp_fits(tag->sharp))
-            return pal_note_set(b->note, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
-                                place_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
-                                (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
+            return pal_diagnostic_set(
+                b->diag, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
+                place_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
+                (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
         c->edge[e].sharp = fmaxf(c->edge[e].sharp, tag->sharp);
     }
     for (int32_t k = 0; k < in->n_face_tag; k++) {
         const pal_cell_tag *tag = &in->face_tag[k];
         if (tag->a < 0 || tag->a >= c->n_face_use)
-            return pal_note_set(b->note, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
-                                (long long)tag->a, c->n_face_use);
+            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
+                                      (long long)tag->a, c->n_face_use);
         if (!sharp_fits(tag->sharp))
             return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
-                               (double)PAL_SHARP_EVER);
+                               (double)PAL_SHARPNESS_MAX);
         pal_cell_face *face = &c->face[c->face_use[tag->a].face];
         face->sharp = fmaxf(face->sharp, tag->sharp);
     }
@@ -640,26 +641,26 @@ static pal_err build(builder *b)
 static pal_err check_shape(const builder *b)
 {
     pal_cells_fault fault;
-    if (pal_cells_shape_good(b->c, NULL, &fault)) return PAL_ERR_OK;
+    if (pal_cells_shape_valid(b->c, NULL, &fault)) return PAL_ERR_OK;
     if (fault.face_use >= 0)
         return refuse_loop(b, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
-                           fault.size_m);
+                           fault.length_scale_m);
     return refuse_cell(b, fault.cell,
                        "has no positive volume (%.3g m^3, %.3g m across): its faces must run "
                        "counter-clockwise seen from outside",
-                       fault.measure, fault.size_m);
+                       fault.measure, fault.length_scale_m);
 }
 
-pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_note *note)
+pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag)
 {
     pal_cells cells = {0};
-    builder b = {.in = loops, .c = &cells, .note = note};
+    builder b = {.in = loops, .c = &cells, .diag = diag};
     pal_err err = build(&b);
     if (!err) err = check_shape(&b);
     free(b.table);
     free(b.stamp);
     free(b.last);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "cells: no memory for %d cells", loops->n_cell);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "cells: no memory for %d cells", loops->n_cell);
     if (err)
         pal_cells_free(&cells);
     else

@@ -8,10 +8,10 @@
 typedef struct checker {
     const pal_cells *c;
     int32_t *stamp; /* scratch [n_vertex] */
-    pal_note *note;
+    pal_diagnostic *diag;
 } checker;
 
-#define WRONG(...) return pal_note_set(k->note, PAL_ERR_REFUSED, __VA_ARGS__)
+#define WRONG(...) return pal_diagnostic_set(k->diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 static bool within(int32_t i, int32_t n)
 {
@@ -33,7 +33,7 @@ static pal_err check_uses(const checker *k)
     for (int32_t f = 0; f < c->n_face_use; f++) {
         const pal_face_use *use = &c->face_use[f];
         int32_t n = use[1].first_use - use->first_use;
-        if (!within(use->face, c->n_face) || (use->sign != 1 && use->sign != -1) || n < 3 || n > PAL_CELL_LOOP_MOST ||
+        if (!within(use->face, c->n_face) || (use->sign != 1 && use->sign != -1) || n < 3 || n > PAL_CELL_LOOP_MAX ||
             use[1].first_use > c->n_edge_use || c->face[use->face].use[use->sign < 0] != f ||
             c->face[use->face].use[use->sign > 0] != use->mate)
             WRONG("cells: face use %d does not fit face %d", f, use->face);
@@ -45,7 +45,7 @@ static pal_err check_uses(const checker *k)
     for (int32_t f = 0; f < c->n_face; f++)
         if (!within(c->face[f].use[0], c->n_face_use) || c->face_use[c->face[f].use[0]].face != f ||
             (c->face[f].use[1] >= 0 && c->face[f].use[1] <= c->face[f].use[0]) ||
-            !(c->face[f].sharp >= 0 && c->face[f].sharp <= PAL_SHARP_EVER))
+            !(c->face[f].sharp >= 0 && c->face[f].sharp <= PAL_SHARPNESS_MAX))
             WRONG("cells: face %d does not fit its uses %d and %d, or its sharpness %g", f, c->face[f].use[0],
                   c->face[f].use[1], (double)c->face[f].sharp);
     return PAL_ERR_OK;
@@ -153,7 +153,7 @@ static pal_err check_corners(const checker *k)
     for (int32_t n = 0; n < c->cell_vertex.start[c->n_cell]; n++) {
         int32_t u = c->corner_use[n];
         do {
-            u = pal_cells_turn(c, u), n_seen++;
+            u = pal_cells_next_around(c, u), n_seen++;
         } while (u != c->corner_use[n]);
     }
     if (n_seen != c->n_edge_use)
@@ -178,7 +178,7 @@ static pal_err check_marks(const checker *k)
         for (int32_t i = c->edge_face.start[e]; i < c->edge_face.start[e + 1]; i++)
             n += pal_cells_face_boundary(c, c->edge_face.item[i]);
         if (n % 2 || c->edge[e].boundary != (n > 0) || c->edge[e].pinched != (n > 2) ||
-            !(c->edge[e].sharp >= 0 && c->edge[e].sharp <= PAL_SHARP_EVER))
+            !(c->edge[e].sharp >= 0 && c->edge[e].sharp <= PAL_SHARPNESS_MAX))
             WRONG("cells: edge %d has %d boundary faces and sharpness %g, which its marks do not say", e, n,
                   (double)c->edge[e].sharp);
         n_edge += n > 2;
@@ -188,8 +188,8 @@ static pal_err check_marks(const checker *k)
         for (int32_t i = c->vertex_face.start[v]; i < c->vertex_face.start[v + 1]; i++)
             boundary |= pal_cells_face_boundary(c, c->vertex_face.item[i]);
         if (c->vertex_boundary[v] != boundary || (c->vertex_pinched[v] && !boundary) ||
-            !(c->vertex_sharp[v] >= 0 && c->vertex_sharp[v] <= PAL_SHARP_EVER))
-            WRONG("cells: vertex %d has marks or a sharpness of %g that do not fit", v, (double)c->vertex_sharp[v]);
+            !(c->vertex_sharpness[v] >= 0 && c->vertex_sharpness[v] <= PAL_SHARPNESS_MAX))
+            WRONG("cells: vertex %d has marks or a sharpness of %g that do not fit", v, (double)c->vertex_sharpness[v]);
         n_vertex += c->vertex_pinched[v];
     }
     if (n_face != c->n_boundary_face || n_edge != c->n_pinched_edge || n_vertex != c->n_pinched_vertex)
@@ -201,17 +201,17 @@ static pal_err check_marks(const checker *k)
 static pal_err check_positions(const checker *k, const double *x)
 {
     pal_cells_fault fault;
-    if (pal_cells_shape_good(k->c, x, &fault)) return PAL_ERR_OK;
+    if (pal_cells_shape_valid(k->c, x, &fault)) return PAL_ERR_OK;
     if (fault.face_use < 0)
         WRONG("cells: cell %d has no positive volume (%.3g m^3, %.3g m across)", fault.cell, fault.measure,
-              fault.size_m);
+              fault.length_scale_m);
     WRONG("cells: face %d of cell %d has no area (%.3g m^2, longest edge %.3g m)",
-          fault.face_use - k->c->cell_use[fault.cell], fault.cell, fault.measure, fault.size_m);
+          fault.face_use - k->c->cell_use[fault.cell], fault.cell, fault.measure, fault.length_scale_m);
 }
 
-pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_note *note)
+pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_diagnostic *diag)
 {
-    checker checker_of = {.c = cells, .note = note}, *k = &checker_of;
+    checker checker_of = {.c = cells, .diag = diag}, *k = &checker_of;
     if (cells->n_cell < 1 || cells->n_vertex < 1) WRONG("cells: there are none");
     k->stamp = malloc((size_t)cells->n_vertex * sizeof *k->stamp);
     if (!k->stamp) return PAL_ERR_MEMORY;

@@ -6,7 +6,7 @@
  * cell is divided as if it had not been cut, with the vertices that are there, so that dividing all cells one after the
  * other makes the same complex as a level of subdivision. One that is cut twice is divided as it stands. */
 #include "server/base/vec3.h"
-#include "server/mesh/cells/cell_edit_parts.h"
+#include "server/mesh/cells/cell_edit_work.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,7 +17,7 @@
 enum role { CORNER, HANGING, CENTRE };
 
 /* The cell that is divided, as it was before its neighbours were. Of all vertices, edges and faces, by old number: */
-typedef struct shell {
+typedef struct adaptive {
     const pal_cells *c;
     int32_t cell, n_vertex;
     int32_t *edge;   /* new vertex in the middle of an edge that is cut; -1: it is not             [n_edge]   */
@@ -31,9 +31,9 @@ typedef struct shell {
     int32_t *mid;
     int32_t *centre; /* vertex in the middle of each side, new or old */
     float *sharp;    /* of the face at each corner                    */
-} shell;
+} adaptive;
 
-static void shell_free(shell *s)
+static void shell_free(adaptive *s)
 {
     free(s->edge);
     free(s->face);
@@ -46,10 +46,10 @@ static void shell_free(shell *s)
     free(s->sharp);
 }
 
-static pal_err shell_room(const pal_cells *c, int32_t cell, shell *s)
+static pal_err shell_room(const pal_cells *c, int32_t cell, adaptive *s)
 {
     size_t n_use = (size_t)(c->face_use[c->cell_use[cell + 1]].first_use - c->face_use[c->cell_use[cell]].first_use);
-    *s = (shell){.c = c, .cell = cell, .n_vertex = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell]};
+    *s = (adaptive){.c = c, .cell = cell, .n_vertex = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell]};
     s->edge = malloc((size_t)c->n_edge * sizeof *s->edge);
     s->face = malloc((size_t)c->n_face * sizeof *s->face);
     s->role = calloc((size_t)c->n_vertex, sizeof *s->role);
@@ -81,23 +81,23 @@ static bool is_midpoint(const pal_cells *c, int32_t v, int32_t a, int32_t b)
 
 static int32_t quad_far(const pal_cells *c, int32_t use)
 {
-    return pal_cells_far(c, pal_cells_next(c, use));
+    return pal_cells_end_vertex(c, pal_cells_next(c, use));
 }
 
 /* quads of the cell round the vertex where use starts, none yet of another centre, with it in their middle? */
-static bool is_centre(const shell *s, int32_t use)
+static bool is_centre(const adaptive *s, int32_t use)
 {
     const pal_cells *c = s->c;
     double mean[3] = {0}, size = 0;
     int32_t u = use, n = 0;
     do {
         const pal_face_use *f = &c->face_use[c->edge_use[u].face_use];
-        int32_t turned = pal_cells_turn(c, u);
+        int32_t turned = pal_cells_next_around(c, u);
         if (f[1].first_use - f->first_use != 4 || s->face[f->face] >= 0) return false;
         const pal_face_use *g = &c->face_use[c->edge_use[turned].face_use];
         if (g[1].first_use - g->first_use != 4) return false;
         /* quad_far is the corner beyond; the vertex between this quad and the next is where the turned use ends */
-        if (!is_midpoint(c, pal_cells_far(c, turned), quad_far(c, u), quad_far(c, turned))) return false;
+        if (!is_midpoint(c, pal_cells_end_vertex(c, turned), quad_far(c, u), quad_far(c, turned))) return false;
         pal_add3(mean, mean, at(c, quad_far(c, u)));
         n++, u = turned;
     } while (u != use);
@@ -108,7 +108,7 @@ static bool is_centre(const shell *s, int32_t use)
 }
 
 /* the edge use of the cell that starts at one of its vertices */
-static int32_t corner_use(const shell *s, int32_t vertex)
+static int32_t corner_use(const adaptive *s, int32_t vertex)
 {
     int32_t k = s->c->cell_vertex.start[s->cell];
     while (s->c->cell_vertex.item[k] != vertex) k++;
@@ -116,34 +116,34 @@ static int32_t corner_use(const shell *s, int32_t vertex)
 }
 
 /* gives the faces round a vertex to it as their centre, or takes them back (-1) */
-static void claim_faces(shell *s, int32_t use, int32_t centre)
+static void claim_faces(adaptive *s, int32_t use, int32_t centre)
 {
     int32_t u = use;
     s->role[s->c->edge_use[use].vertex] = centre < 0 ? CORNER : CENTRE;
     do {
         s->face[pal_cells_face_of(s->c, u)] = centre;
-        u = pal_cells_turn(s->c, u);
+        u = pal_cells_next_around(s->c, u);
     } while (u != use);
 }
 
 /* joined, but for centres, to two vertices only that do not hang themselves, and in their middle? */
-static bool hangs(const shell *s, int32_t use)
+static bool hangs(const adaptive *s, int32_t use)
 {
     const pal_cells *c = s->c;
     int32_t u = use, end[2], n = 0;
     do {
-        int32_t far = pal_cells_far(c, u);
+        int32_t far = pal_cells_end_vertex(c, u);
         if (s->role[far] != CENTRE) {
             if (n == 2 || s->role[far] == HANGING) return false;
             end[n++] = far;
         }
-        u = pal_cells_turn(c, u);
+        u = pal_cells_next_around(c, u);
     } while (u != use);
     return n == 2 && is_midpoint(c, c->edge_use[use].vertex, end[0], end[1]);
 }
 
 /* marks what hangs; false with the role taken back where a centre's neighbour does not */
-static bool settle_roles(shell *s)
+static bool settle_roles(adaptive *s)
 {
     const pal_cells *c = s->c;
     for (int32_t i = 0; i < s->n_vertex; i++)
@@ -154,11 +154,11 @@ static bool settle_roles(shell *s)
         if (s->role[s->order[i]] != CENTRE) continue;
         int32_t use = corner_use(s, s->order[i]), u = use;
         do {
-            if (s->role[pal_cells_far(c, u)] != HANGING) {
+            if (s->role[pal_cells_end_vertex(c, u)] != HANGING) {
                 claim_faces(s, use, -1);
                 return false;
             }
-            u = pal_cells_turn(c, u);
+            u = pal_cells_next_around(c, u);
         } while (u != use);
     }
     return true;
@@ -171,7 +171,7 @@ static int descending(const void *a, const void *b)
 }
 
 /* roles of the vertices, later ones first: of two cuts, the finer */
-static void find_roles(shell *s)
+static void find_roles(adaptive *s)
 {
     const pal_cells *c = s->c;
     memset(s->edge, -1, (size_t)c->n_edge * sizeof *s->edge);
@@ -189,7 +189,7 @@ static void find_roles(shell *s)
 /* ---- sides, and the numbers and rows of new vertices ---- */
 
 /* a vertex of the open side, in order; hanging ones go between */
-static void put_side_vertex(shell *s, int32_t vertex, float sharp)
+static void put_side_vertex(adaptive *s, int32_t vertex, float sharp)
 {
     int32_t *end = &s->start[s->n_side + 1];
     if (s->role[vertex] == HANGING) {
@@ -204,7 +204,7 @@ static void put_side_vertex(shell *s, int32_t vertex, float sharp)
     (*end)++;
 }
 
-static void end_side(shell *s, int32_t centre)
+static void end_side(adaptive *s, int32_t centre)
 {
     if (s->centre[s->n_side] >= 0) s->mid[s->start[s->n_side + 1] - 1] = s->centre[s->n_side];
     s->centre[s->n_side] = centre;
@@ -214,7 +214,7 @@ static void end_side(shell *s, int32_t centre)
 }
 
 /* sides of the cell: faces that are whole, then those round centres; face is -1 for all after that */
-static void list_sides(shell *s)
+static void list_sides(adaptive *s)
 {
     const pal_cells *c = s->c;
     s->start[0] = s->start[1] = 0, s->centre[0] = -1;
@@ -230,8 +230,8 @@ static void list_sides(shell *s)
         int32_t use = corner_use(s, s->order[i]), u = use;
         do {
             put_side_vertex(s, quad_far(c, u), c->face[pal_cells_face_of(c, u)].sharp);
-            u = pal_cells_turn(c, u);
-            put_side_vertex(s, pal_cells_far(c, u), 0);
+            u = pal_cells_next_around(c, u);
+            put_side_vertex(s, pal_cells_end_vertex(c, u), 0);
         } while (u != use);
         end_side(s, s->order[i]);
     }
@@ -239,15 +239,15 @@ static void list_sides(shell *s)
 }
 
 /* the edge of the cell between two of its vertices */
-static int32_t edge_between(const shell *s, int32_t a, int32_t b)
+static int32_t edge_between(const adaptive *s, int32_t a, int32_t b)
 {
     int32_t u = corner_use(s, a);
-    while (pal_cells_far(s->c, u) != b) u = pal_cells_turn(s->c, u);
+    while (pal_cells_end_vertex(s->c, u) != b) u = pal_cells_next_around(s->c, u);
     return s->c->edge_use[u].edge;
 }
 
 /* new vertices after the old: edges, faces, the middle, each with its row, the mean of its corners */
-static void put_middles(pal_edit_work *w, shell *s)
+static void put_middles(pal_edit_work *w, adaptive *s)
 {
     const pal_cells *c = s->c;
     int32_t n = c->n_vertex, n_corner = 0;
@@ -259,9 +259,9 @@ static void put_middles(pal_edit_work *w, shell *s)
         int32_t e = edge_between(s, s->corner[i], next);
         if (s->edge[e] < 0) {
             s->edge[e] = n++;
-            pal_row_add(&w->rows, s->corner[i], 0.5);
-            pal_row_add(&w->rows, next, 0.5);
-            pal_row_end(&w->rows);
+            pal_interpolation_builder_add(&w->rows, s->corner[i], 0.5);
+            pal_interpolation_builder_add(&w->rows, next, 0.5);
+            pal_interpolation_builder_end_row(&w->rows);
         }
         s->mid[i] = s->edge[e];
     }
@@ -270,14 +270,15 @@ static void put_middles(pal_edit_work *w, shell *s)
         if (s->centre[side] >= 0) continue;
         s->face[-2 - s->centre[side]] = n;
         s->centre[side] = n++;
-        for (int32_t i = first; i < after; i++) pal_row_add(&w->rows, s->corner[i], 1.0 / (after - first));
-        pal_row_end(&w->rows);
+        for (int32_t i = first; i < after; i++)
+            pal_interpolation_builder_add(&w->rows, s->corner[i], 1.0 / (after - first));
+        pal_interpolation_builder_end_row(&w->rows);
     }
     s->middle = n;
     for (int32_t i = 0; i < s->n_vertex; i++) n_corner += s->role[s->order[i]] == CORNER;
     for (int32_t i = 0; i < s->n_vertex; i++)
-        if (s->role[s->order[i]] == CORNER) pal_row_add(&w->rows, s->order[i], 1.0 / n_corner);
-    pal_row_end(&w->rows);
+        if (s->role[s->order[i]] == CORNER) pal_interpolation_builder_add(&w->rows, s->order[i], 1.0 / n_corner);
+    pal_interpolation_builder_end_row(&w->rows);
 }
 
 /* ---- the new cells ---- */
@@ -289,7 +290,7 @@ static void put_quad(pal_edit_work *w, const int32_t vertex[4], float sharp)
 }
 
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
-static void put_outer(pal_edit_work *w, const shell *s, int32_t side, int32_t i, bool reversed)
+static void put_outer(pal_edit_work *w, const adaptive *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
     const int32_t quad[4] = {s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before};
@@ -297,7 +298,7 @@ static void put_outer(pal_edit_work *w, const shell *s, int32_t side, int32_t i,
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
-static int32_t centre_over(const shell *s, int32_t corner, int32_t mid)
+static int32_t centre_over(const adaptive *s, int32_t corner, int32_t mid)
 {
     for (int32_t side = 0; side < s->n_side; side++)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++)
@@ -306,7 +307,7 @@ static int32_t centre_over(const shell *s, int32_t corner, int32_t mid)
 }
 
 /* the part at a corner: outer quads lie in the sides, inner ones cross the edges from it */
-static void put_part(pal_edit_work *w, const shell *s, int32_t corner)
+static void put_part(pal_edit_work *w, const adaptive *s, int32_t corner)
 {
     for (int32_t side = 0; side < s->n_side; side++)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
@@ -319,7 +320,7 @@ static void put_part(pal_edit_work *w, const shell *s, int32_t corner)
 }
 
 /* a cell that stays, with the parts of its faces and edges that are cut */
-static void put_neighbour(pal_edit_work *w, const shell *s, int32_t cell)
+static void put_neighbour(pal_edit_work *w, const adaptive *s, int32_t cell)
 {
     const pal_cells *c = w->from;
     for (int32_t f = c->cell_use[cell]; f < c->cell_use[cell + 1]; f++) {
@@ -338,7 +339,7 @@ static void put_neighbour(pal_edit_work *w, const shell *s, int32_t cell)
     pal_edit_end_cell(w, cell);
 }
 
-static void put_divided(pal_edit_work *w, const shell *s)
+static void put_divided(pal_edit_work *w, const adaptive *s)
 {
     const pal_cells *c = w->from;
     const int32_t *vertex = c->cell_vertex.item + c->cell_vertex.start[s->cell];
@@ -357,10 +358,10 @@ static void put_divided(pal_edit_work *w, const shell *s)
         pal_edit_tag(w, end[0], mid < 0 ? end[1] : mid, c->edge[e].sharp);
         if (mid >= 0) pal_edit_tag(w, mid, end[1], c->edge[e].sharp);
     }
-    memcpy(w->to.vertex_sharp, c->vertex_sharp, (size_t)c->n_vertex * sizeof *c->vertex_sharp);
+    memcpy(w->to.vertex_sharpness, c->vertex_sharpness, (size_t)c->n_vertex * sizeof *c->vertex_sharpness);
 }
 
-static int32_t count_corners(const shell *s)
+static int32_t count_corners(const adaptive *s)
 {
     int32_t n = 0;
     for (int32_t i = 0; i < s->n_vertex; i++) n += s->role[s->order[i]] == CORNER;
@@ -368,7 +369,7 @@ static int32_t count_corners(const shell *s)
 }
 
 /* room for the result: a quad in each side and one inside for every use, and what the neighbours' loops get more */
-static pal_err room_for_cut(pal_edit_work *w, const shell *s, pal_note *note)
+static pal_err room_for_cut(pal_edit_work *w, const adaptive *s, pal_diagnostic *diag)
 {
     const pal_cells *c = w->from;
     int64_t n_use = s->start[s->n_side], n_more = 0, n_new = 1;
@@ -381,35 +382,35 @@ static pal_err room_for_cut(pal_edit_work *w, const shell *s, pal_note *note)
     }
     int32_t whole = 0;
     for (int32_t i = 0; i < s->start[s->n_side]; i++) whole += s->mid[i] < 0;
-    return pal_edit_room(w, c->n_vertex + whole / 2 + n_new, (int64_t)c->n_cell + count_corners(s) - 1,
-                         c->n_face_use + 3 * n_use, c->n_edge_use + n_more + 12 * n_use, note);
+    return pal_edit_reserve(w, c->n_vertex + whole / 2 + n_new, (int64_t)c->n_cell + count_corners(s) - 1,
+                            c->n_face_use + 3 * n_use, c->n_edge_use + n_more + 12 * n_use, diag);
 }
 
-static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_note *note)
+static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag)
 {
     pal_edit_work w = pal_edit_begin(from, "divide cell %d", cell);
-    shell s = {0};
-    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, note));
+    adaptive s = {0};
+    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
     int32_t n = from->cell_vertex.start[cell + 1] - from->cell_vertex.start[cell];
-    if (n > PAL_DIVIDE_CORNERS_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: it has %d corners, %d is the most", w.what, n,
-                            PAL_DIVIDE_CORNERS_MOST);
+    if (n > PAL_DIVIDE_CORNERS_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: it has %d corners, %d is the most", w.what, n,
+                                  PAL_DIVIDE_CORNERS_MAX);
     pal_err err = shell_room(from, cell, &s);
     if (!err) {
         find_roles(&s);
         list_sides(&s);
-        err = room_for_cut(&w, &s, note);
+        err = room_for_cut(&w, &s, diag);
     }
     if (!err) {
         for (int32_t v = 0; v < from->n_vertex; v++) {
-            pal_row_add(&w.rows, v, 1);
-            pal_row_end(&w.rows);
+            pal_interpolation_builder_add(&w.rows, v, 1);
+            pal_interpolation_builder_end_row(&w.rows);
         }
         put_middles(&w, &s);
         put_divided(&w, &s);
     }
     shell_free(&s);
-    return pal_edit_finish(&w, err, out, note);
+    return pal_edit_finish(&w, err, out, diag);
 }
 
 /* ---- many cells ---- */
@@ -417,11 +418,11 @@ static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *o
 /* edit becomes what it does and then next does, both divisions; takes next. Both are freed when it fails */
 static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 {
-    pal_point_rows rows = {0};
-    pal_err err = pal_point_rows_product(&next->rows, &edit->rows, INT32_MAX, &rows);
+    pal_interpolation rows = {0};
+    pal_err err = pal_interpolation_product(&next->rows, &edit->rows, INT32_MAX, &rows);
     if (!err) {
         for (int32_t i = 0; i < next->cells.n_cell; i++) next->cell_from[i] = edit->cell_from[next->cell_from[i]];
-        pal_point_rows_free(&next->rows);
+        pal_interpolation_free(&next->rows);
         next->rows = rows;
     } else
         pal_cells_edit_free(next);
@@ -431,51 +432,55 @@ static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 }
 
 /* listed [n_cell] is all false */
-static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell, bool *listed, pal_note *note)
+static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell, bool *listed, pal_diagnostic *diag)
 {
     pal_edit_work w = pal_edit_begin(from, "divide");
-    int32_t most = from->n_cell < PAL_DIVIDE_CELLS_MOST ? from->n_cell : PAL_DIVIDE_CELLS_MOST;
-    if (n < 1 || n > most) return pal_note_set(note, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, most);
+    int32_t most = from->n_cell < PAL_DIVIDE_CELLS_MAX ? from->n_cell : PAL_DIVIDE_CELLS_MAX;
+    if (n < 1 || n > most)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, most);
     for (int32_t i = 0; i < n; i++) {
-        PAL_TRY(pal_edit_check_number(&w, "cell", cell[i], from->n_cell, note));
-        if (listed[cell[i]]) return pal_note_set(note, PAL_ERR_REFUSED, "divide: cell %d is given twice", cell[i]);
+        PAL_TRY(pal_edit_check_number(&w, "cell", cell[i], from->n_cell, diag));
+        if (listed[cell[i]])
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: cell %d is given twice", cell[i]);
         listed[cell[i]] = true;
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out, pal_note *note)
+pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out,
+                         pal_diagnostic *diag)
 {
     pal_cells_edit edit = {0}, next = {0};
     memset(out, 0, sizeof *out);
     bool *listed = calloc((size_t)from->n_cell + 1, sizeof *listed);
-    pal_err err = listed ? check_list(from, n, cell, listed, note) : PAL_ERR_MEMORY;
+    pal_err err = listed ? check_list(from, n, cell, listed, diag) : PAL_ERR_MEMORY;
     free(listed);
-    if (!err) err = divide_one(from, cell[0], &edit, note);
+    if (!err) err = divide_one(from, cell[0], &edit, diag);
     /* the cells that are still to come keep their numbers */
     for (int32_t i = 1; i < n && !err; i++) {
-        err = divide_one(&edit.cells, cell[i], &next, note);
+        err = divide_one(&edit.cells, cell[i], &next, diag);
         if (err)
             pal_cells_edit_free(&edit);
         else
             err = join_edits(&edit, &next);
     }
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "divide: no memory");
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "divide: no memory");
     if (err) return err;
-    pal_point_rows_place(&edit.rows, from->x, edit.cells.x);
+    pal_interpolation_apply(&edit.rows, from->x, edit.cells.x);
     *out = edit;
     return PAL_ERR_OK;
 }
 
-pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out, pal_note *note)
+pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out,
+                              pal_diagnostic *diag)
 {
     const pal_cells *c = from;
     pal_edit_work w = pal_edit_begin(from, "divide cell %d", cell);
     memset(out, 0, sizeof *out);
-    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, note));
-    if (rings < 0 || rings > PAL_DIVIDE_RINGS_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %d rings, must be 0 to %d", w.what, rings,
-                            PAL_DIVIDE_RINGS_MOST);
+    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
+    if (rings < 0 || rings > PAL_DIVIDE_RINGS_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d rings, must be 0 to %d", w.what, rings,
+                                  PAL_DIVIDE_RINGS_MAX);
     int32_t *list = malloc((size_t)c->n_cell * sizeof *list), n = 1, first = 0;
     bool *listed = calloc((size_t)c->n_cell, sizeof *listed);
     pal_err err = list && listed ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -489,7 +494,7 @@ pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings
                     if (!listed[near]) listed[near] = true, list[n++] = near;
                 }
             }
-    err = err ? pal_note_set(note, err, "%s: no memory", w.what) : pal_cells_divide(from, n, list, out, note);
+    err = err ? pal_diagnostic_set(diag, err, "%s: no memory", w.what) : pal_cells_divide(from, n, list, out, diag);
     free(list);
     free(listed);
     return err;

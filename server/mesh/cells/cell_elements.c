@@ -19,17 +19,17 @@ enum { U, V, W };
 
 static int32_t turn2(const pal_cells *c, int32_t h)
 {
-    return pal_cells_turn(c, pal_cells_turn(c, h));
+    return pal_cells_next_around(c, pal_cells_next_around(c, h));
 }
 
 /* the same cell with the axes changed round, so that the given one comes first */
 static int32_t first_axis(const pal_cells *c, int32_t h, int axis)
 {
-    return axis == U ? h : axis == W ? pal_cells_turn(c, h) : turn2(c, h);
+    return axis == U ? h : axis == W ? pal_cells_next_around(c, h) : turn2(c, h);
 }
 static int32_t back_axis(const pal_cells *c, int32_t h, int axis)
 {
-    return axis == U ? h : axis == W ? turn2(c, h) : pal_cells_turn(c, h);
+    return axis == U ? h : axis == W ? turn2(c, h) : pal_cells_next_around(c, h);
 }
 
 /* the cell across the face at the far (ahead) or near end of an axis */
@@ -41,7 +41,7 @@ static int32_t step(const pal_cells *c, int32_t h, int axis, bool ahead)
         int32_t far = c->edge_use[pal_cells_next(c, h)].radial;
         h = turn2(c, c->edge_use[far].mate);
     } else {
-        int32_t far = c->edge_use[pal_cells_turn(c, h)].mate;
+        int32_t far = c->edge_use[pal_cells_next_around(c, h)].mate;
         h = pal_cells_prev(c, c->edge_use[far].radial);
     }
     return back_axis(c, h, axis);
@@ -59,7 +59,7 @@ static void corners(const pal_cells *c, int32_t h, int32_t out[8])
     out[3] = c->edge_use[top = pal_cells_next(c, top)].vertex;
     out[7] = c->edge_use[pal_cells_next(c, top)].vertex;
     /* v and vw, round the face at u = 0 */
-    use = pal_cells_next(c, pal_cells_turn(c, h));
+    use = pal_cells_next(c, pal_cells_next_around(c, h));
     out[6] = c->edge_use[use = pal_cells_next(c, use)].vertex;
     out[2] = c->edge_use[pal_cells_next(c, use)].vertex;
 }
@@ -74,7 +74,7 @@ static bool is_hex(const pal_cells *c, int32_t cell)
         if (c->face_use[u + 1].first_use - c->face_use[u].first_use != 4) return false;
     for (int32_t k = c->cell_vertex.start[cell]; k < c->cell_vertex.start[cell + 1]; k++) {
         int32_t h = c->corner_use[k];
-        if (pal_cells_turn(c, turn2(c, h)) != h) return false;
+        if (pal_cells_next_around(c, turn2(c, h)) != h) return false;
     }
     return true;
 }
@@ -125,14 +125,15 @@ static bool label_nodes(const pal_cells *c, int32_t cell, int32_t *stamp, int32_
 
 /* ---- the lists ---- */
 
-static pal_err check_quads(const pal_cells *c, int32_t cell, pal_note *note)
+static pal_err check_quads(const pal_cells *c, int32_t cell, pal_diagnostic *diag)
 {
     for (int32_t u = c->cell_use[cell]; u < c->cell_use[cell + 1]; u++) {
         int n = c->face_use[u + 1].first_use - c->face_use[u].first_use;
         if (n != 4)
-            return pal_note_set(note, PAL_ERR_REFUSED,
-                                "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once",
-                                cell, c->face_use[u].face, n);
+            return pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED,
+                "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once", cell,
+                c->face_use[u].face, n);
     }
     return PAL_ERR_OK;
 }
@@ -153,14 +154,14 @@ static void add_pyramids(const pal_cells *c, int32_t cell, pal_cell_elements *e)
 static pal_err place_virtual(const pal_cells *c, pal_cell_elements *e)
 {
     const pal_cell_rows *r = &c->cell_vertex;
-    pal_row_build b;
-    pal_row_build_begin(&b, e->n_virtual, c->n_vertex, r->start[c->n_cell]);
+    pal_interpolation_builder b;
+    pal_interpolation_builder_begin(&b, e->n_virtual, c->n_vertex, r->start[c->n_cell]);
     for (int32_t i = 0; i < e->n_virtual && !b.err; i++) {
         int32_t first = r->start[e->virtual_cell[i]], after = r->start[e->virtual_cell[i] + 1];
-        for (int32_t k = first; k < after; k++) pal_row_add(&b, r->item[k], 1.0 / (after - first));
-        pal_row_end(&b);
+        for (int32_t k = first; k < after; k++) pal_interpolation_builder_add(&b, r->item[k], 1.0 / (after - first));
+        pal_interpolation_builder_end_row(&b);
     }
-    return pal_row_build_finish(&b, &e->virtual_rows);
+    return pal_interpolation_builder_finish(&b, &e->virtual_rows);
 }
 
 /* room for n elements of a kind */
@@ -172,11 +173,11 @@ static pal_err take(pal_cell_elements *e, pal_cell_kind kind, int32_t n)
 }
 
 /* room for as many of each as there can be, a pyramid for each face of the cells that are no hexahedra */
-static pal_err take_room(const pal_cells *c, const bool *hex, pal_cell_elements *e, pal_note *note)
+static pal_err take_room(const pal_cells *c, const bool *hex, pal_cell_elements *e, pal_diagnostic *diag)
 {
     int32_t n_hex = 0, n_cubic = 0, n_pyramid = 0;
     for (int32_t i = 0; i < c->n_cell; i++) {
-        if (!hex[i]) PAL_TRY(check_quads(c, i, note));
+        if (!hex[i]) PAL_TRY(check_quads(c, i, diag));
         n_hex += hex[i], n_cubic += is_cubic(c, hex, i);
         n_pyramid += hex[i] ? 0 : c->cell_use[i + 1] - c->cell_use[i];
     }
@@ -205,14 +206,14 @@ static void fill(const pal_cells *c, const bool *hex, int32_t *stamp, pal_cell_e
     }
 }
 
-pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, pal_note *note)
+pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, pal_diagnostic *diag)
 {
     pal_cell_elements e = {.n_vertex = cells->n_vertex};
     bool *hex = malloc((size_t)cells->n_cell + 1);
     int32_t *stamp = calloc((size_t)cells->n_vertex + 1, sizeof *stamp);
     pal_err err = hex && stamp ? PAL_ERR_OK : PAL_ERR_MEMORY;
     for (int32_t i = 0; i < cells->n_cell && !err; i++) hex[i] = is_hex(cells, i);
-    if (!err) err = take_room(cells, hex, &e, note);
+    if (!err) err = take_room(cells, hex, &e, diag);
     if (!err) {
         fill(cells, hex, stamp, &e);
         err = place_virtual(cells, &e);
@@ -233,17 +234,18 @@ void pal_cell_elements_free(pal_cell_elements *e)
         free(e->cell[kind]);
     }
     free(e->virtual_cell);
-    pal_point_rows_free(&e->virtual_rows);
+    pal_interpolation_free(&e->virtual_rows);
     memset(e, 0, sizeof *e);
 }
 
 /* ---- rows of all nodes ---- */
 
-pal_err pal_cell_elements_rows(const pal_cell_elements *e, const pal_point_rows *vertices, pal_point_rows *out)
+pal_err pal_cell_elements_interpolation(const pal_cell_elements *e, const pal_interpolation *vertices,
+                                        pal_interpolation *out)
 {
     PAL_ASSERT(vertices->n_row == e->n_vertex);
-    pal_point_rows extra = {0}, all = {.n_row = e->n_vertex + e->n_virtual, .n_point = vertices->n_point};
-    PAL_TRY(pal_point_rows_product(&e->virtual_rows, vertices, INT32_MAX - vertices->start[e->n_vertex], &extra));
+    pal_interpolation extra = {0}, all = {.n_row = e->n_vertex + e->n_virtual, .n_point = vertices->n_point};
+    PAL_TRY(pal_interpolation_product(&e->virtual_rows, vertices, INT32_MAX - vertices->start[e->n_vertex], &extra));
     size_t n = (size_t)vertices->start[e->n_vertex], more = (size_t)extra.start[e->n_virtual];
     all.start = malloc(((size_t)all.n_row + 1) * sizeof *all.start);
     all.point = malloc((n + more) * sizeof *all.point);
@@ -258,7 +260,7 @@ pal_err pal_cell_elements_rows(const pal_cell_elements *e, const pal_point_rows 
         for (int32_t i = 0; i <= e->n_virtual; i++) all.start[e->n_vertex + i] = (int32_t)n + extra.start[i];
         *out = all;
     } else
-        pal_point_rows_free(&all);
-    pal_point_rows_free(&extra);
+        pal_interpolation_free(&all);
+    pal_interpolation_free(&extra);
     return err;
 }

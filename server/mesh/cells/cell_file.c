@@ -17,7 +17,7 @@ pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format
 {
     va_list list;
     va_start(list, format);
-    pal_err err = pal_file_refuse(reader->note, reader->name, "line", reader->scan.line, format, list);
+    pal_err err = pal_file_refuse(reader->diag, reader->name, "line", reader->scan.line, format, list);
     va_end(list);
     return err;
 }
@@ -26,12 +26,13 @@ pal_err pal_cell_reader_grow(const pal_cell_reader *reader, void **array, size_t
 {
     if (n < *cap) return PAL_ERR_OK;
     if (n >= MOST_ITEMS)
-        return pal_note_set(reader->note, PAL_ERR_BUDGET, "%s: line %lld: more than %zu items", reader->name,
-                            (long long)reader->scan.line, MOST_ITEMS);
+        return pal_diagnostic_set(reader->diag, PAL_ERR_BUDGET, "%s: line %lld: more than %zu items", reader->name,
+                                  (long long)reader->scan.line, MOST_ITEMS);
     size_t more = *cap ? 2 * *cap : 16;
     void *bigger = realloc(*array, more * size);
     if (!bigger)
-        return pal_note_set(reader->note, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", reader->name, more * size);
+        return pal_diagnostic_set(reader->diag, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", reader->name,
+                                  more * size);
     *array = bigger, *cap = more;
     return PAL_ERR_OK;
 }
@@ -82,7 +83,7 @@ pal_err pal_cell_reader_corner(pal_cell_reader *reader, int32_t vertex)
 static pal_err end_line(pal_cell_reader *r)
 {
     if (!pal_text_more(&r->scan)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s at the end of the line", pal_text_show(&r->scan).text);
+    return pal_cell_reader_refuse(r, "%s at the end of the line", pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_vertex(pal_cell_reader *r)
@@ -90,7 +91,8 @@ static pal_err read_vertex(pal_cell_reader *r)
     double x[3];
     for (int a = 0; a < 3; a++)
         if (!pal_text_double(&r->scan, &x[a]))
-            return pal_cell_reader_refuse(r, "a position needs three numbers, found %s", pal_text_show(&r->scan).text);
+            return pal_cell_reader_refuse(r, "a position needs three numbers, found %s",
+                                          pal_text_excerpt_at(&r->scan).text);
     PAL_TRY(pal_cell_reader_vertex(r, x));
     return end_line(r);
 }
@@ -100,7 +102,7 @@ static pal_err read_number(pal_cell_reader *r, const char *what, int64_t most, i
 {
     int64_t i;
     if (!pal_text_int(&r->scan, &i))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_show(&r->scan).text);
+        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     if (i < 1 || i > most)
         return pal_cell_reader_refuse(r, "%s %lld, there are %lld before this line", what, (long long)i,
                                       (long long)most);
@@ -124,9 +126,9 @@ static pal_err read_sharp(pal_cell_reader *r, float *out)
 {
     double sharp;
     if (!pal_text_double(&r->scan, &sharp))
-        return pal_cell_reader_refuse(r, "a sharpness must be a number, found %s", pal_text_show(&r->scan).text);
-    if (!(sharp >= 0 && sharp <= (double)PAL_SHARP_EVER))
-        return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARP_EVER);
+        return pal_cell_reader_refuse(r, "a sharpness must be a number, found %s", pal_text_excerpt_at(&r->scan).text);
+    if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
+        return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
     *out = (float)sharp;
     return end_line(r);
 }
@@ -139,10 +141,11 @@ static pal_err read_vertex_sharp(pal_cell_reader *r, size_t *cap)
     PAL_TRY(read_number(r, "vertex", r->l.n_vertex, &v));
     PAL_TRY(read_sharp(r, &sharp));
     while (r->n_sharp <= (size_t)v) {
-        PAL_TRY(pal_cell_reader_grow(r, (void **)&r->l.vertex_sharp, r->n_sharp, cap, sizeof *r->l.vertex_sharp));
-        r->l.vertex_sharp[r->n_sharp++] = 0;
+        PAL_TRY(
+            pal_cell_reader_grow(r, (void **)&r->l.vertex_sharpness, r->n_sharp, cap, sizeof *r->l.vertex_sharpness));
+        r->l.vertex_sharpness[r->n_sharp++] = 0;
     }
-    r->l.vertex_sharp[v] = sharp;
+    r->l.vertex_sharpness[v] = sharp;
     return PAL_ERR_OK;
 }
 
@@ -187,7 +190,8 @@ static pal_err read_line(pal_cell_reader *r, size_t *cap_sharp)
             return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
         return pal_cell_reader_cell(r);
     }
-    return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf", pal_text_show(scan).text);
+    return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
+                                  pal_text_excerpt_at(scan).text);
 }
 
 static pal_err read_ours(pal_cell_reader *r)
@@ -202,9 +206,9 @@ static pal_err read_ours(pal_cell_reader *r)
         if (pal_text_more(&r->scan)) PAL_TRY(read_line(r, &cap_sharp));
     /* room for the vertices after the last one named */
     while (r->n_sharp > 0 && r->n_sharp < (size_t)r->l.n_vertex) {
-        PAL_TRY(
-            pal_cell_reader_grow(r, (void **)&r->l.vertex_sharp, r->n_sharp, &cap_sharp, sizeof *r->l.vertex_sharp));
-        r->l.vertex_sharp[r->n_sharp++] = 0;
+        PAL_TRY(pal_cell_reader_grow(r, (void **)&r->l.vertex_sharpness, r->n_sharp, &cap_sharp,
+                                     sizeof *r->l.vertex_sharpness));
+        r->l.vertex_sharpness[r->n_sharp++] = 0;
     }
     r->l.count_from = 1;
     return PAL_ERR_OK;
@@ -228,22 +232,23 @@ static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
     r->l.loop[r->n_loop] = (int32_t)r->n_corner;
     if (r->n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
     if (vtk) PAL_TRY(pal_cell_loops_keep(&r->l, NULL, NULL));
-    pal_note inner = {""};
+    pal_diagnostic inner = {""};
     pal_err err = pal_cells_make(&r->l, out, &inner);
     const char *text = inner.text + (begins((const uint8_t *)inner.text, strlen(inner.text), "cells: ") ? 7 : 0);
-    return err ? pal_note_set(r->note, err, "%s: %.360s", r->name, text) : PAL_ERR_OK;
+    return err ? pal_diagnostic_set(r->diag, err, "%s: %.360s", r->name, text) : PAL_ERR_OK;
 }
 
-pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_cells *out, pal_note *note)
+pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_cells *out, pal_diagnostic *diag)
 {
     char shown[128];
-    pal_file_show_name(shown, name);
+    pal_file_printable_name(shown, name);
     pal_cell_reader r = {
-        .name = shown, .note = note, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}, .l = {.count_from = 0}};
+        .name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}, .l = {.count_from = 0}};
     bool vtk = begins(bytes, n_byte, "# vtk");
     pal_err err = PAL_ERR_OK;
     if (n_byte > MOST_BYTES)
-        err = pal_note_set(note, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte, MOST_BYTES);
+        err =
+            pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte, MOST_BYTES);
     else if (vtk)
         err = pal_cell_vtk_read(&r);
     else
@@ -253,19 +258,19 @@ pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
     return err;
 }
 
-pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_note *note)
+pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, MOST_BYTES, &bytes, &n_byte, note));
-    pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, note);
+    PAL_TRY(pal_file_read(path, MOST_BYTES, &bytes, &n_byte, diag));
+    pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }
 
 /* ---- out ---- */
 
-void pal_cell_put_number(FILE *file, double value)
+void pal_cell_write_number(FILE *file, double value)
 {
     char text[40];
     snprintf(text, sizeof text, "%.17g", value);
@@ -281,7 +286,7 @@ static void write_ours(const pal_cells *c, FILE *file)
         fputc('v', file);
         for (int a = 0; a < 3; a++) {
             fputc(' ', file);
-            pal_cell_put_number(file, c->x[3 * (size_t)v + (size_t)a]);
+            pal_cell_write_number(file, c->x[3 * (size_t)v + (size_t)a]);
         }
         fputc('\n', file);
     }
@@ -295,19 +300,20 @@ static void write_ours(const pal_cells *c, FILE *file)
         }
     }
     for (int32_t v = 0; v < c->n_vertex; v++)
-        if (c->vertex_sharp[v] > 0)
-            fprintf(file, "sv %d ", v + 1), pal_cell_put_number(file, (double)c->vertex_sharp[v]), fputc('\n', file);
+        if (c->vertex_sharpness[v] > 0)
+            fprintf(file, "sv %d ", v + 1), pal_cell_write_number(file, (double)c->vertex_sharpness[v]),
+                fputc('\n', file);
     for (int32_t e = 0; e < c->n_edge; e++)
         if (c->edge[e].sharp > 0) {
             fprintf(file, "se %d %d ", c->edge[e].vertex[0] + 1, c->edge[e].vertex[1] + 1);
-            pal_cell_put_number(file, (double)c->edge[e].sharp);
+            pal_cell_write_number(file, (double)c->edge[e].sharp);
             fputc('\n', file);
         }
     for (int32_t f = 0; f < c->n_face; f++)
         if (c->face[f].sharp > 0) {
             const pal_face_use *use = &c->face_use[c->face[f].use[0]];
             fprintf(file, "sf %d %d ", use->cell + 1, c->face[f].use[0] - c->cell_use[use->cell] + 1);
-            pal_cell_put_number(file, (double)c->face[f].sharp);
+            pal_cell_write_number(file, (double)c->face[f].sharp);
             fputc('\n', file);
         }
 }
@@ -332,18 +338,18 @@ pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, s
     return PAL_ERR_OK;
 }
 
-pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_note *note)
+pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnostic *diag)
 {
     size_t n = strlen(path), n_byte;
     bool vtk = n >= 4 && !strcmp(path + n - 4, ".vtk"), ours = n >= 9 && !strcmp(path + n - 9, ".palcells");
     char shown[128];
     uint8_t *bytes;
-    pal_file_show_name(shown, path);
+    pal_file_printable_name(shown, path);
     if (!vtk && !ours)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: cells are written to .palcells or .vtk files", shown);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cells are written to .palcells or .vtk files", shown);
     if (pal_cell_file_bytes(cells, vtk, &bytes, &n_byte))
-        return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for the text of %d cells", shown, cells->n_cell);
-    pal_err err = pal_file_write(path, bytes, n_byte, note);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for the text of %d cells", shown, cells->n_cell);
+    pal_err err = pal_file_write(path, bytes, n_byte, diag);
     free(bytes);
     return err;
 }

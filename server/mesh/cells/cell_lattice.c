@@ -100,7 +100,7 @@ static void put_wedge(builder *b, const int gone[2])
     end_cell(b);
 }
 
-static pal_err put_place(builder *b, char what, pal_note *note)
+static pal_err put_place(builder *b, char what, pal_diagnostic *diag)
 {
     static const char apex_side[] = "WESNDU"; /* side of the brick, as loops */
     double middle[3] = {b->place[0] + 0.5, b->place[1] + 0.5, b->place[2] + 0.5};
@@ -119,12 +119,12 @@ static pal_err put_place(builder *b, char what, pal_note *note)
         int low = (bit & 1) << (axis + 1) % 3 | (bit >> 1) << (axis + 2) % 3;
         put_wedge(b, (const int[2]){low, low | 1 << axis});
     } else {
-        return pal_note_set(note, PAL_ERR_INTERNAL, "cells: a lattice has the letter \"%c\"", what);
+        return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "cells: a lattice has the letter \"%c\"", what);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err put_all(builder *b, pal_note *note)
+static pal_err put_all(builder *b, pal_diagnostic *diag)
 {
     const int32_t *n = b->lattice->n;
     int32_t *at = b->place;
@@ -134,13 +134,13 @@ static pal_err put_all(builder *b, pal_note *note)
             int32_t most = (int32_t)strlen(row) - 1;
             for (at[0] = 0; at[0] < n[0]; at[0]++) {
                 char what = row[at[0] < most ? at[0] : most];
-                if (what != '.') PAL_TRY(put_place(b, what, note));
+                if (what != '.') PAL_TRY(put_place(b, what, diag));
             }
         }
     return PAL_ERR_OK;
 }
 
-pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, pal_note *note)
+pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, pal_diagnostic *diag)
 {
     const int32_t *n = lattice->n;
     size_t n_place = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
@@ -155,8 +155,8 @@ pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, p
     if (b.vertex_at && b.l.x && b.l.cell && b.l.loop && b.l.corner) {
         for (size_t i = 0; i < n_corner; i++) b.vertex_at[i] = -1;
         b.l.cell[0] = b.l.loop[0] = 0;
-        err = put_all(&b, note);
-        if (!err) err = pal_cells_make(&b.l, out, note);
+        err = put_all(&b, diag);
+        if (!err) err = pal_cells_make(&b.l, out, diag);
     }
     free(b.vertex_at);
     pal_cell_loops_free(&b.l);

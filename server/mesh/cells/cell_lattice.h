@@ -8,8 +8,8 @@
  *                of the next axis if b & 1, of the one after if b & 2
  *
  * Cells stand in the order of the places, x fastest. A model of cell_models.h is one of these. Thread: [load]. */
-#ifndef PAL_MESH_CELL_LATTICE_H
-#define PAL_MESH_CELL_LATTICE_H
+#ifndef PAL_MESH_CELLS_CELL_LATTICE_H
+#define PAL_MESH_CELLS_CELL_LATTICE_H
 #include "server/mesh/cells/cells.h"
 
 typedef struct pal_cell_lattice {
@@ -21,5 +21,5 @@ typedef struct pal_cell_lattice {
 } pal_cell_lattice;
 
 /* INTERNAL for an unknown letter; what pal_cells_make refuses; MEMORY */
-pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, pal_note *note);
+pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, pal_diagnostic *diag);
 #endif

@@ -305,9 +305,9 @@ const pal_cell_model *pal_cell_model_find(const char *name)
     return NULL;
 }
 
-pal_err pal_cell_model_make(const pal_cell_model *model, pal_cells *out, pal_note *note)
+pal_err pal_cell_model_make(const pal_cell_model *model, pal_cells *out, pal_diagnostic *diag)
 {
     const pal_cell_lattice *lattice = &lattice_list[model - pal_cell_model_list];
     const double cube_m[3] = {0.1, 0.1, 0.1};
-    return lattice->row ? pal_cell_lattice_make(lattice, out, note) : pal_cells_block(lattice->n, cube_m, out, note);
+    return lattice->row ? pal_cell_lattice_make(lattice, out, diag) : pal_cells_block(lattice->n, cube_m, out, diag);
 }

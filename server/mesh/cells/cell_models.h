@@ -2,8 +2,8 @@
  * kidney. Each is a lattice of bricks from which cells are kept, bent and swollen by a smooth map; some bricks are
  * pyramids or wedges, so that elements of all kinds come up. Sizes in metres, z up; what faces someone faces -y.
  * Thread: [load]. */
-#ifndef PAL_MESH_CELL_MODELS_H
-#define PAL_MESH_CELL_MODELS_H
+#ifndef PAL_MESH_CELLS_CELL_MODELS_H
+#define PAL_MESH_CELLS_CELL_MODELS_H
 #include "server/mesh/cells/cells.h"
 
 enum { PAL_CELL_MODELS = 9 };
@@ -21,5 +21,5 @@ extern const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS];
 /* NULL: there is none of that name */
 const pal_cell_model *pal_cell_model_find(const char *name);
 /* the cells of an entry of the list; the caller frees them; MEMORY */
-pal_err pal_cell_model_make(const pal_cell_model *model, pal_cells *out, pal_note *note);
+pal_err pal_cell_model_make(const pal_cell_model *model, pal_cells *out, pal_diagnostic *diag);
 #endif

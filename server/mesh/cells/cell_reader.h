@@ -1,6 +1,6 @@
 /* Private to the mesh room: loops of cells as a file is read, in arrays that grow with it. Thread: [load]. */
-#ifndef PAL_MESH_CELL_READER_H
-#define PAL_MESH_CELL_READER_H
+#ifndef PAL_MESH_CELLS_CELL_READER_H
+#define PAL_MESH_CELLS_CELL_READER_H
 #include "server/mesh/cells/cells.h"
 #include "server/mesh/files/text_scan.h"
 
@@ -9,7 +9,7 @@
 typedef struct pal_cell_reader {
     const char *name; /* as messages show it */
     pal_text_scan scan;
-    pal_note *note;
+    pal_diagnostic *diag;
     pal_cell_loops l; /* cell and loop hold starts only; pal_cell_reader_finish adds the ends */
     size_t n_loop, n_corner, n_sharp;
     size_t cap_x, cap_vertex_line, cap_cell, cap_loop, cap_line, cap_corner, cap_edge_tag, cap_tag_line, cap_face_tag;
@@ -30,5 +30,5 @@ pal_err pal_cell_reader_corner(pal_cell_reader *reader, int32_t vertex);
 pal_err pal_cell_vtk_read(pal_cell_reader *reader);
 void pal_cell_vtk_write(const pal_cells *cells, FILE *file);
 /* 17 digits and a decimal point */
-void pal_cell_put_number(FILE *file, double value);
+void pal_cell_write_number(FILE *file, double value);
 #endif

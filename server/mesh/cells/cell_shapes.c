@@ -12,11 +12,11 @@
 static const int32_t HEX_LOOP[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                        {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-static pal_err get_room(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_note *note)
+static pal_err get_room(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_diagnostic *diag)
 {
-    if (n_cell > PAL_CELL_SHAPE_MOST)
-        return pal_note_set(note, PAL_ERR_BUDGET, "cells: a shape of %lld cells, at most %d are made",
-                            (long long)n_cell, PAL_CELL_SHAPE_MOST);
+    if (n_cell > PAL_CELL_SHAPE_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "cells: a shape of %lld cells, at most %d are made",
+                                  (long long)n_cell, PAL_CELL_SHAPE_MAX);
     *l = (pal_cell_loops){.n_vertex = (int32_t)n_vertex, .n_cell = (int32_t)n_cell};
     l->x = malloc((size_t)n_vertex * 3 * sizeof *l->x);
     l->cell = malloc(((size_t)n_cell + 1) * sizeof *l->cell);
@@ -57,26 +57,26 @@ static void put_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
             }
 }
 
-static pal_err finish(pal_cell_loops *l, pal_cells *out, pal_note *note)
+static pal_err finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic *diag)
 {
-    pal_err err = pal_cells_make(l, out, note);
+    pal_err err = pal_cells_make(l, out, diag);
     pal_cell_loops_free(l);
     return err;
 }
 
-static pal_err check_count(const char *name, int32_t n, int32_t least, pal_note *note)
+static pal_err check_count(const char *name, int32_t n, int32_t least, pal_diagnostic *diag)
 {
-    if (n >= least && n <= PAL_CELL_SHAPE_MOST) return PAL_ERR_OK;
-    return pal_note_set(note, n < least ? PAL_ERR_REFUSED : PAL_ERR_BUDGET, "cells: %s is %d, must be %d to %d", name,
-                        n, least, PAL_CELL_SHAPE_MOST);
+    if (n >= least && n <= PAL_CELL_SHAPE_MAX) return PAL_ERR_OK;
+    return pal_diagnostic_set(diag, n < least ? PAL_ERR_REFUSED : PAL_ERR_BUDGET, "cells: %s is %d, must be %d to %d",
+                              name, n, least, PAL_CELL_SHAPE_MAX);
 }
 
 /* above is excluded */
-static pal_err check_length(const char *name, double length, double above, pal_note *note)
+static pal_err check_length(const char *name, double length, double above, pal_diagnostic *diag)
 {
     if (length > above && length <= 1e8) return PAL_ERR_OK;
-    return pal_note_set(note, PAL_ERR_REFUSED, "cells: %s is %g m, must be above %g and at most 1e8", name, length,
-                        above);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %s is %g m, must be above %g and at most 1e8", name,
+                              length, above);
 }
 
 /* corner i of n equal steps from low to high, both ends to the bit */
@@ -89,44 +89,44 @@ static double step_at(int32_t i, int32_t n, double low, double high)
 static int64_t count_cells(const int32_t n[3])
 {
     int64_t two = (int64_t)n[0] * n[1];
-    return two > PAL_CELL_SHAPE_MOST ? two : two * n[2];
+    return two > PAL_CELL_SHAPE_MAX ? two : two * n[2];
 }
 
-pal_err pal_cells_block(const int32_t n[3], const double size_m[3], pal_cells *out, pal_note *note)
+pal_err pal_cells_block(const int32_t n[3], const double length_scale_m[3], pal_cells *out, pal_diagnostic *diag)
 {
     static const char *const count[3] = {"number of cells along x", "number of cells along y",
                                          "number of cells along z"};
     static const char *const size[3] = {"size along x", "size along y", "size along z"};
     pal_cell_loops l;
     for (int a = 0; a < 3; a++) {
-        PAL_TRY(check_count(count[a], n[a], 1, note));
-        PAL_TRY(check_length(size[a], size_m[a], 0, note));
+        PAL_TRY(check_count(count[a], n[a], 1, diag));
+        PAL_TRY(check_length(size[a], length_scale_m[a], 0, diag));
     }
     int64_t v = 0, n_cell = count_cells(n);
     PAL_TRY(
-        get_room((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MOST ? 1 : n[2] + 1), n_cell, &l, note));
+        get_room((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
     for (int32_t k = 0; k <= n[2]; k++)
         for (int32_t j = 0; j <= n[1]; j++)
             for (int32_t i = 0; i <= n[0]; i++)
-                put_vertex(&l, v++, step_at(i, n[0], -size_m[0] / 2, size_m[0] / 2),
-                           step_at(j, n[1], -size_m[1] / 2, size_m[1] / 2),
-                           step_at(k, n[2], -size_m[2] / 2, size_m[2] / 2));
+                put_vertex(&l, v++, step_at(i, n[0], -length_scale_m[0] / 2, length_scale_m[0] / 2),
+                           step_at(j, n[1], -length_scale_m[1] / 2, length_scale_m[1] / 2),
+                           step_at(k, n[2], -length_scale_m[2] / 2, length_scale_m[2] / 2));
     put_grid(&l, n, false);
-    return finish(&l, out, note);
+    return finish(&l, out, diag);
 }
 
 pal_err pal_cells_tube(const int32_t n[3], double inner_m, double outer_m, double length_m, pal_cells *out,
-                       pal_note *note)
+                       pal_diagnostic *diag)
 {
     pal_cell_loops l;
-    PAL_TRY(check_count("number of cells around", n[0], 3, note));
-    PAL_TRY(check_count("number of cells through the wall", n[1], 1, note));
-    PAL_TRY(check_count("number of cells along the tube", n[2], 1, note));
-    PAL_TRY(check_length("inner radius", inner_m, 0, note));
-    PAL_TRY(check_length("outer radius", outer_m, inner_m, note));
-    PAL_TRY(check_length("length", length_m, 0, note));
+    PAL_TRY(check_count("number of cells around", n[0], 3, diag));
+    PAL_TRY(check_count("number of cells through the wall", n[1], 1, diag));
+    PAL_TRY(check_count("number of cells along the tube", n[2], 1, diag));
+    PAL_TRY(check_length("inner radius", inner_m, 0, diag));
+    PAL_TRY(check_length("outer radius", outer_m, inner_m, diag));
+    PAL_TRY(check_length("length", length_m, 0, diag));
     int64_t v = 0, n_cell = count_cells(n);
-    PAL_TRY(get_room((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MOST ? 1 : n[2] + 1), n_cell, &l, note));
+    PAL_TRY(get_room((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
     /* around, outward, along is a left-handed set of directions when around is counter-clockwise */
     for (int32_t k = 0; k <= n[2]; k++)
         for (int32_t j = 0; j <= n[1]; j++)
@@ -135,15 +135,15 @@ pal_err pal_cells_tube(const int32_t n[3], double inner_m, double outer_m, doubl
                 put_vertex(&l, v++, r * cos(a), r * sin(a), step_at(k, n[2], -length_m / 2, length_m / 2));
             }
     put_grid(&l, n, true);
-    return finish(&l, out, note);
+    return finish(&l, out, diag);
 }
 
-pal_err pal_cells_ring(int32_t n, double radius_m, double thick_m, pal_cells *out, pal_note *note)
+pal_err pal_cells_ring(int32_t n, double radius_m, double thick_m, pal_cells *out, pal_diagnostic *diag)
 {
     const int32_t count[3] = {n, 1, 1};
-    PAL_TRY(check_length("thickness", thick_m, 0, note));
-    PAL_TRY(check_length("radius", radius_m, thick_m / 2, note));
-    return pal_cells_tube(count, radius_m - thick_m / 2, radius_m + thick_m / 2, thick_m, out, note);
+    PAL_TRY(check_length("thickness", thick_m, 0, diag));
+    PAL_TRY(check_length("radius", radius_m, thick_m / 2, diag));
+    return pal_cells_tube(count, radius_m - thick_m / 2, radius_m + thick_m / 2, thick_m, out, diag);
 }
 
 /* Section of the torus: a square of (m + 1)^2 vertices, then m rings of 4 m vertices, each ring in the order of the
@@ -199,16 +199,16 @@ static void section_cell(int32_t m, int32_t k, int32_t corner[4])
     corner[2] = ring_vertex(m, ring + 1, i + 1), corner[3] = ring_vertex(m, ring + 1, i);
 }
 
-pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pal_cells *out, pal_note *note)
+pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pal_cells *out, pal_diagnostic *diag)
 {
     pal_cell_loops l;
-    PAL_TRY(check_count("number of cells around", n, 3, note));
-    PAL_TRY(check_count("number of cells across the middle", m, 1, note));
-    PAL_TRY(check_length("radius of the tube", tube_m, 0, note));
-    PAL_TRY(check_length("radius", radius_m, tube_m, note));
+    PAL_TRY(check_count("number of cells around", n, 3, diag));
+    PAL_TRY(check_count("number of cells across the middle", m, 1, diag));
+    PAL_TRY(check_length("radius of the tube", tube_m, 0, diag));
+    PAL_TRY(check_length("radius", radius_m, tube_m, diag));
     const int32_t count[3] = {n, m, m};
     int64_t n_cell = 5 * count_cells(count), n_place = (int64_t)(m + 1) * (m + 1) + 4LL * m * m;
-    PAL_TRY(get_room(n_cell > PAL_CELL_SHAPE_MOST ? 1 : n_place * n, n_cell, &l, note));
+    PAL_TRY(get_room(n_cell > PAL_CELL_SHAPE_MAX ? 1 : n_place * n, n_cell, &l, diag));
     double *place = malloc((size_t)n_place * 2 * sizeof *place);
     if (!place) {
         pal_cell_loops_free(&l);
@@ -231,5 +231,5 @@ pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pa
         }
     }
     free(place);
-    return finish(&l, out, note);
+    return finish(&l, out, diag);
 }

@@ -47,7 +47,7 @@ static pal_err take_int(pal_cell_reader *r, const char *what, int64_t least, int
 {
     if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
     if (!pal_text_int(&r->scan, out))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_show(&r->scan).text);
+        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     if (*out < least || *out > most)
         return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)least,
                                       (long long)most);
@@ -58,14 +58,14 @@ static pal_err take_double(pal_cell_reader *r, const char *what, double *out)
 {
     if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
     if (!pal_text_double(&r->scan, out))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_show(&r->scan).text);
+        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     return PAL_ERR_OK;
 }
 
 static pal_err take_word(pal_cell_reader *r, const char *word)
 {
     if (pal_text_seek(&r->scan) && pal_text_is(&r->scan, word)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s should be here, found %s", word, pal_text_show(&r->scan).text);
+    return pal_cell_reader_refuse(r, "%s should be here, found %s", word, pal_text_excerpt_at(&r->scan).text);
 }
 
 /* every number takes two bytes at least, so counts beyond that lie */
@@ -246,14 +246,14 @@ static pal_err read_sharp(pal_cell_reader *r)
     if (pal_text_more(&r->scan)) PAL_TRY(take_int(r, "the number of components", 1, 1, &n));
     PAL_TRY(take_word(r, "LOOKUP_TABLE"));
     pal_text_next_line(&r->scan);
-    r->l.vertex_sharp = calloc((size_t)r->l.n_vertex, sizeof *r->l.vertex_sharp);
-    if (!r->l.vertex_sharp) return PAL_ERR_MEMORY;
+    r->l.vertex_sharpness = calloc((size_t)r->l.n_vertex, sizeof *r->l.vertex_sharpness);
+    if (!r->l.vertex_sharpness) return PAL_ERR_MEMORY;
     for (int32_t v = 0; v < r->l.n_vertex; v++) {
         double sharp;
         PAL_TRY(take_double(r, "a sharpness", &sharp));
-        if (!(sharp >= 0 && sharp <= (double)PAL_SHARP_EVER))
-            return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARP_EVER);
-        r->l.vertex_sharp[v] = (float)sharp;
+        if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
+            return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
+        r->l.vertex_sharpness[v] = (float)sharp;
     }
     return PAL_ERR_OK;
 }
@@ -291,7 +291,8 @@ static const kind *list_corners(const pal_cells *c, int32_t cell, int32_t corner
     }
     if (n_quad != (k->type == HEXAHEDRON ? 6 : k->type == WEDGE ? 3 : k->type == PYRAMID) || base < 0) return NULL;
     for (int32_t i = first; i < first + n_vertex; i++) {
-        int32_t u = c->corner_use[i], t = pal_cells_turn(c, pal_cells_turn(c, pal_cells_turn(c, u)));
+        int32_t u = c->corner_use[i],
+                t = pal_cells_next_around(c, pal_cells_next_around(c, pal_cells_next_around(c, u)));
         n_over += t != u;
     }
     if (n_over != (k->type == PYRAMID)) return NULL;
@@ -301,7 +302,7 @@ static const kind *list_corners(const pal_cells *c, int32_t cell, int32_t corner
         int32_t to = k->type == WEDGE ? i : (n - i) % n;
         corner[to] = c->edge_use[u + i].vertex;
         if (to + n < n_vertex || to == 0)
-            corner[to + n] = pal_cells_far(c, pal_cells_turn(c, pal_cells_turn(c, u + i)));
+            corner[to + n] = pal_cells_end_vertex(c, pal_cells_next_around(c, pal_cells_next_around(c, u + i)));
     }
     return k;
 }
@@ -331,7 +332,7 @@ void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
     fprintf(file, "# vtk DataFile Version 3.0\ncells\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS %d double\n",
             c->n_vertex);
     for (size_t i = 0; i < 3 * (size_t)c->n_vertex; i++) {
-        pal_cell_put_number(file, c->x[i]);
+        pal_cell_write_number(file, c->x[i]);
         fputc(i % 3 < 2 ? ' ' : '\n', file);
     }
     for (int32_t i = 0; i < c->n_cell; i++) {
@@ -354,11 +355,11 @@ void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
         const kind *k = list_corners(c, i, corner);
         fprintf(file, "%d\n", k ? k->type : POLYHEDRON);
     }
-    for (int32_t v = 0; v < c->n_vertex; v++) sharp |= c->vertex_sharp[v] > 0;
+    for (int32_t v = 0; v < c->n_vertex; v++) sharp |= c->vertex_sharpness[v] > 0;
     if (!sharp) return;
     fprintf(file, "POINT_DATA %d\nSCALARS sharp double 1\nLOOKUP_TABLE default\n", c->n_vertex);
     for (int32_t v = 0; v < c->n_vertex; v++) {
-        pal_cell_put_number(file, (double)c->vertex_sharp[v]);
+        pal_cell_write_number(file, (double)c->vertex_sharpness[v]);
         fputc('\n', file);
     }
 }

@@ -38,13 +38,13 @@ static void walk_sheets(const pal_cells *c, int32_t *parent, bool *seen, pal_cel
     for (int32_t u = 0; u < c->n_edge_use; u++) {
         if (c->edge_use[u].mate >= 0) continue;
         n_half++;
-        join(parent, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_over(c, u)));
+        join(parent, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_across_edge(c, u)));
         if (seen[u]) continue;
         n_vertex++;
         int32_t at = u;
         do {
             seen[at] = true;
-            at = pal_cells_over(c, pal_cells_prev(c, at));
+            at = pal_cells_across_edge(c, pal_cells_prev(c, at));
         } while (at != u);
     }
     out->n_sheet = count_roots(parent, c->n_face);

@@ -32,7 +32,7 @@ static int list_arrays(pal_cells *c, array list[N_ARRAY])
     ARRAY(field.item, row_items(&c->field, (int32_t)(count)));                                                         \
     ARRAY(field.start, (count) + 1)
     ARRAY(x, 3 * n_vertex);
-    ARRAY(vertex_sharp, n_vertex);
+    ARRAY(vertex_sharpness, n_vertex);
     ARRAY(vertex_boundary, n_vertex);
     ARRAY(vertex_pinched, n_vertex);
     ARRAY(edge, n_edge);
@@ -93,7 +93,7 @@ static bool same_doubles(const double *a, const double *b, size_t n)
 static bool same_sharpness(const pal_cells *a, const pal_cells *b)
 {
     for (int32_t v = 0; v < a->n_vertex; v++)
-        if (!(a->vertex_sharp[v] == b->vertex_sharp[v])) return false;
+        if (!(a->vertex_sharpness[v] == b->vertex_sharpness[v])) return false;
     for (int32_t e = 0; e < a->n_edge; e++)
         if (!(a->edge[e].sharp == b->edge[e].sharp)) return false;
     for (int32_t f = 0; f < a->n_face; f++)
@@ -121,7 +121,7 @@ bool pal_cells_equal(const pal_cells *a, const pal_cells *b)
 
 void pal_cell_loops_free(pal_cell_loops *loops)
 {
-    void *all[] = {loops->x,        loops->cell,     loops->loop, loops->corner,      loops->vertex_sharp,
+    void *all[] = {loops->x,        loops->cell,     loops->loop, loops->corner,      loops->vertex_sharpness,
                    loops->edge_tag, loops->face_tag, loops->line, loops->vertex_line, loops->tag_line};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
     memset(loops, 0, sizeof *loops);
@@ -130,7 +130,7 @@ void pal_cell_loops_free(pal_cell_loops *loops)
 static void put_loops(const pal_cells *c, pal_cell_loops *l)
 {
     memcpy(l->x, c->x, (size_t)c->n_vertex * 3 * sizeof *l->x);
-    memcpy(l->vertex_sharp, c->vertex_sharp, (size_t)c->n_vertex * sizeof *l->vertex_sharp);
+    memcpy(l->vertex_sharpness, c->vertex_sharpness, (size_t)c->n_vertex * sizeof *l->vertex_sharpness);
     memcpy(l->cell, c->cell_use, ((size_t)c->n_cell + 1) * sizeof *l->cell);
     for (int32_t i = 0; i <= c->n_face_use; i++) l->loop[i] = c->face_use[i].first_use;
     for (int32_t u = 0; u < c->n_edge_use; u++) l->corner[u] = c->edge_use[u].vertex;
@@ -151,13 +151,13 @@ pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
     for (int32_t e = 0; e < c->n_edge; e++) n_edge_tag += c->edge[e].sharp > 0;
     for (int32_t f = 0; f < c->n_face; f++) n_face_tag += c->face[f].sharp > 0;
     l.x = malloc((size_t)c->n_vertex * 3 * sizeof *l.x);
-    l.vertex_sharp = malloc((size_t)c->n_vertex * sizeof *l.vertex_sharp);
+    l.vertex_sharpness = malloc((size_t)c->n_vertex * sizeof *l.vertex_sharpness);
     l.cell = malloc(((size_t)c->n_cell + 1) * sizeof *l.cell);
     l.loop = malloc(((size_t)c->n_face_use + 1) * sizeof *l.loop);
     l.corner = malloc((size_t)c->n_edge_use * sizeof *l.corner);
     l.edge_tag = malloc((n_edge_tag + 1) * sizeof *l.edge_tag);
     l.face_tag = malloc((2 * n_face_tag + 1) * sizeof *l.face_tag);
-    if (!l.x || !l.vertex_sharp || !l.cell || !l.loop || !l.corner || !l.edge_tag || !l.face_tag) {
+    if (!l.x || !l.vertex_sharpness || !l.cell || !l.loop || !l.corner || !l.edge_tag || !l.face_tag) {
         pal_cell_loops_free(&l);
         return PAL_ERR_MEMORY;
     }
@@ -246,7 +246,7 @@ pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *ke
     for (int32_t v = 0; v < l->n_vertex; v++) {
         if (!number[v]) continue;
         memmove(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v, 3 * sizeof *l->x);
-        if (l->vertex_sharp) l->vertex_sharp[n] = l->vertex_sharp[v];
+        if (l->vertex_sharpness) l->vertex_sharpness[n] = l->vertex_sharpness[v];
         if (l->vertex_line) l->vertex_line[n] = l->vertex_line[v];
         if (kept) kept[n] = v;
         number[v] = n++;
@@ -352,7 +352,7 @@ static double cell_diagonal(const pal_cells *c, const double *x, int32_t cell)
     return pal_dist3(low, high);
 }
 
-bool pal_cells_shape_good(const pal_cells *cells, const double *x, pal_cells_fault *fault)
+bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault)
 {
     const pal_cells *c = cells;
     const double *p = x ? x : c->x;

@@ -11,38 +11,38 @@
  * From an edge use, next and prev walk round its face, mate is the same edge on the other side of the same face (-1 at
  * the boundary), radial the same edge in the neighbouring face inside the same cell. Mate and radial undo themselves
  * and run along the edge the other way. radial, mate, radial, mate ... visits the cells round an edge; radial of prev
- * (pal_cells_turn) visits the faces of one cell round a vertex.
+ * (pal_cells_next_around) visits the faces of one cell round a vertex.
  *
  * Numbers: vertices and cells as given, faces and edges in the order of their first use, so that the same input gives
  * the same complex to the bit. An edit is: pal_cells_loops, change the loops, pal_cells_make, in linear time.
  * A pal_cells owns its arrays (heap). x and the sharpnesses may be written; the rest is constant once made.
  * Thread: [load] to make, [any] to read. */
-#ifndef PAL_MESH_CELLS_H
-#define PAL_MESH_CELLS_H
+#ifndef PAL_MESH_CELLS_CELLS_H
+#define PAL_MESH_CELLS_CELLS_H
 #include "server/mesh/geometry/surface.h"
 
 #include <stddef.h>
 
-enum { PAL_CELL_LOOP_MOST = 256 }; /* corners of a face */
-#define PAL_SHARP_EVER 1e6f        /* most sharp: so many levels of subdivision */
+enum { PAL_CELL_LOOP_MAX = 256 }; /* corners of a face */
+#define PAL_SHARPNESS_MAX 1e6f    /* most sharp: so many levels of subdivision */
 
 /* sharpness of an edge by its two vertices in any order, or of a face by its loop's number */
 typedef struct pal_cell_tag {
     int32_t a, b; /* edge: vertices; face: loop, 0 */
-    float sharp;  /* 0..PAL_SHARP_EVER             */
+    float sharp;  /* 0..PAL_SHARPNESS_MAX             */
 } pal_cell_tag;
 
 /* Cells as lists of oriented loops: what a file, a shape or an edit gives. A face between two cells is given by both,
  * in opposite directions. Owns its arrays (heap). */
 typedef struct pal_cell_loops {
     int32_t n_vertex, n_cell, n_edge_tag, n_face_tag;
-    double *x;              /* position, m                                             [n_vertex][3]            */
-    int32_t *cell;          /* loops of cell c: cell[c] .. cell[c+1]-1                 [n_cell+1]               */
-    int32_t *loop;          /* corners of loop l: loop[l] .. loop[l+1]-1               [cell[n_cell]+1]         */
-    int32_t *corner;        /* vertices, counter-clockwise seen from outside the cell  [loop[cell[n_cell]]]     */
-    float *vertex_sharp;    /* may be NULL: all 0                                      [n_vertex]               */
-    pal_cell_tag *edge_tag; /* an edge given twice has the greater one                 [n_edge_tag]             */
-    pal_cell_tag *face_tag; /* either loop of a face between two cells will do         [n_face_tag]             */
+    double *x;               /* position, m                                             [n_vertex][3]            */
+    int32_t *cell;           /* loops of cell c: cell[c] .. cell[c+1]-1                 [n_cell+1]               */
+    int32_t *loop;           /* corners of loop l: loop[l] .. loop[l+1]-1               [cell[n_cell]+1]         */
+    int32_t *corner;         /* vertices, counter-clockwise seen from outside the cell  [loop[cell[n_cell]]]     */
+    float *vertex_sharpness; /* may be NULL: all 0                                      [n_vertex]               */
+    pal_cell_tag *edge_tag;  /* an edge given twice has the greater one                 [n_edge_tag]             */
+    pal_cell_tag *face_tag;  /* either loop of a face between two cells will do         [n_face_tag]             */
     /* lines of a file, for messages; each may be NULL */
     int64_t *line;        /* of loops [cell[n_cell]] */
     int64_t *vertex_line; /* [n_vertex]              */
@@ -82,15 +82,15 @@ typedef struct pal_cell_rows {
 typedef struct pal_cells {
     int32_t n_vertex, n_edge, n_face, n_cell, n_face_use, n_edge_use;
     int32_t n_boundary_face, n_pinched_edge, n_pinched_vertex;
-    double *x;              /* position, m                                       [n_vertex][3]     */
-    float *vertex_sharp;    /* as edges' sharp                                   [n_vertex]        */
-    bool *vertex_boundary;  /* of a boundary face                                [n_vertex]        */
-    bool *vertex_pinched;   /* sheets of the boundary touch here (numerics: a corner) [n_vertex]   */
-    pal_cell_edge *edge;    /* [n_edge]                                                            */
-    pal_cell_face *face;    /* [n_face]                                                            */
-    int32_t *cell_use;      /* first face use of each cell                       [n_cell+1]        */
-    pal_face_use *face_use; /* entry n_face_use: first_use = n_edge_use, else -1 [n_face_use+1]    */
-    pal_edge_use *edge_use; /* [n_edge_use]                                                        */
+    double *x;               /* position, m                                       [n_vertex][3]     */
+    float *vertex_sharpness; /* as edges' sharp                                   [n_vertex]        */
+    bool *vertex_boundary;   /* of a boundary face                                [n_vertex]        */
+    bool *vertex_pinched;    /* sheets of the boundary touch here (numerics: a corner) [n_vertex]   */
+    pal_cell_edge *edge;     /* [n_edge]                                                            */
+    pal_cell_face *face;     /* [n_face]                                                            */
+    int32_t *cell_use;       /* first face use of each cell                       [n_cell+1]        */
+    pal_face_use *face_use;  /* entry n_face_use: first_use = n_edge_use, else -1 [n_face_use+1]    */
+    pal_edge_use *edge_use;  /* [n_edge_use]                                                        */
     pal_cell_rows vertex_edge, vertex_face, vertex_cell, edge_face, edge_cell;
     pal_cell_rows cell_vertex; /* vertices in order of first use: entry k is corner k of all cells,
                                 * vertex_cell and this have equally many entries                    */
@@ -100,11 +100,11 @@ typedef struct pal_cells {
 
 /* Builds the complex; the loops are copied. REFUSED, in one sentence with the line when there is one, cell, face and
  * number: counts or starts that do not fit, a position that is NaN or beyond 1e9 m, a vertex out of range, repeated in
- * a loop or of no cell, a loop of less than 3 or more than PAL_CELL_LOOP_MOST corners, a face without area, a face of
+ * a loop or of no cell, a loop of less than 3 or more than PAL_CELL_LOOP_MAX corners, a face without area, a face of
  * three cells, of one cell twice, given the same way round by two cells, or with the corners of another face in another
  * order, cells that go round an edge or a vertex more than once, a cell that is not closed, has a face inside out, is
  * no ball or has no positive volume, a sharpness out of range or of an edge that is not there. MEMORY. */
-pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_note *note);
+pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_cells_free(pal_cells *cells);
 /* deep copy; MEMORY */
@@ -123,15 +123,15 @@ pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *ke
 /* the first face without area (its vector area is below 1e-12 of its longest edge squared) or cell without positive
  * volume (below 1e-12 of its box's diagonal cubed) */
 typedef struct pal_cells_fault {
-    int32_t cell, face_use; /* face_use: the face without area; -1: the cell is at fault */
-    double measure, size_m; /* area, m^2, and longest edge, or volume, m^3, and diagonal */
+    int32_t cell, face_use;         /* face_use: the face without area; -1: the cell is at fault */
+    double measure, length_scale_m; /* area, m^2, and longest edge, or volume, m^3, and diagonal */
 } pal_cells_fault;
 /* false with the first fault at positions x [n_vertex][3] (NULL: its own); fault may be NULL */
-bool pal_cells_shape_good(const pal_cells *cells, const double *x, pal_cells_fault *fault);
+bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault);
 
 /* Is the complex whole? Every index, every pair of mates and radials, every row and mark, then the shape at x
  * [n_vertex] [3] (NULL: its own): for after an edit. REFUSED names the first fault, MEMORY. */
-pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_note *note);
+pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_diagnostic *diag);
 
 /* Measures with positions x [n_vertex][3] (NULL: its own). A face that is not flat counts as the fan of triangles about
  * its corners' mean, so that cells fill the solid exactly. */
@@ -171,7 +171,7 @@ static inline int32_t pal_cells_prev(const pal_cells *c, int32_t use)
     return (use == f->first_use ? f[1].first_use : use) - 1;
 }
 /* the vertex the edge use ends at */
-static inline int32_t pal_cells_far(const pal_cells *c, int32_t use)
+static inline int32_t pal_cells_end_vertex(const pal_cells *c, int32_t use)
 {
     const pal_cell_edge *e = &c->edge[c->edge_use[use].edge];
     return e->vertex[e->vertex[0] == c->edge_use[use].vertex];
@@ -186,7 +186,7 @@ static inline int32_t pal_cells_face_of(const pal_cells *c, int32_t use)
 }
 /* the next edge use of the same cell from the same vertex: all of them in a cycle, counter-clockwise seen from outside
  */
-static inline int32_t pal_cells_turn(const pal_cells *c, int32_t use)
+static inline int32_t pal_cells_next_around(const pal_cells *c, int32_t use)
 {
     return c->edge_use[pal_cells_prev(c, use)].radial;
 }
@@ -203,7 +203,7 @@ static inline int32_t pal_cells_face_loop(const pal_cells *c, int32_t face, int3
 }
 /* From an edge use of a boundary face to that of the boundary face next to it over the same edge, through all cells
  * between; it runs the other way. With next and prev it walks the boundary as a surface. */
-static inline int32_t pal_cells_over(const pal_cells *c, int32_t use)
+static inline int32_t pal_cells_across_edge(const pal_cells *c, int32_t use)
 {
     for (use = c->edge_use[use].radial; c->edge_use[use].mate >= 0; use = c->edge_use[c->edge_use[use].mate].radial) {
     }

@@ -27,7 +27,7 @@
 /* one level being made: the old cells, the rows, and where each new kind of vertex begins */
 typedef struct level {
     const pal_cells *c;
-    pal_row_build *row;
+    pal_interpolation_builder *row;
     bool averaging;
     int32_t first_edge, first_face, first_cell, n_vertex;
 } level;
@@ -45,20 +45,21 @@ static level level_of(const pal_cells *c)
 
 static void add_mid(const level *l, int32_t e, double s)
 {
-    for (int k = 0; k < 2; k++) pal_row_add(l->row, l->c->edge[e].vertex[k], s / 2);
+    for (int k = 0; k < 2; k++) pal_interpolation_builder_add(l->row, l->c->edge[e].vertex[k], s / 2);
 }
 
 static void add_face(const level *l, int32_t f, double s)
 {
     int32_t first, n = pal_cells_face_loop(l->c, f, &first);
-    for (int32_t k = 0; k < n; k++) pal_row_add(l->row, l->c->edge_use[first + k].vertex, s / n);
+    for (int32_t k = 0; k < n; k++) pal_interpolation_builder_add(l->row, l->c->edge_use[first + k].vertex, s / n);
 }
 
 static void add_cell(const level *l, int32_t cell, double s)
 {
     const pal_cell_rows *r = &l->c->cell_vertex;
     int32_t n = r->start[cell + 1] - r->start[cell];
-    for (int32_t k = r->start[cell]; k < r->start[cell + 1]; k++) pal_row_add(l->row, r->item[k], s / n);
+    for (int32_t k = r->start[cell]; k < r->start[cell + 1]; k++)
+        pal_interpolation_builder_add(l->row, r->item[k], s / n);
 }
 
 /* centroid of the new cell of entry k of cell_vertex, as it is cut: the vertex, its edges' midpoints, its faces, C */
@@ -66,15 +67,15 @@ static void add_part(const level *l, int32_t cell, int32_t k, double s)
 {
     const pal_cells *c = l->c;
     int32_t first = c->corner_use[k], use = first, n = 0;
-    do n++, use = pal_cells_turn(c, use);
+    do n++, use = pal_cells_next_around(c, use);
     while (use != first);
     s /= 2 * n + 2;
-    pal_row_add(l->row, c->cell_vertex.item[k], s);
+    pal_interpolation_builder_add(l->row, c->cell_vertex.item[k], s);
     add_cell(l, cell, s);
     do {
         add_mid(l, c->edge_use[use].edge, s);
         add_face(l, pal_cells_face_of(c, use), s);
-        use = pal_cells_turn(c, use);
+        use = pal_cells_next_around(c, use);
     } while (use != first);
 }
 
@@ -82,7 +83,7 @@ static void add_part(const level *l, int32_t cell, int32_t k, double s)
 static void add_quad(const level *l, int32_t use, double s)
 {
     const pal_cells *c = l->c;
-    pal_row_add(l->row, c->edge_use[use].vertex, s / 4);
+    pal_interpolation_builder_add(l->row, c->edge_use[use].vertex, s / 4);
     add_mid(l, c->edge_use[use].edge, s / 4);
     add_mid(l, c->edge_use[pal_cells_prev(c, use)].edge, s / 4);
     add_face(l, pal_cells_face_of(c, use), s / 4);
@@ -188,7 +189,7 @@ static void boundary_vertex(const level *l, int32_t v, double s)
     if (l->averaging) return;
     for (int32_t k = edges->start[v]; k < edges->start[v + 1]; k++)
         if (c->edge[edges->item[k]].boundary) add_mid(l, edges->item[k], 2 * s / n / n);
-    pal_row_add(l->row, v, s * (n - 3) / n);
+    pal_interpolation_builder_add(l->row, v, s * (n - 3) / n);
 }
 
 static void inner_vertex(const level *l, int32_t v, double s)
@@ -207,7 +208,7 @@ static void inner_vertex(const level *l, int32_t v, double s)
     if (l->averaging) return;
     for (int32_t k = faces->start[v]; k < faces->start[v + 1]; k++) add_face(l, faces->item[k], 3 * s / 8 / n_face);
     for (int32_t k = edges->start[v]; k < edges->start[v + 1]; k++) add_mid(l, edges->item[k], 3 * s / 8 / n_edge);
-    pal_row_add(l->row, v, s / 8);
+    pal_interpolation_builder_add(l->row, v, s / 8);
 }
 
 /* the sharp edges at a vertex: the sharpest two, and the sharpnesses of the sharpest three, at most 1 */
@@ -240,14 +241,14 @@ static crease crease_at(const pal_cells *c, int32_t v)
 static void vertex_rule(const level *l, int32_t v)
 {
     const pal_cells *c = l->c;
-    double stay = c->vertex_pinched[v] ? 1 : fmin(c->vertex_sharp[v], 1), s = 1 - stay;
+    double stay = c->vertex_pinched[v] ? 1 : fmin(c->vertex_sharpness[v], 1), s = 1 - stay;
     crease at = crease_at(c, v);
     stay += s * at.sharp[2];
-    if (stay > 0) pal_row_add(l->row, v, stay);
+    if (stay > 0) pal_interpolation_builder_add(l->row, v, stay);
     double on = s * (at.sharp[1] - at.sharp[2]), smooth = s * (1 - at.sharp[1]);
     if (on > 0) {
         /* (P1 + 6 P + P2)/8 by the two midpoints */
-        pal_row_add(l->row, v, on / 2);
+        pal_interpolation_builder_add(l->row, v, on / 2);
         for (int k = 0; k < 2; k++) add_mid(l, at.edge[k], on / 4);
     }
     if (smooth <= 0) return;
@@ -258,12 +259,12 @@ static void vertex_rule(const level *l, int32_t v)
 }
 
 /* the level's rows, in the order of the new vertices */
-static pal_err make_rows(const pal_cells *c, bool averaging, int64_t most_entry, pal_point_rows *out)
+static pal_err make_rows(const pal_cells *c, bool averaging, int64_t max_entry, pal_interpolation *out)
 {
-    pal_row_build build;
+    pal_interpolation_builder build;
     level l = level_of(c);
     l.row = &build, l.averaging = averaging;
-    pal_row_build_begin(&build, l.n_vertex, c->n_vertex, most_entry);
+    pal_interpolation_builder_begin(&build, l.n_vertex, c->n_vertex, max_entry);
     for (int32_t i = 0; i < l.n_vertex && !build.err; i++) {
         if (i < l.first_edge)
             vertex_rule(&l, i);
@@ -273,9 +274,9 @@ static pal_err make_rows(const pal_cells *c, bool averaging, int64_t most_entry,
             face_rule(&l, i - l.first_face);
         else
             cell_rule(&l, i - l.first_cell);
-        pal_row_end(&build);
+        pal_interpolation_builder_end_row(&build);
     }
-    return pal_row_build_finish(&build, out);
+    return pal_interpolation_builder_finish(&build, out);
 }
 
 /* ---- the new cells ---- */
@@ -283,7 +284,7 @@ static pal_err make_rows(const pal_cells *c, bool averaging, int64_t most_entry,
 /* what is left of a sharpness a level later */
 static float after(float s)
 {
-    return s >= PAL_SHARP_EVER ? PAL_SHARP_EVER : s > 1 ? s - 1 : 0;
+    return s >= PAL_SHARPNESS_MAX ? PAL_SHARPNESS_MAX : s > 1 ? s - 1 : 0;
 }
 
 /* loops, origins of the cells and of the loops (a control face, or -1); the tags come after */
@@ -305,7 +306,7 @@ static void fill_loops(const pal_cells *c, pal_cell_loops *to, const int32_t *ce
                 loop[2] = l.first_face + f, loop[3] = l.first_edge + c->edge_use[before].edge;
                 loop_origin[n_loop] = face_from[f];
                 to->loop[n_loop++] = n_corner, n_corner += 4;
-                use = pal_cells_turn(c, use);
+                use = pal_cells_next_around(c, use);
             } while (use != first);
             /* the inner quads cross the edges: over from the face on their left to the one on their right */
             do {
@@ -315,7 +316,7 @@ static void fill_loops(const pal_cells *c, pal_cell_loops *to, const int32_t *ce
                 loop[2] = l.first_cell + cell, loop[3] = l.first_face + f;
                 loop_origin[n_loop] = -1;
                 to->loop[n_loop++] = n_corner, n_corner += 4;
-                use = pal_cells_turn(c, use);
+                use = pal_cells_next_around(c, use);
             } while (use != first);
         }
     to->cell[to->n_cell] = n_loop;
@@ -343,11 +344,11 @@ static void fill_tags(const pal_cells *c, pal_cell_loops *to)
                     to->face_tag[to->n_face_tag] = (pal_cell_tag){to->cell[k] + n, 0, after(c->face[f].sharp)};
                 to->n_face_tag++;
             }
-            n++, use = pal_cells_turn(c, use);
+            n++, use = pal_cells_next_around(c, use);
         } while (use != c->corner_use[k]);
     }
-    if (to->vertex_sharp)
-        for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharp[v] = after(c->vertex_sharp[v]);
+    if (to->vertex_sharpness)
+        for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharpness[v] = after(c->vertex_sharpness[v]);
 }
 
 /* arrays of the level's loops, filled but for positions; loop_origin [4 n_face_use .. all loops], cell_origin */
@@ -361,10 +362,10 @@ static pal_err make_loops(const pal_cells *c, const pal_subdivision *from, pal_c
     to->cell = malloc(((size_t)to->n_cell + 1) * sizeof *to->cell);
     to->loop = malloc((n_loop + 1) * sizeof *to->loop);
     to->corner = malloc(n_corner * sizeof *to->corner);
-    to->vertex_sharp = calloc((size_t)to->n_vertex, sizeof *to->vertex_sharp);
+    to->vertex_sharpness = calloc((size_t)to->n_vertex, sizeof *to->vertex_sharpness);
     *cell_origin = malloc((size_t)to->n_cell * sizeof **cell_origin);
     *loop_origin = malloc(n_loop * sizeof **loop_origin);
-    if (!to->x || !to->cell || !to->loop || !to->corner || !to->vertex_sharp || !*cell_origin || !*loop_origin)
+    if (!to->x || !to->cell || !to->loop || !to->corner || !to->vertex_sharpness || !*cell_origin || !*loop_origin)
         return PAL_ERR_MEMORY;
     fill_loops(c, to, from->cell_origin, from->face_origin, *cell_origin, *loop_origin);
     fill_tags(c, to);
@@ -427,11 +428,12 @@ static double rows_bytes(double entries)
     return entries * (sizeof(int32_t) + sizeof(double));
 }
 
-static pal_err refuse(double byte, double budget, int at, const pal_subdivision_options *o, pal_note *note)
+static pal_err refuse(double byte, double budget, int at, const pal_subdivision_options *o, pal_diagnostic *diag)
 {
-    return pal_note_set(note, PAL_ERR_BUDGET,
-                        "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer levels", at,
-                        o->n_level, byte / 1048576, budget / 1048576);
+    return pal_diagnostic_set(
+        diag, PAL_ERR_BUDGET,
+        "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer levels", at, o->n_level,
+        byte / 1048576, budget / 1048576);
 }
 
 /* control face of each face of the new complex, whose loops' are known */
@@ -445,35 +447,36 @@ static pal_err name_faces(const pal_cells *c, const int32_t *loop_origin, int32_
 }
 
 /* the next level of s in place; s stays as it is when it fails */
-static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, double budget, pal_note *note)
+static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, double budget, pal_diagnostic *diag)
 {
     pal_subdivision next = {.n_level = s->n_level + 1};
     pal_cell_loops loops = {0};
-    pal_point_rows step = {0};
+    pal_interpolation step = {0};
     int32_t *loop_origin = NULL;
-    pal_note why = {""};
+    pal_diagnostic reason = {""};
     sizes now = sizes_of(&s->cells), then = sizes_after(&now);
     /* the rows of a level have at least one entry each; how many more is seen as they are made */
     double byte = bytes_of(&now) + making_bytes_of(&then), rows = rows_bytes(s->rows.start[s->rows.n_row]);
     if (byte + rows + 2 * rows_bytes(then.vertex) > budget || then.edge_use > INT32_MAX || then.edge > INT32_MAX / 4)
-        return refuse(byte + rows + 2 * rows_bytes(then.vertex), budget, next.n_level, o, note);
+        return refuse(byte + rows + 2 * rows_bytes(then.vertex), budget, next.n_level, o, diag);
     double room = (budget - byte - rows) / rows_bytes(1);
     pal_err err = make_rows(&s->cells, o->rule == PAL_SUBDIVISION_AVERAGING, (int64_t)room, &step);
     if (!err) {
         room -= step.start[step.n_row];
-        err = pal_point_rows_product(&step, &s->rows, (int64_t)room, &next.rows);
+        err = pal_interpolation_product(&step, &s->rows, (int64_t)room, &next.rows);
     }
     if (err == PAL_ERR_BUDGET)
-        pal_note_set(note, err, "subdivision: level %d of %d needs more than %.4g MiB", next.n_level, o->n_level,
-                     budget / 1048576);
+        pal_diagnostic_set(diag, err, "subdivision: level %d of %d needs more than %.4g MiB", next.n_level, o->n_level,
+                           budget / 1048576);
     if (!err) err = make_loops(&s->cells, s, &loops, &next.cell_origin, &loop_origin);
     if (!err) {
-        pal_point_rows_place(&step, s->cells.x, loops.x);
-        err = pal_cells_make(&loops, &next.cells, &why);
-        if (err && why.text[0]) pal_note_set(note, err, "subdivision: level %d: %s", next.n_level, why.text);
+        pal_interpolation_apply(&step, s->cells.x, loops.x);
+        err = pal_cells_make(&loops, &next.cells, &reason);
+        if (err && reason.text[0])
+            pal_diagnostic_set(diag, err, "subdivision: level %d: %s", next.n_level, reason.text);
     }
     if (!err) err = name_faces(&next.cells, loop_origin, &next.face_origin);
-    pal_point_rows_free(&step);
+    pal_interpolation_free(&step);
     pal_cell_loops_free(&loops);
     free(loop_origin);
     if (err) {
@@ -482,7 +485,7 @@ static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, doub
     }
     pal_subdivision_free(s);
     *s = next;
-    s->n_byte = (size_t)bytes_of(&then) + pal_point_rows_bytes(&s->rows);
+    s->n_byte = (size_t)bytes_of(&then) + pal_interpolation_bytes(&s->rows);
     return PAL_ERR_OK;
 }
 
@@ -490,31 +493,31 @@ static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, doub
 static pal_err begin(const pal_cells *control, pal_subdivision *s)
 {
     PAL_TRY(pal_cells_copy(control, &s->cells));
-    PAL_TRY(pal_point_rows_identity(control->n_vertex, &s->rows));
+    PAL_TRY(pal_interpolation_identity(control->n_vertex, &s->rows));
     s->cell_origin = malloc((size_t)control->n_cell * sizeof *s->cell_origin);
     s->face_origin = malloc((size_t)control->n_face * sizeof *s->face_origin);
     if (!s->cell_origin || !s->face_origin) return PAL_ERR_MEMORY;
     for (int32_t c = 0; c < control->n_cell; c++) s->cell_origin[c] = c;
     for (int32_t f = 0; f < control->n_face; f++) s->face_origin[f] = f;
     sizes size = sizes_of(control);
-    s->n_byte = (size_t)bytes_of(&size) + pal_point_rows_bytes(&s->rows);
+    s->n_byte = (size_t)bytes_of(&size) + pal_interpolation_bytes(&s->rows);
     return PAL_ERR_OK;
 }
 
 pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_options *options, pal_subdivision *out,
-                             pal_note *note)
+                             pal_diagnostic *diag)
 {
     pal_subdivision s = {0};
     double budget = (double)(options->budget_byte ? options->budget_byte : BUDGET);
-    if (options->n_level < 0 || options->n_level > PAL_SUBDIVISION_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
-                            options->n_level, PAL_SUBDIVISION_MOST);
-    if (control->n_cell < 1) return pal_note_set(note, PAL_ERR_REFUSED, "subdivision: there is no cell");
+    if (options->n_level < 0 || options->n_level > PAL_SUBDIVISION_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
+                                  options->n_level, PAL_SUBDIVISION_MAX);
+    if (control->n_cell < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: there is no cell");
     sizes size = sizes_of(control);
-    if (bytes_of(&size) > budget) return refuse(bytes_of(&size), budget, 0, options, note);
+    if (bytes_of(&size) > budget) return refuse(bytes_of(&size), budget, 0, options, diag);
     pal_err err = begin(control, &s);
-    while (!err && s.n_level < options->n_level) err = refine(&s, options, budget, note);
-    if (!err) pal_point_rows_place(&s.rows, control->x, s.cells.x);
+    while (!err && s.n_level < options->n_level) err = refine(&s, options, budget, diag);
+    if (!err) pal_interpolation_apply(&s.rows, control->x, s.cells.x);
     if (err)
         pal_subdivision_free(&s);
     else
@@ -525,7 +528,7 @@ pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_opt
 void pal_subdivision_free(pal_subdivision *s)
 {
     pal_cells_free(&s->cells);
-    pal_point_rows_free(&s->rows);
+    pal_interpolation_free(&s->rows);
     free(s->cell_origin);
     free(s->face_origin);
     memset(s, 0, sizeof *s);

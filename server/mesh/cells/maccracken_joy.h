@@ -9,12 +9,12 @@
  * weights do not look inside: boundary surfaces are Catmull-Clark surfaces (with averaging, only where four faces
  * meet), creases cubic B-splines.
  * Thread: [load] to make, [any] to read. */
-#ifndef PAL_MESH_MACCRACKEN_JOY_H
-#define PAL_MESH_MACCRACKEN_JOY_H
+#ifndef PAL_MESH_CELLS_MACCRACKEN_JOY_H
+#define PAL_MESH_CELLS_MACCRACKEN_JOY_H
 #include "server/mesh/cells/cells.h"
-#include "server/num/point_rows.h"
+#include "server/num/interpolation.h"
 
-#define PAL_SUBDIVISION_MOST 8 /* levels */
+#define PAL_SUBDIVISION_MAX 8 /* levels */
 
 typedef enum pal_subdivision_rule {
     PAL_SUBDIVISION_MACCRACKEN_JOY, /* weights of MacCracken, Joy 1996                                           */
@@ -23,7 +23,7 @@ typedef enum pal_subdivision_rule {
 } pal_subdivision_rule;
 
 typedef struct pal_subdivision_options {
-    int n_level; /* 0..PAL_SUBDIVISION_MOST; 0: the control cells themselves     */
+    int n_level; /* 0..PAL_SUBDIVISION_MAX; 0: the control cells themselves     */
     pal_subdivision_rule rule;
     size_t budget_byte; /* most memory, about, while it is made; 0: 512 MiB            */
 } pal_subdivision_options;
@@ -36,17 +36,17 @@ typedef struct pal_subdivision_options {
  * cells over, as all that is round them moves and they do not; on the boundary they do not as a rule. */
 typedef struct pal_subdivision {
     int n_level;
-    pal_cells cells;      /* after the last level; x = A p to the bit                                   */
-    pal_point_rows rows;  /* A                          [cells.n_vertex rows of control vertices]       */
-    int32_t *cell_origin; /* control cell that each cell is part of                      [cells.n_cell] */
-    int32_t *face_origin; /* control face that each face is part of, -1: inside a cell   [cells.n_face] */
-    size_t n_byte;        /* memory of all arrays, about                                                */
+    pal_cells cells;        /* after the last level; x = A p to the bit                                   */
+    pal_interpolation rows; /* A                          [cells.n_vertex rows of control vertices]       */
+    int32_t *cell_origin;   /* control cell that each cell is part of                      [cells.n_cell] */
+    int32_t *face_origin;   /* control face that each face is part of, -1: inside a cell   [cells.n_face] */
+    size_t n_byte;          /* memory of all arrays, about                                                */
 } pal_subdivision;
 
 /* The control cells are copied. REFUSED: number of levels out of range, or a level's cells fold over, with level, cell
  * and number. BUDGET, with both numbers, before the memory is taken; MEMORY. */
 pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_options *options, pal_subdivision *out,
-                             pal_note *note);
+                             pal_diagnostic *diag);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_subdivision_free(pal_subdivision *s);
 #endif

@@ -10,23 +10,23 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static pal_err read_open(int fd, const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_note *note)
+static pal_err read_open(int fd, const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_diagnostic *diag)
 {
     struct stat info;
-    if (fstat(fd, &info)) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    if (!S_ISREG(info.st_mode)) return pal_note_set(note, PAL_ERR_IO, "%s: not a file", path);
+    if (fstat(fd, &info)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    if (!S_ISREG(info.st_mode)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: not a file", path);
     if ((uint64_t)info.st_size > limit)
-        return pal_note_set(note, PAL_ERR_BUDGET, "%s: %lld bytes, at most %zu are read", path, (long long)info.st_size,
-                            limit);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %lld bytes, at most %zu are read", path,
+                                  (long long)info.st_size, limit);
     size_t n = 0, size = (size_t)info.st_size;
     uint8_t *all = malloc(size + 1);
-    if (!all) return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", path, size);
+    if (!all) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", path, size);
     while (n < size) {
         ssize_t got = read(fd, all + n, size - n);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) {
             free(all);
-            return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+            return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
         }
         if (got == 0) break;
         n += (size_t)got;
@@ -36,25 +36,26 @@ static pal_err read_open(int fd, const char *path, size_t limit, uint8_t **bytes
     return PAL_ERR_OK;
 }
 
-pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_note *note)
+pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_diagnostic *diag)
 {
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    pal_err err = read_open(fd, path, limit, bytes, n_byte, note);
+    if (fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    pal_err err = read_open(fd, path, limit, bytes, n_byte, diag);
     close(fd);
     return err;
 }
 
-pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note)
+pal_err pal_file_begin(pal_file_out *out, const char *path, pal_diagnostic *diag)
 {
     size_t n = strlen(path);
-    if (n >= sizeof out->path) return pal_note_set(note, PAL_ERR_IO, "%.100s...: the path is too long", path);
+    if (n >= sizeof out->path) return pal_diagnostic_set(diag, PAL_ERR_IO, "%.100s...: the path is too long", path);
     struct stat info; /* the new file takes the name: a device or a pipe of that name would be gone */
-    if (!stat(path, &info) && !S_ISREG(info.st_mode)) return pal_note_set(note, PAL_ERR_IO, "%s: not a file", path);
+    if (!stat(path, &info) && !S_ISREG(info.st_mode))
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: not a file", path);
     memcpy(out->path, path, n + 1);
     snprintf(out->temporary, sizeof out->temporary, "%s.XXXXXX", out->path);
     int fd = mkstemp(out->temporary);
-    if (fd < 0) return pal_note_set(note, PAL_ERR_IO, "%s: %s", path, strerror(errno));
+    if (fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
     /* mkstemp keeps the file to its owner; give it the rights of any new file */
     mode_t mask = umask(0);
     umask(mask);
@@ -63,29 +64,29 @@ pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note)
     if (out->file) return PAL_ERR_OK;
     close(fd);
     unlink(out->temporary);
-    return pal_note_set(note, PAL_ERR_MEMORY, "%s: no memory for a stream", path);
+    return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a stream", path);
 }
 
-pal_err pal_file_end(pal_file_out *out, pal_err err, pal_note *note)
+pal_err pal_file_end(pal_file_out *out, pal_err err, pal_diagnostic *diag)
 {
     bool bad = ferror(out->file) != 0;
     bad |= fclose(out->file) != 0;
     out->file = NULL;
     if (!err && (bad || rename(out->temporary, out->path)))
-        err = pal_note_set(note, PAL_ERR_IO, "%s: %s", out->path, strerror(errno));
+        err = pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", out->path, strerror(errno));
     if (err) unlink(out->temporary);
     return err;
 }
 
-pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_note *note)
+pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_diagnostic *diag)
 {
     pal_file_out out;
-    PAL_TRY(pal_file_begin(&out, path, note));
+    PAL_TRY(pal_file_begin(&out, path, diag));
     if (n_byte) fwrite(bytes, 1, n_byte, out.file);
-    return pal_file_end(&out, PAL_ERR_OK, note);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
-void pal_file_show_name(char out[128], const char *name)
+void pal_file_printable_name(char out[128], const char *name)
 {
     size_t n = strlen(name), from = n > 120 ? n - 117 : 0;
     snprintf(out, 128, "%s%s", from ? "..." : "", name + from);
@@ -93,11 +94,11 @@ void pal_file_show_name(char out[128], const char *name)
         if ((unsigned char)*c < 0x20 || *c == 0x7F) *c = '?';
 }
 
-pal_err pal_file_refuse(pal_note *note, const char *name, const char *unit, int64_t at, const char *format,
+pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format,
                         va_list list)
 {
-    if (!note) return PAL_ERR_REFUSED;
+    if (!diag) return PAL_ERR_REFUSED;
     char sentence[320];
     vsnprintf(sentence, sizeof sentence, format, list);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
 }

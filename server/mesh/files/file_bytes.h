@@ -1,8 +1,8 @@
 /* Files that appear whole or not at all: written under a temporary name beside the path, then renamed; and how readers
  * name a file and a place in it. Only for the readers and writers of this room; pal_file_read and pal_file_write are
  * declared in mesh_file.h. Thread: [load]. */
-#ifndef PAL_MESH_FILE_BYTES_H
-#define PAL_MESH_FILE_BYTES_H
+#ifndef PAL_MESH_FILES_FILE_BYTES_H
+#define PAL_MESH_FILES_FILE_BYTES_H
 #include "server/base/err.h"
 
 #include <stdarg.h>
@@ -14,13 +14,13 @@ typedef struct pal_file_out {
     char path[4096], temporary[4104];
 } pal_file_out;
 
-pal_err pal_file_begin(pal_file_out *out, const char *path, pal_note *note);
+pal_err pal_file_begin(pal_file_out *out, const char *path, pal_diagnostic *diag);
 /* closes; with err == 0 and every write good the file takes its name, else the temporary one is removed. IO or err */
-pal_err pal_file_end(pal_file_out *out, pal_err err, pal_note *note);
+pal_err pal_file_end(pal_file_out *out, pal_err err, pal_diagnostic *diag);
 
 /* the name as messages show it: printable, one line, its end when it is long */
-void pal_file_show_name(char out[128], const char *name);
+void pal_file_printable_name(char out[128], const char *name);
 /* REFUSED with "NAME: UNIT AT: sentence"; unit is "line" or "byte", note may be NULL */
-pal_err pal_file_refuse(pal_note *note, const char *name, const char *unit, int64_t at, const char *format,
+pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format,
                         va_list list) __attribute__((format(printf, 5, 0)));
 #endif

@@ -14,7 +14,7 @@ pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, .
 {
     va_list list;
     va_start(list, format);
-    pal_err err = pal_file_refuse(build->note, build->name, build->binary ? "byte" : "line", at, format, list);
+    pal_err err = pal_file_refuse(build->diag, build->name, build->binary ? "byte" : "line", at, format, list);
     va_end(list);
     return err;
 }
@@ -24,11 +24,12 @@ static pal_err grow(pal_mesh_build *build, void **array, size_t *cap, size_t n, 
 {
     if (more <= *cap - n) return PAL_ERR_OK;
     if (more > most_piece || n + more > most_piece)
-        return pal_note_set(build->note, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, most_piece);
+        return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, most_piece);
     size_t wanted = n + more > *cap + *cap / 2 ? n + more : *cap + *cap / 2;
     if (wanted < 64) wanted = 64;
     void *moved = realloc(*array, wanted * size);
-    if (!moved) return pal_note_set(build->note, PAL_ERR_MEMORY, "%s: no memory for %zu pieces", build->name, wanted);
+    if (!moved)
+        return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for %zu pieces", build->name, wanted);
     *array = moved;
     *cap = wanted;
     return PAL_ERR_OK;
@@ -74,9 +75,9 @@ pal_err pal_mesh_fan_corner(pal_mesh_build *build, int64_t at, int64_t index)
 {
     if (index < 0 || index > INT32_MAX - 1)
         return pal_mesh_refuse(build, at, "a face uses vertex index %lld", (long long)index);
-    if (index > build->most_index) {
-        build->most_index = index;
-        build->most_at = at;
+    if (index > build->max_index) {
+        build->max_index = index;
+        build->max_index_at = at;
     }
     if (build->fan_n < 3) build->fan_n++;
     if (build->fan_n == 1) build->fan_first = index;

@@ -1,7 +1,7 @@
 /* What the surface readers share: arrays that grow with the bytes that are there, polygons as fans, and refusals that
  * name the file and the place. Only for the readers of this room. Thread: [load]. */
-#ifndef PAL_MESH_MESH_BUILD_H
-#define PAL_MESH_MESH_BUILD_H
+#ifndef PAL_MESH_FILES_MESH_BUILD_H
+#define PAL_MESH_FILES_MESH_BUILD_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -11,16 +11,16 @@ typedef struct pal_mesh_build {
     const char *name; /* file name for messages                                          */
     const uint8_t *bytes;
     size_t n_byte;
-    pal_note *note;
+    pal_diagnostic *diag;
     const char *format;     /* for the report                                                  */
     bool binary;            /* places are byte offsets, else line numbers                      */
     double *x;              /* [n_vertex][3]                                                   */
     int32_t *tri;           /* [n_tri][3], indices not yet checked against n_vertex            */
     size_t n_vertex, n_tri; /* in use                                                          */
     size_t cap_vertex, cap_tri;
-    int64_t most_index, most_at; /* largest index of any face (-1 at first) and its place      */
-    int64_t first_at;            /* place of the first face, 0: none yet                       */
-    int64_t fan_first, fan_last; /* the open polygon                                           */
+    int64_t max_index, max_index_at; /* largest index of any face (-1 at first) and its place      */
+    int64_t first_at;                /* place of the first face, 0: none yet                       */
+    int64_t fan_first, fan_last;     /* the open polygon                                           */
     int fan_n, fan_n_tri;
 } pal_mesh_build;
 

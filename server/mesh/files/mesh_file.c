@@ -39,9 +39,10 @@ static pal_err parse(pal_mesh_build *build)
     reader *read = choose(build->name, build->bytes, build->n_byte);
     if (!read) return pal_mesh_refuse(build, 0, "neither OBJ, STL, PLY nor OFF");
     PAL_TRY(read(build));
-    if (build->most_index >= (int64_t)build->n_vertex)
-        return pal_mesh_refuse(build, build->most_at, "a face uses vertex index %lld (from 0) of only %zu vertices",
-                               (long long)build->most_index, build->n_vertex);
+    if (build->max_index >= (int64_t)build->n_vertex)
+        return pal_mesh_refuse(build, build->max_index_at,
+                               "a face uses vertex index %lld (from 0) of only %zu vertices",
+                               (long long)build->max_index, build->n_vertex);
     return PAL_ERR_OK;
 }
 
@@ -57,10 +58,10 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
                       pal_surface_report *report, double *unit_m, const char **unit_name)
 {
     if (options->weld >= 0) {
-        pal_note why = {{0}};
-        pal_err err = pal_surface_clean(s, options->weld, report, &why);
-        if (err == PAL_ERR_REFUSED) return pal_mesh_refuse(build, build->first_at, "%s", why.text);
-        if (err) return pal_note_set(build->note, err, "%s: %s", build->name, why.text);
+        pal_diagnostic reason = {{0}};
+        pal_err err = pal_surface_clean(s, options->weld, report, &reason);
+        if (err == PAL_ERR_REFUSED) return pal_mesh_refuse(build, build->first_at, "%s", reason.text);
+        if (err) return pal_diagnostic_set(build->diag, err, "%s: %s", build->name, reason.text);
     }
     double low[3], high[3], unit = options->unit_m;
     const char *word = "given";
@@ -74,13 +75,13 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
 
 pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_mesh_file_options *options,
                             pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
-                            pal_note *note)
+                            pal_diagnostic *diag)
 {
     static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
     char shown[128];
-    pal_file_show_name(shown, name);
+    pal_file_printable_name(shown, name);
     pal_mesh_build build = {
-        .name = shown, .bytes = bytes, .n_byte = n_byte, .note = note, .binary = true, .most_index = -1};
+        .name = shown, .bytes = bytes, .n_byte = n_byte, .diag = diag, .binary = true, .max_index = -1};
     pal_err err = parse(&build);
     pal_surface s = {.n_vertex = (int)build.n_vertex, .n_tri = (int)build.n_tri, .x = build.x, .tri = build.tri};
     pal_surface_report found = {.n_vertex_read = (int64_t)build.n_vertex, .n_tri_read = (int64_t)build.n_tri};
@@ -99,12 +100,12 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
 }
 
 pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
-                           pal_surface_report *report, double *unit_m, const char **unit_name, pal_note *note)
+                           pal_surface_report *report, double *unit_m, const char **unit_name, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, most_byte, &bytes, &n_byte, note));
-    pal_err err = pal_mesh_file_parse(path, bytes, n_byte, options, out, report, unit_m, unit_name, note);
+    PAL_TRY(pal_file_read(path, most_byte, &bytes, &n_byte, diag));
+    pal_err err = pal_mesh_file_parse(path, bytes, n_byte, options, out, report, unit_m, unit_name, diag);
     free(bytes);
     return err;
 }

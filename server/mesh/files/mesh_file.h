@@ -2,8 +2,8 @@
  *
  * Every refusal is one sentence with the file's name and the line (text) or byte offset (binary). Memory is bounded by
  * a small multiple of the file's size, whatever counts it claims. Thread: [load]. */
-#ifndef PAL_MESH_MESH_FILE_H
-#define PAL_MESH_MESH_FILE_H
+#ifndef PAL_MESH_FILES_MESH_FILE_H
+#define PAL_MESH_FILES_MESH_FILE_H
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
@@ -22,11 +22,11 @@ typedef struct pal_mesh_file_options {
  * COFF, NOFF headers, comments. unit_name out ("m", "mm", "scaled", or "given" for options' own) and unit_m out may be
  * NULL. IO, REFUSED, MEMORY. */
 pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
-                           pal_surface_report *report, double *unit_m, const char **unit_name, pal_note *note);
+                           pal_surface_report *report, double *unit_m, const char **unit_name, pal_diagnostic *diag);
 /* the same from memory: name is used in messages only */
 pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_mesh_file_options *options,
                             pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
-                            pal_note *note);
+                            pal_diagnostic *diag);
 
 /* unit of a body whose box diagonal is given in file units, from the sizes organs have (5 mm to 1 m):
  * diagonal 3 to 3000: mm; 0.003 to 3: m (the overlap at 3 goes to mm); otherwise the file's unit is taken so that the
@@ -36,20 +36,20 @@ double pal_mesh_unit_guess(double diagonal, const char **name);
 double pal_mesh_unit_named(const char *word);
 
 /* binary little-endian PLY, float32 metres (positions + origin), int32 lists; whole file written or none; IO */
-pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_note *note);
+pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag);
 /* text OBJ, metres with all digits of a double; whole file written or none; IO */
-pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_note *note);
+pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag);
 /* binary STL, float32 metres; whole file written or none; IO */
-pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_note *note);
+pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag);
 /* one of the three by the end of the path, .ply, .obj or .stl; REFUSED (another ending), IO */
-pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_note *note);
+pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_diagnostic *diag);
 
 /* TetGen files STEM.node, STEM.ele, STEM.face: 1-based, positions in m with origin added, boundary marker 1 on surface
  * nodes and faces; IO */
-pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_note *note);
+pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_diagnostic *diag);
 
 /* whole file into memory (caller frees), at most limit bytes; IO, BUDGET, MEMORY */
-pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_note *note);
+pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_diagnostic *diag);
 /* writes to a temporary name beside path and renames, so that a reader never sees half a file; IO */
-pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_note *note);
+pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_diagnostic *diag);
 #endif

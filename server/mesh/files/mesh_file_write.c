@@ -7,10 +7,10 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are written in the host's order");
 
-pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_note *note)
+pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
-    PAL_TRY(pal_file_begin(&out, path, note));
+    PAL_TRY(pal_file_begin(&out, path, diag));
     fprintf(out.file,
             "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex %d\nproperty float x\n"
             "property float y\nproperty float z\nelement face %d\nproperty list uchar int vertex_indices\n"
@@ -26,7 +26,7 @@ pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pa
         memcpy(row + 1, surface->tri + 3 * t, 12);
         fwrite(row, sizeof row, 1, out.file);
     }
-    return pal_file_end(&out, PAL_ERR_OK, note);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
 /* writes a number and a blank at p and returns the end; about ten times as fast as printf */
@@ -72,7 +72,7 @@ static void write_nodes(FILE *file, const pal_tets *tets)
 {
     char row[160];
     /* picometres are enough for bodies of more than a tenth of a millimetre */
-    bool fixed = tets->h_m > 1e-6;
+    bool fixed = tets->edge_m > 1e-6;
     fprintf(file, "%d 3 0 1\n", tets->n_node);
     for (size_t i = 0; i < (size_t)tets->n_node; i++) {
         char *p = put_int(row, (int64_t)i + 1);
@@ -92,11 +92,11 @@ static void write_corners(FILE *file, const int32_t *corner, int n_row, size_t n
     }
 }
 
-pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_note *note)
+pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
     char row[160];
-    PAL_TRY(pal_file_begin(&out, path, note));
+    PAL_TRY(pal_file_begin(&out, path, diag));
     fprintf(out.file, "# metres\n");
     for (size_t i = 0; i < (size_t)surface->n_vertex; i++) {
         char *p = row + 2;
@@ -110,13 +110,13 @@ pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pa
         for (size_t k = 0; k < 3; k++) p = put_int(p, (int64_t)surface->tri[3 * t + k] + 1);
         end_row(out.file, row, p);
     }
-    return pal_file_end(&out, PAL_ERR_OK, note);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
-pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_note *note)
+pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
-    PAL_TRY(pal_file_begin(&out, path, note));
+    PAL_TRY(pal_file_begin(&out, path, diag));
     char head[80] = "binary, metres";
     uint32_t n_tri = (uint32_t)surface->n_tri;
     fwrite(head, sizeof head, 1, out.file);
@@ -137,31 +137,31 @@ pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pa
         memcpy(packed, row, sizeof row);
         fwrite(packed, sizeof packed, 1, out.file);
     }
-    return pal_file_end(&out, PAL_ERR_OK, note);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
-pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_note *note)
+pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     size_t n = strlen(path);
     const char *end = n > 4 ? path + n - 4 : "";
     char shown[128];
-    if (!strcmp(end, ".ply")) return pal_mesh_file_write_ply(path, surface, note);
-    if (!strcmp(end, ".obj")) return pal_mesh_file_write_obj(path, surface, note);
-    if (!strcmp(end, ".stl")) return pal_mesh_file_write_stl(path, surface, note);
-    pal_file_show_name(shown, path);
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
+    if (!strcmp(end, ".ply")) return pal_mesh_file_write_ply(path, surface, diag);
+    if (!strcmp(end, ".obj")) return pal_mesh_file_write_obj(path, surface, diag);
+    if (!strcmp(end, ".stl")) return pal_mesh_file_write_stl(path, surface, diag);
+    pal_file_printable_name(shown, path);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
 }
 
-pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_note *note)
+pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_diagnostic *diag)
 {
     static const char *const tail[3] = {".node", ".ele", ".face"};
     for (int k = 0; k < 3; k++) {
         char path[4096];
         if (strlen(stem) + 8 > sizeof path)
-            return pal_note_set(note, PAL_ERR_IO, "%.100s...: the path is too long", stem);
+            return pal_diagnostic_set(diag, PAL_ERR_IO, "%.100s...: the path is too long", stem);
         snprintf(path, sizeof path, "%s%s", stem, tail[k]);
         pal_file_out out;
-        PAL_TRY(pal_file_begin(&out, path, note));
+        PAL_TRY(pal_file_begin(&out, path, diag));
         if (k == 0) {
             write_nodes(out.file, tets);
         } else if (k == 1) {
@@ -171,7 +171,7 @@ pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_n
             fprintf(out.file, "%d 1\n", tets->n_face);
             write_corners(out.file, tets->face, tets->n_face, 3, true);
         }
-        PAL_TRY(pal_file_end(&out, PAL_ERR_OK, note));
+        PAL_TRY(pal_file_end(&out, PAL_ERR_OK, diag));
     }
     return PAL_ERR_OK;
 }

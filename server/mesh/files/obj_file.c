@@ -25,7 +25,7 @@ static pal_err read_position(pal_mesh_build *build, pal_text_scan *scan)
     for (int a = 0; a < 3; a++)
         if (!pal_text_double(scan, &p[a]))
             return pal_mesh_refuse(build, scan->line, "a position needs three numbers, found %s",
-                                   pal_text_show(scan).text);
+                                   pal_text_excerpt_at(scan).text);
     return pal_mesh_vertex(build, p);
 }
 
@@ -54,7 +54,7 @@ static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan)
     while (pal_text_more(scan)) {
         int64_t index;
         if (!read_corner(scan, &index))
-            return pal_mesh_refuse(build, scan->line, "a face corner is %s", pal_text_show(scan).text);
+            return pal_mesh_refuse(build, scan->line, "a face corner is %s", pal_text_excerpt_at(scan).text);
         if (index == 0) return pal_mesh_refuse(build, scan->line, "a face uses vertex 0, the first is 1");
         if (index < 0 && -index > (int64_t)build->n_vertex)
             return pal_mesh_refuse(build, scan->line, "a face uses vertex %lld, only %zu came before", (long long)index,

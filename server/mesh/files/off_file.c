@@ -33,7 +33,8 @@ static pal_err read_counts(pal_mesh_build *build, pal_text_scan *scan, int64_t n
     static const char *const what[2] = {"vertices", "faces"};
     for (int k = 0; k < 2; k++) {
         if (!pal_text_seek(scan) || !pal_text_int(scan, &n[k]) || n[k] < 0)
-            return pal_mesh_refuse(build, scan->line, "the number of %s is %s", what[k], pal_text_show(scan).text);
+            return pal_mesh_refuse(build, scan->line, "the number of %s is %s", what[k],
+                                   pal_text_excerpt_at(scan).text);
         /* a vertex takes at least six bytes, a face at least two */
         int64_t most = (scan->end - scan->at) / (k == 0 ? 6 : 2) + 1;
         if (n[k] > most)
@@ -54,7 +55,7 @@ static pal_err read_vertices(pal_mesh_build *build, pal_text_scan *scan, int64_t
         for (int a = 0; a < 3; a++)
             if (!pal_text_double(scan, &p[a]))
                 return pal_mesh_refuse(build, scan->line, "vertex %lld needs three numbers, found %s", (long long)i,
-                                       pal_text_show(scan).text);
+                                       pal_text_excerpt_at(scan).text);
         PAL_TRY(pal_mesh_vertex(build, p));
     }
     return PAL_ERR_OK;
@@ -65,12 +66,12 @@ static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan, int64_t fac
     int64_t n, index;
     if (!pal_text_int(scan, &n) || n < 0)
         return pal_mesh_refuse(build, scan->line, "face %lld begins with %s, not its number of corners",
-                               (long long)face, pal_text_show(scan).text);
+                               (long long)face, pal_text_excerpt_at(scan).text);
     pal_mesh_fan_begin(build, scan->line);
     for (int64_t k = 0; k < n; k++) {
         if (!pal_text_int(scan, &index))
             return pal_mesh_refuse(build, scan->line, "corner %lld of %lld of face %lld is %s", (long long)k + 1,
-                                   (long long)n, (long long)face, pal_text_show(scan).text);
+                                   (long long)n, (long long)face, pal_text_excerpt_at(scan).text);
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, index));
     }
     return pal_mesh_fan_end(build);

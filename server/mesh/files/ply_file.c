@@ -59,7 +59,7 @@ static bool take_type(pal_text_scan *scan, pal_scalar *out)
 static pal_err refuse_header(ply *p, const char *what)
 {
     p->build->binary = false;
-    return pal_mesh_refuse(p->build, p->scan.line, "%s, found %s", what, pal_text_show(&p->scan).text);
+    return pal_mesh_refuse(p->build, p->scan.line, "%s, found %s", what, pal_text_excerpt_at(&p->scan).text);
 }
 
 static pal_err read_format(ply *p)
@@ -160,7 +160,8 @@ static pal_err take_value(ply *p, pal_scalar type, double *out)
     if (p->ascii) {
         if (pal_text_seek(&p->scan) && pal_text_double(&p->scan, out)) return PAL_ERR_OK;
         if (p->scan.at == p->scan.end) return pal_mesh_refuse(p->build, p->scan.line, "the file ends inside the body");
-        return pal_mesh_refuse(p->build, p->scan.line, "expected a number, found %s", pal_text_show(&p->scan).text);
+        return pal_mesh_refuse(p->build, p->scan.line, "expected a number, found %s",
+                               pal_text_excerpt_at(&p->scan).text);
     }
     const uint8_t *end = p->build->bytes + p->build->n_byte;
     if (end - p->at < pal_scalar_size(type))
@@ -298,7 +299,7 @@ pal_err pal_ply_parse(pal_mesh_build *build)
     build->format = "ply";
     build->binary = false;
     ply *p = calloc(1, sizeof *p);
-    if (!p) return pal_note_set(build->note, PAL_ERR_MEMORY, "%s: no memory for the header", build->name);
+    if (!p) return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for the header", build->name);
     p->build = build;
     p->scan = (pal_text_scan){.at = build->bytes, .end = build->bytes + build->n_byte, .line = 1};
     pal_err err = read_ply(p);

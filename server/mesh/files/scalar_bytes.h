@@ -1,6 +1,6 @@
 /* Numbers of any size and byte order from a file's bytes. Only for the readers of this room. Thread: any. */
-#ifndef PAL_MESH_SCALAR_BYTES_H
-#define PAL_MESH_SCALAR_BYTES_H
+#ifndef PAL_MESH_FILES_SCALAR_BYTES_H
+#define PAL_MESH_FILES_SCALAR_BYTES_H
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>

@@ -67,12 +67,13 @@ static pal_err read_loop(pal_mesh_build *build, pal_text_scan *scan)
         for (int a = 0; a < 3; a++)
             if (!pal_text_double(scan, &p[a]))
                 return pal_mesh_refuse(build, scan->line, "a vertex needs three numbers, found %s",
-                                       pal_text_show(scan).text);
+                                       pal_text_excerpt_at(scan).text);
         PAL_TRY(pal_mesh_vertex(build, p));
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, (int64_t)build->n_vertex - 1));
     }
     if (!pal_text_is(scan, "endloop"))
-        return pal_mesh_refuse(build, scan->line, "expected vertex or endloop, found %s", pal_text_show(scan).text);
+        return pal_mesh_refuse(build, scan->line, "expected vertex or endloop, found %s",
+                               pal_text_excerpt_at(scan).text);
     return pal_mesh_fan_end(build);
 }
 
@@ -92,12 +93,13 @@ static pal_err parse_ascii(pal_mesh_build *build)
             open = true;
         } else if (pal_text_is(&scan, "outer")) {
             if (!pal_text_is(&scan, "loop"))
-                return pal_mesh_refuse(build, scan.line, "expected loop, found %s", pal_text_show(&scan).text);
+                return pal_mesh_refuse(build, scan.line, "expected loop, found %s", pal_text_excerpt_at(&scan).text);
             PAL_TRY(read_loop(build, &scan));
         } else if (pal_text_is(&scan, "endfacet")) {
             open = false;
         } else {
-            return pal_mesh_refuse(build, scan.line, "expected facet or endsolid, found %s", pal_text_show(&scan).text);
+            return pal_mesh_refuse(build, scan.line, "expected facet or endsolid, found %s",
+                                   pal_text_excerpt_at(&scan).text);
         }
     }
     if (open) return pal_mesh_refuse(build, scan.line, "the file ends inside a facet");

@@ -193,7 +193,7 @@ bool pal_text_int(pal_text_scan *scan, int64_t *out)
     return true;
 }
 
-pal_text_excerpt pal_text_show(const pal_text_scan *scan)
+pal_text_excerpt pal_text_excerpt_at(const pal_text_scan *scan)
 {
     pal_text_excerpt show;
     pal_text_scan at = *scan;

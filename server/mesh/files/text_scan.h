@@ -2,8 +2,8 @@
  *
  * Lines end with LF, CR or CR LF. Numbers are exact (correctly rounded) and do not depend on the locale. The bytes are
  * untrusted and need no terminator. Thread: any. */
-#ifndef PAL_MESH_TEXT_SCAN_H
-#define PAL_MESH_TEXT_SCAN_H
+#ifndef PAL_MESH_FILES_TEXT_SCAN_H
+#define PAL_MESH_FILES_TEXT_SCAN_H
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -32,5 +32,5 @@ bool pal_text_int(pal_text_scan *scan, int64_t *out);
 typedef struct pal_text_excerpt {
     char text[32];
 } pal_text_excerpt;
-pal_text_excerpt pal_text_show(const pal_text_scan *scan);
+pal_text_excerpt pal_text_excerpt_at(const pal_text_scan *scan);
 #endif

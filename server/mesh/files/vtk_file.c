@@ -1,7 +1,7 @@
 /* Legacy VTK, version 3.0, ASCII (VTK User's Guide, "VTK File Formats").
  *
  * VTK goes around the lower face of a hexahedron and then around the upper one, so corners 2 and 3, 6 and 7 change
- * places; its quadratic tetrahedron has the middles of edges 01 12 20 03 13 23, as num/shape.h has. */
+ * places; its quadratic tetrahedron has the middles of edges 01 12 20 03 13 23, as num/shape_functions.h has. */
 #include "server/mesh/files/vtk_file.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -65,24 +65,24 @@ static void write_cells(FILE *file, const pal_vtk_grid *g)
     for (int e = 0; e < g->n_element; e++) fprintf(file, "%d\n", cell_type(g->n_corner));
 }
 
-static pal_err check_fields(const pal_vtk_field *field, int n, const char *path, pal_note *note)
+static pal_err check_fields(const pal_vtk_field *field, int n, const char *path, pal_diagnostic *diag)
 {
     for (int f = 0; f < n; f++)
         if (field[f].n_component != 1 && field[f].n_component != 3)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: field %.60s has %d components, not 1 or 3", path,
-                                field[f].name, field[f].n_component);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: field %.60s has %d components, not 1 or 3", path,
+                                      field[f].name, field[f].n_component);
     return PAL_ERR_OK;
 }
 
-pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_note *note)
+pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag)
 {
     const pal_vtk_grid *g = grid;
     pal_file_out out;
     if (!cell_type(g->n_corner))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: elements of %d corners", path, g->n_corner);
-    PAL_TRY(check_fields(g->point, g->n_point, path, note));
-    PAL_TRY(check_fields(g->cell, g->n_cell, path, note));
-    PAL_TRY(pal_file_begin(&out, path, note));
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: elements of %d corners", path, g->n_corner);
+    PAL_TRY(check_fields(g->point, g->n_point, path, diag));
+    PAL_TRY(check_fields(g->cell, g->n_cell, path, diag));
+    PAL_TRY(pal_file_begin(&out, path, diag));
     fputs("# vtk DataFile Version 3.0\n", out.file);
     write_word(out.file, g->title ? g->title : "mesh", true);
     fprintf(out.file, "\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS %d double\n", g->n_node);
@@ -90,5 +90,5 @@ pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_note 
     write_cells(out.file, g);
     write_fields(out.file, "POINT_DATA", g->point, g->n_point, g->n_node);
     write_fields(out.file, "CELL_DATA", g->cell, g->n_cell, g->n_element);
-    return pal_file_end(&out, PAL_ERR_OK, note);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }

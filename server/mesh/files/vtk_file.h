@@ -1,6 +1,6 @@
 /* Legacy VTK files: an unstructured grid of one kind of element with fields at nodes and cells. Thread: [load]. */
-#ifndef PAL_MESH_VTK_FILE_H
-#define PAL_MESH_VTK_FILE_H
+#ifndef PAL_MESH_FILES_VTK_FILE_H
+#define PAL_MESH_FILES_VTK_FILE_H
 #include "server/base/err.h"
 
 #include <stdint.h>
@@ -17,12 +17,12 @@ typedef struct pal_vtk_grid {
     int n_corner;           /* 8: hexahedra, 4: tetrahedra, 10: quadratic tetrahedra            */
     const double *x;        /* node position relative to origin_m, m              [n_node][3]  */
     const double *origin_m; /* [3], NULL: 0                                                    */
-    const int32_t *node;    /* as num/shape.h numbers corners and middles [n_element][n_corner] */
+    const int32_t *node;    /* as num/shape_functions.h numbers corners and middles [n_element][n_corner] */
     int n_point, n_cell;    /* fields at nodes and at elements                                 */
     const pal_vtk_field *point, *cell;
 } pal_vtk_grid;
 
 /* ASCII with 17 digits, a decimal point whatever the locale; whole file written or none; REFUSED (n_corner,
  * n_component), IO */
-pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_note *note);
+pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag);
 #endif

@@ -1,7 +1,7 @@
 /* AABB tree over the triangles of a surface: segment hits, nearest point, triangles in a box, winding number.
  * The tree borrows the surface. Thread: [load] to build, then read-only by any. */
-#ifndef PAL_MESH_BOX_TREE_H
-#define PAL_MESH_BOX_TREE_H
+#ifndef PAL_MESH_GEOMETRY_BOX_TREE_H
+#define PAL_MESH_GEOMETRY_BOX_TREE_H
 #include "server/mesh/geometry/surface.h"
 
 typedef struct pal_box_tree pal_box_tree;

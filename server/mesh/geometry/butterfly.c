@@ -32,7 +32,7 @@ double pal_butterfly_ring(int K, int i)
     return (0.25 + cos(a) + 0.5 * cos(2 * a)) / K;
 }
 
-double pal_butterfly_rim(int k, int i, int j)
+double pal_butterfly_boundary(int k, int i, int j)
 {
     double a = PI / k;
     if (j < 0) return 1 - sin(a) * sin(i * a) / (k * (1 - cos(a)));
@@ -48,12 +48,12 @@ typedef struct fan {
     int32_t first;
 } fan;
 
-static fan fan_of(const pal_wings *w, int32_t e, int32_t v)
+static fan fan_of(const pal_winged_mesh *w, int32_t e, int32_t v)
 {
     fan f = {0, false, e};
     int32_t at = e;
     do {
-        int32_t after = pal_wing_turn(w->edge, at, v);
+        int32_t after = pal_wing_next_around(w->edge, at, v);
         if (pal_wing_face(w->edge, at, v) < 0) f.rim = true, f.first = after;
         f.n_edge++;
         at = after;
@@ -61,7 +61,7 @@ static fan fan_of(const pal_wings *w, int32_t e, int32_t v)
     return f;
 }
 
-static bool is_corner(const pal_wings *w, int32_t v)
+static bool is_corner(const pal_winged_mesh *w, int32_t v)
 {
     return w->corner && v < w->n_corner && w->corner[v];
 }
@@ -71,7 +71,7 @@ static bool is_regular(const fan *f)
     return f->n_edge == (f->rim ? 4 : 6);
 }
 
-int pal_butterfly_bound(const pal_wings *wings, int32_t e)
+int pal_butterfly_max_entries(const pal_winged_mesh *wings, int32_t e)
 {
     int n = 8;
     for (int end = 0; end < 2 && wings->edge[e].face[1] >= 0; end++) {
@@ -107,13 +107,13 @@ static void add(entries *to, int32_t index, double weight)
 }
 
 /* third vertex of the face on one side of an edge */
-static int32_t opposite(const pal_wings *w, int32_t e, int side)
+static int32_t opposite(const pal_winged_mesh *w, int32_t e, int side)
 {
-    return pal_wing_far(w->edge, w->edge[e].next[side], w->edge[e].vertex[1 - side]);
+    return pal_wing_other_end(w->edge, w->edge[e].next[side], w->edge[e].vertex[1 - side]);
 }
 
 /* eq. 3; a wing beyond the boundary is reflected across it */
-static void regular_rule(const pal_wings *w, int32_t e, entries *to)
+static void regular_rule(const pal_winged_mesh *w, int32_t e, entries *to)
 {
     const pal_winged_edge *edge = w->edge;
     for (int side = 0; side < 2; side++) {
@@ -122,41 +122,41 @@ static void regular_rule(const pal_wings *w, int32_t e, entries *to)
         add(to, start, 0.5);
         add(to, top, 0.125);
         for (int k = 0; k < 2; k++) {
-            int32_t outer = k == 0 ? edge[e].next[side] : edge[e].prev[side], from = k == 0 ? end : top;
-            int outside = 1 - pal_wing_side(edge, outer, from);
-            if (edge[outer].face[outside] >= 0) {
-                add(to, opposite(w, outer, outside), -0.0625);
+            int32_t external_force = k == 0 ? edge[e].next[side] : edge[e].prev[side], from = k == 0 ? end : top;
+            int outside = 1 - pal_wing_side(edge, external_force, from);
+            if (edge[external_force].face[outside] >= 0) {
+                add(to, opposite(w, external_force, outside), -0.0625);
                 continue;
             }
-            add(to, edge[outer].vertex[0], -0.0625);
-            add(to, edge[outer].vertex[1], -0.0625);
+            add(to, edge[external_force].vertex[0], -0.0625);
+            add(to, edge[external_force].vertex[1], -0.0625);
             add(to, k == 0 ? start : end, 0.0625);
         }
     }
 }
 
 /* the rule of the end v of an inner edge, with all weights times share */
-static void end_rule(const pal_wings *w, int32_t e, int32_t v, double share, entries *to)
+static void end_rule(const pal_winged_mesh *w, int32_t e, int32_t v, double share, entries *to)
 {
     fan f = fan_of(w, e, v);
     if (!f.rim) {
         put(to, v, 0.75 * share);
         int32_t at = e;
-        for (int i = 0; i < f.n_edge; i++, at = pal_wing_turn(w->edge, at, v))
-            put(to, pal_wing_far(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
+        for (int i = 0; i < f.n_edge; i++, at = pal_wing_next_around(w->edge, at, v))
+            put(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
         return;
     }
     int k = f.n_edge - 1, place = 0;
     int32_t at = f.first;
-    while (at != e) at = pal_wing_turn(w->edge, at, v), place++;
-    put(to, v, share * pal_butterfly_rim(k, place, -1));
+    while (at != e) at = pal_wing_next_around(w->edge, at, v), place++;
+    put(to, v, share * pal_butterfly_boundary(k, place, -1));
     at = f.first;
-    for (int j = 0; j <= k; j++, at = pal_wing_turn(w->edge, at, v))
-        put(to, pal_wing_far(w->edge, at, v), share * pal_butterfly_rim(k, place, j));
+    for (int j = 0; j <= k; j++, at = pal_wing_next_around(w->edge, at, v))
+        put(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_boundary(k, place, j));
 }
 
 /* the four-point rule; the boundary ends at its corners */
-static void boundary_rule(const pal_wings *w, int32_t e, entries *to)
+static void boundary_rule(const pal_winged_mesh *w, int32_t e, entries *to)
 {
     const pal_winged_edge *edge = w->edge;
     for (int end = 0; end < 2; end++) {
@@ -167,7 +167,7 @@ static void boundary_rule(const pal_wings *w, int32_t e, entries *to)
             add(to, v, -0.125);
             add(to, edge[e].vertex[1 - end], 0.0625);
         } else
-            add(to, pal_wing_far(edge, beyond, v), -0.0625);
+            add(to, pal_wing_other_end(edge, beyond, v), -0.0625);
     }
 }
 
@@ -218,7 +218,7 @@ static void merge(entries *to)
     to->n = n;
 }
 
-int pal_butterfly_stencil(const pal_wings *wings, int32_t e, int32_t *index, double *weight)
+int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *index, double *weight)
 {
     const pal_winged_edge *at = &wings->edge[e];
     entries to = {0, index, weight};

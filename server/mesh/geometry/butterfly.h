@@ -5,8 +5,8 @@
  * before and after it on that walk. A hole counts as a face with number -1 whose walk follows the boundary, so that
  * prev and next exist everywhere and undo each other. A boundary edge has its hole on side 1.
  * Every vertex has one fan of faces. Thread: [any], nothing is kept. */
-#ifndef PAL_MESH_BUTTERFLY_H
-#define PAL_MESH_BUTTERFLY_H
+#ifndef PAL_MESH_GEOMETRY_BUTTERFLY_H
+#define PAL_MESH_GEOMETRY_BUTTERFLY_H
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -23,12 +23,12 @@ static inline int pal_wing_side(const pal_winged_edge *edge, int32_t e, int32_t 
     return edge[e].vertex[0] == v ? 0 : 1;
 }
 /* the other end */
-static inline int32_t pal_wing_far(const pal_winged_edge *edge, int32_t e, int32_t v)
+static inline int32_t pal_wing_other_end(const pal_winged_edge *edge, int32_t e, int32_t v)
 {
     return edge[e].vertex[edge[e].vertex[0] == v];
 }
 /* the next edge around v, counter-clockwise seen from outside; the whole fan is a cycle, holes included */
-static inline int32_t pal_wing_turn(const pal_winged_edge *edge, int32_t e, int32_t v)
+static inline int32_t pal_wing_next_around(const pal_winged_edge *edge, int32_t e, int32_t v)
 {
     return edge[e].prev[pal_wing_side(edge, e, v)];
 }
@@ -39,22 +39,22 @@ static inline int32_t pal_wing_face(const pal_winged_edge *edge, int32_t e, int3
 }
 
 /* one level of a surface; arrays are borrowed */
-typedef struct pal_wings {
+typedef struct pal_winged_mesh {
     const pal_winged_edge *edge;
     const uint8_t *corner; /* 1: the boundary has a corner here, [n_corner]; later vertices have none */
     int32_t n_corner;
-} pal_wings;
+} pal_winged_mesh;
 
 /* Weights of the ring of an inner vertex of K faces, entry i of 0..K-1 counter-clockwise from the split edge; K >= 3.
  * They sum to 1/4; the vertex itself has 3/4 (the printed eq. 4 leaves it out). */
 double pal_butterfly_ring(int K, int i);
 /* Weights of a boundary vertex of k faces for its edge i of 0..k, counter-clockwise from the boundary edge, 0 < i < k,
  * on ring vertex j of 0..k; j = -1: on the vertex itself. */
-double pal_butterfly_rim(int k, int i, int j);
+double pal_butterfly_boundary(int k, int i, int j);
 
 /* most entries the stencil of edge e can have; 8 for most */
-int pal_butterfly_bound(const pal_wings *wings, int32_t e);
+int pal_butterfly_max_entries(const pal_winged_mesh *wings, int32_t e);
 /* Indices, ascending and each once, and weights of the midpoint of edge e; returns their number. Weights sum to 1.
- * index and weight have room for pal_butterfly_bound entries. */
-int pal_butterfly_stencil(const pal_wings *wings, int32_t e, int32_t *index, double *weight);
+ * index and weight have room for pal_butterfly_max_entries entries. */
+int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *index, double *weight);
 #endif

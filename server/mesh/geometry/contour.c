@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double most_point = 2e8;
+static const double max_point = 2e8;
 static const double end_gap = 1e-4;
 
 typedef struct lattice {
@@ -224,7 +224,7 @@ static bool march_all(lattice *l)
 }
 
 pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contour_box *box, pal_surface *out,
-                    pal_note *note)
+                    pal_diagnostic *diag)
 {
     lattice l = {.h = box->spacing_m};
     double n_point = 2;
@@ -232,9 +232,9 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         double n = ceil((box->high_m[a] - box->low_m[a]) / l.h) + 1;
         n_point *= n + 1;
         l.low[a] = box->low_m[a];
-        if (!(n >= 2) || !(n_point <= most_point))
-            return pal_note_set(note, PAL_ERR_BUDGET, "contour of %.3g lattice points, at most %.3g", n_point,
-                                most_point);
+        if (!(n >= 2) || !(n_point <= max_point))
+            return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "contour of %.3g lattice points, at most %.3g", n_point,
+                                      max_point);
         l.n[a] = (int64_t)n;
     }
     l.n_corner = (l.n[0] + 1) * (l.n[1] + 1) * (l.n[2] + 1);
@@ -248,8 +248,8 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
     if (!good || l.n_tri == 0) {
         bool empty = good;
         lattice_free(&l);
-        return empty ? pal_note_set(note, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
-                     : pal_note_set(note, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
+        return empty ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
+                     : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
     }
     *out = (pal_surface){.n_vertex = (int)l.n_vertex, .n_tri = (int)l.n_tri, .x = l.x, .tri = l.tri};
     l.x = NULL;

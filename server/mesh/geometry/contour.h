@@ -2,8 +2,8 @@
  *
  * Every sign pattern gives a closed, manifold, outward-oriented surface without cracks, because each lattice edge is
  * crossed at most once and its tetrahedra form a ring around it. Thread: [load]. */
-#ifndef PAL_MESH_CONTOUR_H
-#define PAL_MESH_CONTOUR_H
+#ifndef PAL_MESH_GEOMETRY_CONTOUR_H
+#define PAL_MESH_GEOMETRY_CONTOUR_H
 #include "server/mesh/geometry/surface.h"
 
 /* value at a point (m): positive inside, negative outside; must be finite and continuous */
@@ -16,5 +16,5 @@ typedef struct pal_contour_box {
 
 /* out: recentred surface. REFUSED when nothing is inside, BUDGET beyond 200 million lattice points, MEMORY */
 pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contour_box *box, pal_surface *out,
-                    pal_note *note);
+                    pal_diagnostic *diag);
 #endif

@@ -1,6 +1,6 @@
 /* Fewer triangles for the same shape: edge collapse by quadric error (Garland and Heckbert 1997). Thread: [load]. */
-#ifndef PAL_MESH_DECIMATE_H
-#define PAL_MESH_DECIMATE_H
+#ifndef PAL_MESH_GEOMETRY_DECIMATE_H
+#define PAL_MESH_GEOMETRY_DECIMATE_H
 #include "server/mesh/geometry/surface.h"
 
 /* collapses edges, cheapest first, until at most n_tri triangles are left or no collapse is possible that keeps the

@@ -26,15 +26,15 @@ void pal_levels_free(pal_levels *l)
 
 /* ---- what is refused before any edge is known ---- */
 
-static pal_err check_face(const pal_surface *s, int t, pal_note *note)
+static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
 {
     const int32_t *c = s->tri + 3 * (size_t)t;
     for (int k = 0; k < 3; k++) {
         if (c[k] < 0 || c[k] >= s->n_vertex)
-            return pal_note_set(note, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d, there are %d", t, c[k],
-                                s->n_vertex);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d, there are %d", t, c[k],
+                                      s->n_vertex);
         if (c[k] == c[(k + 1) % 3])
-            return pal_note_set(note, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
     }
     double longest = 0, u[3], v[3], n[3];
     for (int k = 0; k < 3; k++)
@@ -43,30 +43,30 @@ static pal_err check_face(const pal_surface *s, int t, pal_note *note)
     pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
     pal_cross3(n, u, v);
     if (pal_norm3(n) > FLAT * longest * longest) return PAL_ERR_OK;
-    return pal_note_set(note, PAL_ERR_REFUSED,
-                        "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
-                        c[2]);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                              "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
+                              c[2]);
 }
 
-static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pal_note *note)
+static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pal_diagnostic *diag)
 {
-    if (o->n_level < 1 || o->n_level > PAL_LEVELS_MOST)
-        return pal_note_set(note, PAL_ERR_REFUSED, "levels: %d levels asked for, 1 to %d are made", o->n_level,
-                            PAL_LEVELS_MOST);
+    if (o->n_level < 1 || o->n_level > PAL_LEVELS_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: %d levels asked for, 1 to %d are made", o->n_level,
+                                  PAL_LEVELS_MAX);
     if (s->n_tri < 1 || s->n_vertex < 3)
-        return pal_note_set(note, PAL_ERR_REFUSED, "levels: a surface of %d vertices and %d triangles", s->n_vertex,
-                            s->n_tri);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: a surface of %d vertices and %d triangles",
+                                  s->n_vertex, s->n_tri);
     if (s->n_tri > INT32_MAX / 8 || s->n_vertex > INT32_MAX / 8)
-        return pal_note_set(note, PAL_ERR_BUDGET, "levels: %d vertices and %d triangles, at most %d are taken",
-                            s->n_vertex, s->n_tri, INT32_MAX / 8);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d vertices and %d triangles, at most %d are taken",
+                                  s->n_vertex, s->n_tri, INT32_MAX / 8);
     for (int v = 0; v < s->n_vertex; v++) {
         const double *x = s->x + 3 * (size_t)v;
         for (int a = 0; a < 3; a++)
             if (!(fabs(x[a]) <= FAR_M))
-                return pal_note_set(note, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0], x[1],
-                                    x[2]);
+                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0],
+                                          x[1], x[2]);
     }
-    for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, note));
+    for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, diag));
     return PAL_ERR_OK;
 }
 
@@ -98,21 +98,22 @@ static void order_sides(const pal_surface *s, int of, const int32_t *from, int32
 
 /* one edge from its n sides; the first gives its direction */
 static pal_err make_edge(const pal_surface *s, const int32_t *side, int n, int32_t e, pal_winged_edge *edge,
-                         int32_t *face_edge, pal_note *note)
+                         int32_t *face_edge, pal_diagnostic *diag)
 {
     int32_t low, high, a = s->tri[side[0]];
     side_ends(s, side[0], &low, &high);
     if (n > 2)
-        return pal_note_set(
-            note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
             "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
             "at most; " OFFER,
             n, side[0] / 3, side[1] / 3, side[2] / 3, n > 3 ? ", ..." : "", low, high);
     if (n == 2 && s->tri[side[1]] == a)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
-                            "one over, or " OFFER,
-                            side[0] / 3, side[1] / 3, low, high);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
+            "one over, or " OFFER,
+            side[0] / 3, side[1] / 3, low, high);
     edge[e] = (pal_winged_edge){{a, a == low ? high : low}, {side[0] / 3, n == 2 ? side[1] / 3 : -1}, {0, 0}, {0, 0}};
     for (int k = 0; k < n; k++) face_edge[side[k]] = e;
     return PAL_ERR_OK;
@@ -120,7 +121,7 @@ static pal_err make_edge(const pal_surface *s, const int32_t *side, int n, int32
 
 /* edges with their ends and faces, and face_edge; room for 3 n_tri edges */
 static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *face_edge, int32_t *n_edge,
-                          pal_note *note)
+                          pal_diagnostic *diag)
 {
     size_t n = 3 * (size_t)s->n_tri;
     int32_t *order = malloc(2 * n * sizeof *order), *count = malloc(((size_t)s->n_vertex + 1) * sizeof *count);
@@ -138,7 +139,7 @@ static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *
             side_ends(s, side[i + many], &l, &h);
             if (l != low || h != high) break;
         }
-        err = make_edge(s, side + i, many < 1000 ? (int)many : 1000, (*n_edge)++, edge, face_edge, note);
+        err = make_edge(s, side + i, many < 1000 ? (int)many : 1000, (*n_edge)++, edge, face_edge, diag);
     }
     free(order);
     free(count);
@@ -177,15 +178,15 @@ static bool link_level(pal_levels *l, int level, int32_t *bad)
     return true;
 }
 
-static pal_err refuse_fans(int32_t v, pal_note *note)
+static pal_err refuse_fans(int32_t v, pal_diagnostic *diag)
 {
-    return pal_note_set(note, PAL_ERR_REFUSED,
-                        "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                              "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
 }
 
 /* every vertex has one fan of at least three faces, or one or more at the boundary; irregular: K (K + 1), summed over
  * irregular vertices of K edges */
-static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_note *note)
+static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_diagnostic *diag)
 {
     const int32_t n = l->n_vertex[0];
     int32_t *count = calloc((size_t)n, sizeof *count);
@@ -195,19 +196,20 @@ static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_note *not
     int64_t sum = 0;
     for (int32_t v = 0; v < n && !err; v++) {
         if (count[v] == 0) {
-            err = pal_note_set(note, PAL_ERR_REFUSED, "levels: vertex %d belongs to no triangle: clean the surface", v);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                     "levels: vertex %d belongs to no triangle: clean the surface", v);
             break;
         }
         int32_t e = l->spoke[v], n_face = 0, n_edge = 0;
         do {
             n_face += pal_wing_face(l->edge, e, v) >= 0, n_edge++;
-            e = pal_wing_turn(l->edge, e, v);
+            e = pal_wing_next_around(l->edge, e, v);
         } while (e != l->spoke[v] && n_edge <= count[v] + 1);
         if (n_face != count[v])
-            err = refuse_fans(v, note);
+            err = refuse_fans(v, diag);
         else if (n_edge < 3 && n_face == n_edge)
-            err = pal_note_set(note, PAL_ERR_REFUSED, "levels: triangles %d and %d have the same corners",
-                               l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
+            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangles %d and %d have the same corners",
+                                     l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
         else if (n_edge != (n_face == n_edge ? 6 : 4))
             sum += (int64_t)n_edge * (n_edge + 1);
     }
@@ -219,7 +221,7 @@ static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_note *not
 static void find_corners(pal_levels *l)
 {
     for (int32_t v = 0; v < l->n_vertex[0]; v++) {
-        if (!pal_levels_on_rim(l, v)) continue;
+        if (!pal_levels_on_boundary(l, v)) continue;
         const pal_winged_edge *out = &l->edge[l->spoke[v]], *in = &l->edge[out->next[1]];
         double a[3], b[3];
         pal_sub3(a, l->x + 3 * (size_t)v, l->x + 3 * (size_t)in->vertex[0]);
@@ -258,12 +260,13 @@ static size_t plain_bytes(const pal_levels *l)
 
 #define ENTRY_BYTES (sizeof(int32_t) + sizeof(double))
 
-static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pal_note *note)
+static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pal_diagnostic *diag)
 {
-    return pal_note_set(note, PAL_ERR_BUDGET,
-                        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
-                        "surface",
-                        l->n_level, byte / 1048576, (double)budget / 1048576);
+    return pal_diagnostic_set(
+        diag, PAL_ERR_BUDGET,
+        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
+        "surface",
+        l->n_level, byte / 1048576, (double)budget / 1048576);
 }
 
 static pal_err get_memory(pal_levels *l)
@@ -293,11 +296,11 @@ static pal_err get_memory(pal_levels *l)
 
 /* rows of stencils are written one after another: room for the most there can be, 8 for an edge with regular ends and,
  * on every level, K + 1 more for the K edges of an irregular vertex */
-static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_note *note)
+static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_diagnostic *diag)
 {
     double n = 8.0 * l->first_edge[l->n_level - 1] + (double)(l->n_level - 1) * (double)irregular;
     double byte = (double)plain_bytes(l) + n * (double)ENTRY_BYTES;
-    if (byte > (double)budget || n > INT32_MAX) return refuse_budget(byte, budget, l, note);
+    if (byte > (double)budget || n > INT32_MAX) return refuse_budget(byte, budget, l, diag);
     l->stencil_vertex = malloc(((size_t)n + 1) * sizeof *l->stencil_vertex);
     l->stencil_weight = malloc(((size_t)n + 1) * sizeof *l->stencil_weight);
     return l->stencil_vertex && l->stencil_weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -318,7 +321,7 @@ static void trim_entries(pal_levels *l)
 
 static void place_midpoints(pal_levels *l, int level)
 {
-    pal_wings wings = {l->edge, l->corner, l->n_vertex[0]};
+    pal_winged_mesh wings = {l->edge, l->corner, l->n_vertex[0]};
     int32_t v = l->n_vertex[level];
     for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++, v++) {
         int32_t *start = l->stencil_start + (v - l->n_vertex[0]);
@@ -363,14 +366,14 @@ static void split_level(pal_levels *l, int level)
 }
 
 /* edges that shrink to nothing have no direction for a spring */
-static pal_err check_edges(const pal_levels *l, double diagonal, pal_note *note)
+static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic *diag)
 {
     for (int32_t e = 0; e < l->first_edge[l->n_level]; e++) {
         const int32_t *end = l->edge[e].vertex;
         double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
         if (!(length > FLAT * diagonal))
-            return pal_note_set(
-                note, PAL_ERR_REFUSED,
+            return pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED,
                 "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
                 "m: smooth the surface or ask for fewer levels",
                 end[0], end[1], l->edge_level[e], length, diagonal);
@@ -380,7 +383,7 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_note *note)
 
 /* the coarse level in l's arrays, linked and checked */
 static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged_edge *edge, const int32_t *face_edge,
-                           int64_t *irregular, pal_note *note)
+                           int64_t *irregular, pal_diagnostic *diag)
 {
     size_t n_corner = 3 * (size_t)s->n_tri;
     int32_t bad;
@@ -389,8 +392,8 @@ static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged
     memcpy(l->face_edge, face_edge, n_corner * sizeof *l->face_edge);
     memcpy(l->edge, edge, (size_t)l->first_edge[1] * sizeof *l->edge);
     memcpy(l->origin_m, s->origin_m, sizeof l->origin_m);
-    if (!link_level(l, 0, &bad)) return refuse_fans(bad, note);
-    PAL_TRY(check_fans(l, irregular, note));
+    if (!link_level(l, 0, &bad)) return refuse_fans(bad, diag);
+    PAL_TRY(check_fans(l, irregular, diag));
     find_corners(l);
     l->closed = true;
     for (int32_t e = 0; e < l->first_edge[1]; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
@@ -401,19 +404,19 @@ static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged
 }
 
 static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
-                           int32_t *face_edge, pal_note *note)
+                           int32_t *face_edge, pal_diagnostic *diag)
 {
     size_t budget = o->budget_byte ? o->budget_byte : BUDGET;
     int32_t n_edge;
     int64_t irregular = 0;
-    PAL_TRY(find_edges(s, edge, face_edge, &n_edge, note));
+    PAL_TRY(find_edges(s, edge, face_edge, &n_edge, diag));
     if (!count_levels(l, s->n_vertex, n_edge, s->n_tri))
-        return pal_note_set(note, PAL_ERR_BUDGET, "levels: %d levels of %d triangles make more than %d edges",
-                            l->n_level, s->n_tri, INT32_MAX / 8);
-    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, note);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d levels of %d triangles make more than %d edges",
+                                  l->n_level, s->n_tri, INT32_MAX / 8);
+    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, diag);
     PAL_TRY(get_memory(l));
-    PAL_TRY(take_coarse(s, l, edge, face_edge, &irregular, note));
-    PAL_TRY(get_entries(l, irregular, budget, note));
+    PAL_TRY(take_coarse(s, l, edge, face_edge, &irregular, diag));
+    PAL_TRY(get_entries(l, irregular, budget, diag));
     for (int k = 0; k + 1 < l->n_level; k++) {
         int32_t none;
         place_midpoints(l, k);
@@ -423,17 +426,18 @@ static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pa
     trim_entries(l);
     double low[3], high[3];
     pal_surface_box(s, low, high);
-    return check_edges(l, pal_dist3(low, high), note);
+    return check_edges(l, pal_dist3(low, high), diag);
 }
 
-pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out, pal_note *note)
+pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out,
+                        pal_diagnostic *diag)
 {
-    PAL_TRY(check_input(surface, options, note));
+    PAL_TRY(check_input(surface, options, diag));
     pal_levels l = {.n_level = options->n_level};
     size_t n_corner = 3 * (size_t)surface->n_tri;
     pal_winged_edge *edge = malloc(n_corner * sizeof *edge);
     int32_t *face_edge = malloc(n_corner * sizeof *face_edge);
-    pal_err err = edge && face_edge ? make_levels(surface, options, &l, edge, face_edge, note) : PAL_ERR_MEMORY;
+    pal_err err = edge && face_edge ? make_levels(surface, options, &l, edge, face_edge, diag) : PAL_ERR_MEMORY;
     free(edge);
     free(face_edge);
     if (err) {

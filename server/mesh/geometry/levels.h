@@ -15,29 +15,29 @@
  * face's edge k (from corner k to k + 1). Inner edge k cuts off corner k; child 3 lies on its left, child k on its
  * right. Counts: V' = V + E, E' = 2 E + 3 F (4 E when closed), F' = 4 F.
  *
- * The edges' adjacency is winged (butterfly.h) within each level; pal_levels_spoke and pal_wing_turn walk the edges and
- * faces of any level around a vertex. A pal_levels owns its arrays (heap); it is constant once made and may be shared.
- * Memory: about 330 bytes per finest vertex of a mesh with few irregular vertices; n_byte says it.
- * Thread: [load] to make, [any] to read. */
-#ifndef PAL_MESH_LEVELS_H
-#define PAL_MESH_LEVELS_H
+ * The edges' adjacency is winged (butterfly.h) within each level; pal_levels_spoke and pal_wing_next_around walk the
+ * edges and faces of any level around a vertex. A pal_levels owns its arrays (heap); it is constant once made and may
+ * be shared. Memory: about 330 bytes per finest vertex of a mesh with few irregular vertices; n_byte says it. Thread:
+ * [load] to make, [any] to read. */
+#ifndef PAL_MESH_GEOMETRY_LEVELS_H
+#define PAL_MESH_GEOMETRY_LEVELS_H
 #include "server/mesh/geometry/butterfly.h"
 #include "server/mesh/geometry/surface.h"
 
 #include <stddef.h>
 
-#define PAL_LEVELS_MOST 10
+#define PAL_LEVELS_MAX 10
 
 typedef struct pal_levels_options {
-    int n_level;        /* 1..PAL_LEVELS_MOST, the coarse surface counts as one              */
+    int n_level;        /* 1..PAL_LEVELS_MAX, the coarse surface counts as one              */
     size_t budget_byte; /* most memory the levels may take; 0: 512 MiB                       */
 } pal_levels_options;
 
 typedef struct pal_levels {
     int n_level;
-    int32_t n_vertex[PAL_LEVELS_MOST];       /* vertices of level l and all coarser ones              */
-    int32_t first_edge[PAL_LEVELS_MOST + 1]; /* entry n_level: edges of all levels together           */
-    int32_t first_face[PAL_LEVELS_MOST + 1]; /* entry n_level: faces of all levels together           */
+    int32_t n_vertex[PAL_LEVELS_MAX];       /* vertices of level l and all coarser ones              */
+    int32_t first_edge[PAL_LEVELS_MAX + 1]; /* entry n_level: edges of all levels together           */
+    int32_t first_face[PAL_LEVELS_MAX + 1]; /* entry n_level: faces of all levels together           */
     bool closed;
     int32_t n_component;   /* pieces without a common edge                                              */
     double *x;             /* rest position relative to origin_m, m          [n_vertex[n_level-1]][3]    */
@@ -50,7 +50,7 @@ typedef struct pal_levels {
     uint8_t *face_level;   /* [n faces]                                                              */
     int32_t *spoke;        /* an edge of each vertex and level; at the boundary the one that starts there with the
                             * hole on its right. Level l from first_spoke[l]                         */
-    int32_t first_spoke[PAL_LEVELS_MOST + 1];
+    int32_t first_spoke[PAL_LEVELS_MAX + 1];
     int32_t *stencil_start;  /* rows of the vertices from n_vertex[0] on          [n_vertex - n_vertex[0] + 1]  */
     int32_t *stencil_vertex; /* of a coarser level than the row's vertex, ascending                    */
     double *stencil_weight;  /* sum 1 in each row                                                      */
@@ -62,7 +62,8 @@ typedef struct pal_levels {
  * range, a corner out of range or repeated, a position that is NaN or beyond 1e9 m, a face without area, a vertex of no
  * face, an edge with more than two faces or run through twice the same way, a vertex with more than one fan, two faces
  * with the same corners, a level whose edges shrink to nothing. BUDGET, with both numbers; MEMORY. */
-pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out, pal_note *note);
+pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out,
+                        pal_diagnostic *diag);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_levels_free(pal_levels *levels);
 /* one level as a surface of its own, vertices numbered alike; MEMORY */
@@ -135,7 +136,7 @@ static inline int32_t pal_levels_spoke(const pal_levels *l, int level, int32_t v
     return l->spoke[l->first_spoke[level] + v];
 }
 /* on the boundary of the surface? the same on every level that has v */
-static inline bool pal_levels_on_rim(const pal_levels *l, int32_t v)
+static inline bool pal_levels_on_boundary(const pal_levels *l, int32_t v)
 {
     const pal_winged_edge *e = &l->edge[pal_levels_spoke(l, l->vertex_level[v], v)];
     return e->face[1] < 0;

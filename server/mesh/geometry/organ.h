@@ -1,7 +1,7 @@
 /* A procedural organ of our own, shown when no scan can be had: liver-like, closed, smooth, about 0.2 m across.
  * Thread: [load]. */
-#ifndef PAL_MESH_ORGAN_H
-#define PAL_MESH_ORGAN_H
+#ifndef PAL_MESH_GEOMETRY_ORGAN_H
+#define PAL_MESH_GEOMETRY_ORGAN_H
 #include "server/mesh/geometry/surface.h"
 
 /* about n_tri_about triangles (500 to 500000; others are clamped); the same surface every time; MEMORY */

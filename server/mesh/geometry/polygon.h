@@ -1,20 +1,20 @@
 /* Private to the mesh room: convex polygons of a few corners, cut by planes. A corner that lies on the plane belongs to
  * both sides, and the corners a cut makes are the same in both, so that no area is lost or counted twice. Thread: any.
  */
-#ifndef PAL_MESH_POLYGON_H
-#define PAL_MESH_POLYGON_H
+#ifndef PAL_MESH_GEOMETRY_POLYGON_H
+#define PAL_MESH_GEOMETRY_POLYGON_H
 #include <stddef.h>
 
-enum { PAL_POLYGON_MOST = 24 };
+enum { PAL_POLYGON_MAX = 24 };
 
 typedef struct pal_polygon {
     int n;
-    double x[PAL_POLYGON_MOST][3];
+    double x[PAL_POLYGON_MAX][3];
 } pal_polygon;
 
-static inline void pal_polygon_put(pal_polygon *p, const double x[3])
+static inline void pal_polygon_add(pal_polygon *p, const double x[3])
 {
-    if (p->n == PAL_POLYGON_MOST) return;
+    if (p->n == PAL_POLYGON_MAX) return;
     for (int k = 0; k < 3; k++) p->x[p->n][k] = x[k];
     p->n++;
 }
@@ -27,13 +27,13 @@ static inline void pal_polygon_cut(const pal_polygon *p, const double *height, p
     for (int i = 0; i < p->n; i++) {
         int j = i + 1 == p->n ? 0 : i + 1;
         double a = height[i], b = height[j], q[3];
-        if (a <= 0 && low) pal_polygon_put(low, p->x[i]);
-        if (a >= 0 && high) pal_polygon_put(high, p->x[i]);
+        if (a <= 0 && low) pal_polygon_add(low, p->x[i]);
+        if (a >= 0 && high) pal_polygon_add(high, p->x[i]);
         if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
         double t = a / (a - b);
         for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
-        if (low) pal_polygon_put(low, q);
-        if (high) pal_polygon_put(high, q);
+        if (low) pal_polygon_add(low, q);
+        if (high) pal_polygon_add(high, q);
     }
 }
 
@@ -45,14 +45,14 @@ static inline void pal_polygon_cut_axis(const pal_polygon *p, int axis, double a
     for (int i = 0; i < p->n; i++) {
         int j = i + 1 == p->n ? 0 : i + 1;
         double a = p->x[i][axis] - at, b = p->x[j][axis] - at, q[3];
-        if (a <= 0 && low) pal_polygon_put(low, p->x[i]);
-        if (a >= 0 && high) pal_polygon_put(high, p->x[i]);
+        if (a <= 0 && low) pal_polygon_add(low, p->x[i]);
+        if (a >= 0 && high) pal_polygon_add(high, p->x[i]);
         if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
         double t = a / (a - b);
         for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
         q[axis] = at;
-        if (low) pal_polygon_put(low, q);
-        if (high) pal_polygon_put(high, q);
+        if (low) pal_polygon_add(low, q);
+        if (high) pal_polygon_add(high, q);
     }
 }
 

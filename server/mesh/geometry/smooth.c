@@ -11,7 +11,7 @@ static const double there = 0.5, back = -0.53;
 
 /* one step: x += factor (mean of neighbours - x), sums [n_vertex][3] and degree [n_vertex] as scratch; on an oriented
  * closed surface every neighbour is the next corner of exactly one triangle */
-static void step(pal_surface *s, double factor, double *sum, const int32_t *degree, const uint8_t *held)
+static void step(pal_surface *s, double factor, double *sum, const int32_t *degree, const uint8_t *fixed)
 {
     for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) sum[i] = 0;
     for (size_t t = 0; t < (size_t)s->n_tri; t++) {
@@ -22,13 +22,13 @@ static void step(pal_surface *s, double factor, double *sum, const int32_t *degr
         }
     }
     for (size_t i = 0; i < (size_t)s->n_vertex; i++) {
-        if (held[i] || degree[i] == 0) continue;
+        if (fixed[i] || degree[i] == 0) continue;
         for (size_t a = 0; a < 3; a++) s->x[3 * i + a] += factor * (sum[3 * i + a] / degree[i] - s->x[3 * i + a]);
     }
 }
 
 /* a vertex is held when its outgoing neighbours are not its incoming ones: it lies on an open or flipped edge */
-static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, uint8_t *held)
+static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, uint8_t *fixed)
 {
     for (int i = 0; i < s->n_vertex; i++) degree[i] = 0, balance[i] = 0;
     for (size_t t = 0; t < (size_t)s->n_tri; t++) {
@@ -38,7 +38,7 @@ static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, u
             balance[c[k]] += (int64_t)c[(k + 1) % 3] - c[(k + 2) % 3];
         }
     }
-    for (int i = 0; i < s->n_vertex; i++) held[i] = balance[i] != 0;
+    for (int i = 0; i < s->n_vertex; i++) fixed[i] = balance[i] != 0;
 }
 
 /* pulls every vertex back to within its reach of its start, measured along its normal there, and to within twice that
@@ -65,26 +65,26 @@ static pal_err run(pal_surface *surface, int rounds, const double *reach_m)
     double *sum = malloc(3 * n * sizeof *sum);
     int32_t *degree = malloc(n * sizeof *degree);
     int64_t *balance = malloc(n * sizeof *balance);
-    uint8_t *held = malloc(n);
+    uint8_t *fixed = malloc(n);
     double *start = malloc(6 * n * sizeof *start), *normal = start ? start + 3 * n : NULL;
-    pal_err err = sum && degree && balance && held && start ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = sum && degree && balance && fixed && start ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) {
         memcpy(start, surface->x, 3 * (size_t)surface->n_vertex * sizeof *start);
         pal_surface_normals(surface, normal);
-        find_held(surface, degree, balance, held);
+        find_held(surface, degree, balance, fixed);
         for (int k = 0; k < rounds; k++) {
-            step(surface, there, sum, degree, held);
+            step(surface, there, sum, degree, fixed);
             if (reach_m)
                 hold_back(surface, start, normal, reach_m);
             else
-                step(surface, back, sum, degree, held);
+                step(surface, back, sum, degree, fixed);
         }
     }
     free(start);
     free(sum);
     free(degree);
     free(balance);
-    free(held);
+    free(fixed);
     return err;
 }
 

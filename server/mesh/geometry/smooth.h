@@ -1,7 +1,7 @@
 /* Smoothing without shrinkage (Taubin 1995): a step towards the neighbours' mean, then a slightly longer step back.
  * Thread: [load]. */
-#ifndef PAL_MESH_SMOOTH_H
-#define PAL_MESH_SMOOTH_H
+#ifndef PAL_MESH_GEOMETRY_SMOOTH_H
+#define PAL_MESH_GEOMETRY_SMOOTH_H
 #include "server/mesh/geometry/surface.h"
 
 /* rounds of one step there (0.5) and back (-0.53), in place; vertices of open edges stay; MEMORY */

@@ -18,22 +18,22 @@ typedef struct ring {
     int n;        /* vertices, 1: a pole */
     double along; /* place on the spine, in nodes */
     double swell; /* radius, of the spine's there */
-    bool held;    /* stays as it is made */
+    bool fixed;   /* stays as it is made */
 } ring;
 
 typedef struct node {
     double x[3], r; /* m */
 } node;
 
-typedef struct shell {
+typedef struct adaptive {
     pal_surface *s;
     shape inside;
     int32_t *owner;   /* face that runs from a to b, or -1          [n_vertex][n_vertex] */
     uint8_t *valence; /* [n_vertex] */
-    uint8_t *held;    /* [n_vertex] */
+    uint8_t *fixed;   /* [n_vertex] */
     double *move;     /* [n_vertex][4] */
     double reach;     /* longest way in a step, m */
-} shell;
+} adaptive;
 
 /* ---- rings ---- */
 
@@ -85,7 +85,7 @@ static int zip(int n_a, int32_t a, int n_b, int32_t b, int32_t *tri)
 }
 
 /* all rings along the spine as one closed surface */
-static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n_node, shell *sh)
+static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n_node, adaptive *sh)
 {
     int n_vertex = 0, first = 0;
     for (int k = 0; k < n_ring; k++) n_vertex += rings[k].n;
@@ -99,7 +99,7 @@ static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n
         double axis[3];
         spine_at(spine, n_node, rings[k].along, &at, axis);
         ring_vertices(&rings[k], &at, axis, s->x + 3 * first);
-        memset(sh->held + first, rings[k].held, (size_t)rings[k].n);
+        memset(sh->fixed + first, rings[k].fixed, (size_t)rings[k].n);
         if (k > 0) s->n_tri += zip(rings[k - 1].n, first - rings[k - 1].n, rings[k].n, first, s->tri + 3 * s->n_tri);
         first += rings[k].n;
     }
@@ -121,7 +121,7 @@ static void gradient(shape inside, const double p[3], double g[3])
     }
 }
 
-static void count_around(shell *sh)
+static void count_around(adaptive *sh)
 {
     const pal_surface *s = sh->s;
     size_t n = (size_t)s->n_vertex;
@@ -171,14 +171,14 @@ static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t
 }
 
 /* turns the edge a b of two faces into c d when its opposite angles are more than a half circle together */
-static void turn_edge(shell *sh, int32_t a, int32_t b)
+static void turn_edge(adaptive *sh, int32_t a, int32_t b)
 {
     const pal_surface *s = sh->s;
     size_t n = (size_t)s->n_vertex;
     int32_t left = sh->owner[(size_t)a * n + (size_t)b], right = sh->owner[(size_t)b * n + (size_t)a];
     int32_t *tl = s->tri + 3 * left, *tr = s->tri + 3 * right, c = third(tl, a, b), d = third(tr, a, b);
     const double *x = s->x;
-    if (sh->held[a] && sh->held[b]) return;
+    if (sh->fixed[a] && sh->fixed[b]) return;
     if (sh->valence[a] < 5 || sh->valence[b] < 5 || sh->valence[c] > 6 || sh->valence[d] > 6) return;
     if (sh->owner[(size_t)c * n + (size_t)d] >= 0 || sh->owner[(size_t)d * n + (size_t)c] >= 0) return;
     if (cotangent(x + 3 * c, x + 3 * a, x + 3 * b) + cotangent(x + 3 * d, x + 3 * a, x + 3 * b) > -1e-3) return;
@@ -194,7 +194,7 @@ static void turn_edge(shell *sh, int32_t a, int32_t b)
     sh->valence[a]--, sh->valence[b]--, sh->valence[c]++, sh->valence[d]++;
 }
 
-static void to_surface(const shell *sh, double x[3])
+static void to_surface(const adaptive *sh, double x[3])
 {
     for (int k = 0; k < 3; k++) {
         double g[3], depth = sh->inside(x);
@@ -207,7 +207,7 @@ static void to_surface(const shell *sh, double x[3])
 
 /* along the surface a share of the way to the middle of the faces around, and onto the zero set; the middle is weighted
  * by area, or the vertices would slip off together as a rubber band slips off a ball */
-static void spread(shell *sh, double share)
+static void spread(adaptive *sh, double share)
 {
     pal_surface *s = sh->s;
     memset(sh->move, 0, 4 * (size_t)s->n_vertex * sizeof *sh->move);
@@ -220,7 +220,7 @@ static void spread(shell *sh, double share)
         for (int k = 0; k < 3; k++) sh->move[4 * c[k] + 3] += area;
     }
     for (int v = 0; v < s->n_vertex; v++) {
-        if (sh->held[v]) continue;
+        if (sh->fixed[v]) continue;
         double *x = s->x + 3 * v, *to = sh->move + 4 * v, g[3];
         pal_scale3(to, 1 / to[3], to);
         pal_sub3(to, to, x);
@@ -249,7 +249,7 @@ static double worst_cosine(const double *all, const double x[3], int32_t side[][
 }
 
 /* small steps along the surface that widen the least angle around a vertex */
-static void widen(shell *sh, int32_t v, double step)
+static void widen(adaptive *sh, int32_t v, double step)
 {
     enum { WAYS = 8 };
     pal_surface *s = sh->s;
@@ -284,10 +284,10 @@ static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int 
                           pal_surface *out)
 {
     enum { MOST = 256, STEPS = 500, WIDENINGS = 40 };
-    uint8_t valence[MOST], held[MOST];
+    uint8_t valence[MOST], fixed[MOST];
     pal_surface s;
-    shell sh = {&s,   inside, malloc(MOST * MOST * sizeof(int32_t)), valence, held, malloc(MOST * 4 * sizeof(double)),
-                reach};
+    adaptive sh = {
+        &s, inside, malloc(MOST * MOST * sizeof(int32_t)), valence, fixed, malloc(MOST * 4 * sizeof(double)), reach};
     pal_err err = sh.owner && sh.move ? make_tube(rings, n_ring, spine, n_node, &sh) : PAL_ERR_MEMORY;
     for (int step = 0; !err && step < STEPS; step++) {
         count_around(&sh);
@@ -298,7 +298,7 @@ static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int 
     }
     for (int step = 0; !err && step < WIDENINGS; step++)
         for (int32_t v = 0; v < s.n_vertex; v++)
-            if (!sh.held[v]) widen(&sh, v, reach / (2 + step));
+            if (!sh.fixed[v]) widen(&sh, v, reach / (2 + step));
     free(sh.owner);
     free(sh.move);
     if (err)
@@ -384,13 +384,14 @@ void pal_stomach_free(pal_stomach *stomach)
     pal_surface_free(&stomach->surface);
 }
 
-pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_note *note)
+pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_diagnostic *diag)
 {
     if (n < 2 || m < 2 || n > 20000 || m > 20000 || (double)n * m > 1e7)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "sheet: %d x %d vertices, 2 to 20000 along a side and 10 million together are made", n, m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "sheet: %d x %d vertices, 2 to 20000 along a side and 10 million together are made",
+                                  n, m);
     if (!(width_m > 0 && width_m <= 1e6 && height_m > 0 && height_m <= 1e6))
-        return pal_note_set(note, PAL_ERR_REFUSED, "sheet: a size of %g x %g m", width_m, height_m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "sheet: a size of %g x %g m", width_m, height_m);
     pal_surface s = {.n_vertex = n * m, .n_tri = 2 * (n - 1) * (m - 1)};
     s.x = malloc((size_t)s.n_vertex * 3 * sizeof *s.x);
     s.tri = malloc((size_t)s.n_tri * 3 * sizeof *s.tri);

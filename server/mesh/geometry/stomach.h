@@ -1,8 +1,8 @@
 /* Procedural hollow bodies of our own for the adaptive surface springs (C, Table I): a sphere of 114 vertices, a
  * stomach of 188, a sheet of fabric. The same surface every time; each is taken from the heap (pal_surface_free).
  * Thread: [load]. */
-#ifndef PAL_MESH_STOMACH_H
-#define PAL_MESH_STOMACH_H
+#ifndef PAL_MESH_GEOMETRY_STOMACH_H
+#define PAL_MESH_GEOMETRY_STOMACH_H
 #include "server/mesh/geometry/surface.h"
 
 enum { PAL_SPHERE_VERTEX = 114, PAL_STOMACH_VERTEX = 188, PAL_STOMACH_RING = 6 };
@@ -26,5 +26,5 @@ pal_err pal_sphere_make(double radius_m, pal_surface *out);
 /* n x m vertices in the plane z = 0, centred on zero, width_m along x (n vertices) and height_m along y (m vertices);
  * two triangles a cell, all cells cut alike, so that inner vertices are regular; z is outside. REFUSED: n or m below 2
  * or above 20000, more than 10 million vertices, a size that is not positive and finite; MEMORY */
-pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_note *note);
+pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_diagnostic *diag);
 #endif

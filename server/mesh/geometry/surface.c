@@ -5,7 +5,7 @@
 #include "server/mesh/geometry/surface.h"
 
 #include "server/base/vec3.h"
-#include "server/num/roots.h"
+#include "server/num/union_find.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -191,10 +191,11 @@ pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *
     int32_t *row;
     side *sides;
     PAL_TRY(sides_of(surface, &row, &sides));
-    pal_roots_clear(label, surface->n_tri);
+    pal_union_find_init(label, surface->n_tri);
     for (int i = 0; i < surface->n_vertex; i++)
         for (int k = row[i] + 1; k < row[i + 1]; k++)
-            if (sides[k].high == sides[k - 1].high) pal_roots_join(label, sides[k].corner / 3, sides[k - 1].corner / 3);
+            if (sides[k].high == sides[k - 1].high)
+                pal_union_find_join(label, sides[k].corner / 3, sides[k - 1].corner / 3);
     free(row);
     free(sides);
     /* a root comes before its members: one pass finds the roots, one numbers them (as -1 - number) and hands these on
@@ -215,8 +216,8 @@ static void unite_corners(const pal_surface *surface, int32_t *parent, int32_t o
         c = d;
         d = other;
     }
-    pal_roots_join(parent, a, c);
-    pal_roots_join(parent, b, d);
+    pal_union_find_join(parent, a, c);
+    pal_union_find_join(parent, b, d);
 }
 
 pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out)
@@ -240,19 +241,19 @@ pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out)
                 if (end > k) unite_corners(surface, parent, sides[k].corner, sides[end].corner);
             }
             found.n_open_edge += end - k == 1;
-            found.n_crowded_edge += end - k > 2;
-            found.n_flipped_edge += end - k == 2 && n_up != 1;
+            found.n_nonmanifold_edge += end - k > 2;
+            found.n_misoriented_edge += end - k == 2 && n_up != 1;
         }
     /* a vertex with k fans has k roots among its corners */
     for (int i = 0; i < surface->n_vertex; i++) row[i] = 0;
     for (int32_t c = 0; c < n_corner; c++)
-        if (parent[c] == c) found.n_crowded_vertex += ++row[surface->tri[c]] == 2;
+        if (parent[c] == c) found.n_nonmanifold_vertex += ++row[surface->tri[c]] == 2;
     free(row);
     free(sides);
     free(parent);
     found.closed = surface->n_tri > 0 && found.n_open_edge == 0;
-    found.manifold = found.n_crowded_edge == 0 && found.n_crowded_vertex == 0;
-    found.oriented = found.n_flipped_edge == 0;
+    found.manifold = found.n_nonmanifold_edge == 0 && found.n_nonmanifold_vertex == 0;
+    found.oriented = found.n_misoriented_edge == 0;
     *out = found;
     return PAL_ERR_OK;
 }

@@ -3,8 +3,8 @@
  * A pal_surface owns its arrays (heap); pal_surface_free frees them. Positions are metres relative to origin_m, which
  * is subtracted in double precision while reading, so that a body far from the file's origin keeps its accuracy.
  * Triangles are counter-clockwise seen from outside when the file means them so. Thread: [load]. */
-#ifndef PAL_MESH_SURFACE_H
-#define PAL_MESH_SURFACE_H
+#ifndef PAL_MESH_GEOMETRY_SURFACE_H
+#define PAL_MESH_GEOMETRY_SURFACE_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -28,7 +28,7 @@ typedef struct pal_surface_report {
     int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
     int64_t n_folded;                  /* triangles dropped, beside n_duplicate, because their doubles run the other
                                         * way round: fins that enclose nothing                                   */
-    int64_t n_mended;                  /* triangles without area between three corners: not dropped, which would
+    int64_t n_repaired;                /* triangles without area between three corners: not dropped, which would
                                         * leave a slit, but mended by splitting their neighbour                  */
 } pal_surface_report;
 
@@ -40,7 +40,7 @@ pal_err pal_surface_copy(const pal_surface *from, pal_surface *to);
 /* Joins vertices closer than tolerance (relative to the bounding-box diagonal; 0: equal positions only), drops
  * degenerate, duplicate and non-finite triangles and unused vertices, recentres on the box centre, and adds the counts
  * to report. In place. REFUSED when no triangle is left, MEMORY. */
-pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_note *note);
+pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag);
 
 /* moves the box centre to zero and adds it to origin_m */
 void pal_surface_recentre(pal_surface *surface);
@@ -58,8 +58,8 @@ pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *
 
 /* topology facts for reports: edges with one, with more than two triangles, and run through twice the same way */
 typedef struct pal_surface_topology {
-    int n_open_edge, n_crowded_edge, n_flipped_edge;
-    int n_crowded_vertex; /* vertices with more than one fan of triangles */
+    int n_open_edge, n_nonmanifold_edge, n_misoriented_edge;
+    int n_nonmanifold_vertex; /* vertices with more than one fan of triangles */
     bool closed, manifold, oriented;
 } pal_surface_topology;
 pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out);

@@ -201,7 +201,7 @@ static bool mend(cleaner *k, const int32_t *start, const int32_t *item, int32_t 
     k->next[to] = k->next[from] = k->next[b] = k->next[d] = 1;
     memcpy(c, one, sizeof one);
     memcpy(e, two, sizeof two);
-    k->count.n_mended++;
+    k->count.n_repaired++;
     return true;
 }
 
@@ -337,7 +337,7 @@ static void measure(cleaner *k, double tolerance)
     k->eps = tolerance >= 1e-15 ? fmin(tolerance, 1) * pal_dist3(low, high) : 0;
 }
 
-pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_note *note)
+pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag)
 {
     size_t n_vertex = (size_t)surface->n_vertex, most = n_vertex;
     if ((size_t)surface->n_tri > most) most = (size_t)surface->n_tri;
@@ -348,7 +348,7 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
     k.bucket = malloc(k.n_bucket * sizeof *k.bucket);
     pal_err err = PAL_ERR_OK;
     if (!k.map || !k.next || !k.bucket) {
-        err = pal_note_set(note, PAL_ERR_MEMORY, "no memory to clean %d triangles", surface->n_tri);
+        err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to clean %d triangles", surface->n_tri);
     } else {
         drop_nonfinite(&k);
         measure(&k, tolerance);
@@ -357,10 +357,10 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         drop_degenerate(&k);
         if (!err) err = drop_duplicate(&k);
         compact(&k);
-        if (err) pal_note_set(note, err, "no memory to clean %d triangles", surface->n_tri);
+        if (err) pal_diagnostic_set(diag, err, "no memory to clean %d triangles", surface->n_tri);
         if (!err && surface->n_tri == 0)
-            err = pal_note_set(
-                note, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
+            err = pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
                 (long long)k.count.n_degenerate, (long long)k.count.n_duplicate, (long long)k.count.n_nonfinite);
     }
     if (report) {
@@ -370,7 +370,7 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         report->n_nonfinite += k.count.n_nonfinite;
         report->n_unused += k.count.n_unused;
         report->n_folded += k.count.n_folded;
-        report->n_mended += k.count.n_mended;
+        report->n_repaired += k.count.n_repaired;
     }
     free(k.map);
     free(k.next);

@@ -6,7 +6,7 @@
 #include "server/mesh/geometry/tets.h"
 
 #include "server/base/vec3.h"
-#include "server/num/roots.h"
+#include "server/num/union_find.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -283,11 +283,11 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
         sides_free(&s);
         return PAL_ERR_MEMORY;
     }
-    pal_roots_clear(parent, tets->n_tet);
+    pal_union_find_init(parent, tets->n_tet);
     for (int i = 0; i < tets->n_node; i++)
         for (int64_t a = s.start[i]; a + 1 < s.start[i + 1]; a++) {
             if (same_sides(&s, a, a + 2) < 2) continue;
-            pal_roots_join(parent, (int32_t)(s.item[a].from >> 2), (int32_t)(s.item[a + 1].from >> 2));
+            pal_union_find_join(parent, (int32_t)(s.item[a].from >> 2), (int32_t)(s.item[a + 1].from >> 2));
         }
     sides_free(&s);
     int n = 0;
@@ -295,7 +295,7 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
     if (label) {
         int next = 0;
         for (int t = 0; t < tets->n_tet; t++) {
-            int32_t root = pal_root(parent, t);
+            int32_t root = pal_union_find_root(parent, t);
             label[t] = root == t ? next++ : label[root];
         }
     }
@@ -397,33 +397,34 @@ static pal_err check_unused(const pal_tets *tets, faults *f)
     return PAL_ERR_OK;
 }
 
-pal_err pal_tets_check(const pal_tets *tets, pal_note *note)
+pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag)
 {
     faults f = {0};
     check_corners(tets, &f);
     if (f.bad_index)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%lld index%s out of range of %d nodes, the first in element %d",
-                            (long long)f.bad_index, f.bad_index > 1 ? "es" : "", tets->n_node, f.first_index);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "%lld index%s out of range of %d nodes, the first in element %d",
+                                  (long long)f.bad_index, f.bad_index > 1 ? "es" : "", tets->n_node, f.first_index);
     if (f.repeated)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%lld tetrahedra with a corner used twice, the first is %d",
-                            (long long)f.repeated, f.first_repeated);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra with a corner used twice, the first is %d",
+                                  (long long)f.repeated, f.first_repeated);
     for (int t = 0; t < tets->n_tet; t++)
         if (!(tet_volume(tets, t) > 0)) count_first(&f.flat, &f.first_flat, t);
     if (f.flat)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%lld tetrahedra without positive volume, the first is %d",
-                            (long long)f.flat, f.first_flat);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra without positive volume, the first is %d",
+                                  (long long)f.flat, f.first_flat);
     PAL_TRY(check_sides(tets, &f));
     if (f.crowded)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "%lld faces of more than two tetrahedra, the first has nodes %d %d %d",
-                            (long long)f.crowded, f.crowded_node[0], f.crowded_node[1], f.crowded_node[2]);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "%lld faces of more than two tetrahedra, the first has nodes %d %d %d",
+                                  (long long)f.crowded, f.crowded_node[0], f.crowded_node[1], f.crowded_node[2]);
     PAL_TRY(check_boundary(tets, &f));
     if (f.open)
-        return pal_note_set(note, PAL_ERR_REFUSED, "the boundary is not closed: %lld edges without a partner",
-                            (long long)f.open);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the boundary is not closed: %lld edges without a partner",
+                                  (long long)f.open);
     PAL_TRY(check_unused(tets, &f));
     if (f.unused)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d", (long long)f.unused,
-                            f.first_unused);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d",
+                                  (long long)f.unused, f.first_unused);
     return PAL_ERR_OK;
 }

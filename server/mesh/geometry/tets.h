@@ -1,7 +1,7 @@
 /* Tetrahedral meshes at rest: nodes, tetrahedra with positive volume, boundary faces, unique edges and faces.
  * A pal_tets owns its arrays (heap). Thread: [load]. */
-#ifndef PAL_MESH_TETS_H
-#define PAL_MESH_TETS_H
+#ifndef PAL_MESH_GEOMETRY_TETS_H
+#define PAL_MESH_GEOMETRY_TETS_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -14,7 +14,7 @@ typedef struct pal_tets {
     int32_t *face;             /* boundary triangles, counter-clockwise from outside  [n_face][3]  */
     uint8_t *on_surface;       /* 1: node of a boundary face                          [n_node]     */
     double origin_m[3];        /* position in the file's frame = x + origin_m                      */
-    double h_m;                /* voxel edge, or mean edge length of a foreign mesh                */
+    double edge_m;             /* voxel edge, or mean edge length of a foreign mesh                */
 } pal_tets;
 
 void pal_tets_free(pal_tets *tets);
@@ -30,7 +30,7 @@ pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face);
 
 /* faults a mesh must not have: node out of range, repeated corner, volume <= 0, a face used by more than two tets, a
  * boundary that is not closed, a node of no tet. REFUSED names the first and counts all. */
-pal_err pal_tets_check(const pal_tets *tets, pal_note *note);
+pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag);
 
 /* face-connected components of the tets: label [n_tet] may be NULL; MEMORY */
 pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_component);

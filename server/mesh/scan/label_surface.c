@@ -105,7 +105,7 @@ int pal_label_volume_list(const pal_label_volume *volume, pal_label_count *out, 
     return n_out;
 }
 
-static pal_err refuse_label(const pal_label_volume *volume, int32_t label, pal_note *note)
+static pal_err refuse_label(const pal_label_volume *volume, int32_t label, pal_diagnostic *diag)
 {
     pal_label_count list[8];
     char text[320] = "";
@@ -113,12 +113,12 @@ static pal_err refuse_label(const pal_label_volume *volume, int32_t label, pal_n
     for (int i = 0; i < n; i++)
         used += snprintf(text + used, sizeof text - (size_t)used, "%s%d (%.3g ml)", i ? ", " : "", list[i].label,
                          1e6 * list[i].volume_m3);
-    return pal_note_set(note, PAL_ERR_REFUSED, "label %d is not in the scan, %s%s", label,
-                        n ? "the largest there are " : "which holds no label at all", text);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "label %d is not in the scan, %s%s", label,
+                              n ? "the largest there are " : "which holds no label at all", text);
 }
 
 /* the label's box with one voxel of room, and its mask */
-static pal_err crop_label(const pal_label_volume *volume, int32_t label, crop *c, pal_note *note)
+static pal_err crop_label(const pal_label_volume *volume, int32_t label, crop *c, pal_diagnostic *diag)
 {
     const int *n = volume->n;
     int low[3] = {n[0], n[1], n[2]}, high[3] = {-1, -1, -1};
@@ -135,7 +135,7 @@ static pal_err crop_label(const pal_label_volume *volume, int32_t label, crop *c
                 if (to[a] > high[a]) high[a] = to[a];
             }
         }
-    if (high[0] < 0 || label == 0) return refuse_label(volume, label, note);
+    if (high[0] < 0 || label == 0) return refuse_label(volume, label, diag);
     c->n_voxel = 1;
     for (int a = 0; a < 3; a++) {
         c->low[a] = low[a] - 1;
@@ -143,7 +143,7 @@ static pal_err crop_label(const pal_label_volume *volume, int32_t label, crop *c
         c->n_voxel *= (size_t)c->n[a];
     }
     c->mask = calloc(c->n_voxel, 1);
-    if (!c->mask) return pal_note_set(note, PAL_ERR_MEMORY, "no memory for a mask of %zu voxels", c->n_voxel);
+    if (!c->mask) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a mask of %zu voxels", c->n_voxel);
     for (int z = low[2]; z <= high[2]; z++)
         for (int y = low[1]; y <= high[1]; y++) {
             const int32_t *row = volume->label + ((size_t)z * (size_t)n[1] + (size_t)y) * (size_t)n[0];
@@ -181,10 +181,10 @@ static int64_t flood(const crop *c, int32_t seed, uint8_t from, uint8_t to, int3
 }
 
 /* keeps the largest part and fills its cavities; the box border is empty, so voxel 0 is outside */
-static pal_err keep_largest(crop *c, pal_note *note)
+static pal_err keep_largest(crop *c, pal_diagnostic *diag)
 {
     int32_t *stack = malloc(c->n_voxel * sizeof *stack), best = -1;
-    if (!stack) return pal_note_set(note, PAL_ERR_MEMORY, "no memory to sort %zu voxels", c->n_voxel);
+    if (!stack) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to sort %zu voxels", c->n_voxel);
     int64_t most = 0;
     for (size_t i = 0; i < c->n_voxel; i++) {
         if (c->mask[i] != 1) continue;
@@ -223,10 +223,10 @@ static double face_area(const crop *c, const double m[12])
  * whole rows are added at once, or, along x, whole shifted blocks */
 static void blur_axis(const int n[3], int axis, const float *kernel, int radius, const float *from, float *to)
 {
-    ptrdiff_t step = 1, n_row = n[axis], n_all = (ptrdiff_t)n[0] * n[1] * n[2];
+    ptrdiff_t step = 1, n_row = n[axis], n_finest = (ptrdiff_t)n[0] * n[1] * n[2];
     for (int a = 0; a < axis; a++) step *= n[a];
-    memset(to, 0, (size_t)n_all * sizeof *to);
-    for (ptrdiff_t block = 0; block < n_all; block += step * n_row) {
+    memset(to, 0, (size_t)n_finest * sizeof *to);
+    for (ptrdiff_t block = 0; block < n_finest; block += step * n_row) {
         const float *f = from + block;
         float *t = to + block;
         for (ptrdiff_t k = -radius; step == 1 && k <= radius; k++) {
@@ -293,7 +293,7 @@ static double axis_length(const double m[12], int axis)
 }
 
 /* the mask as a blurred field with a margin in which it falls to zero */
-static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, blurred *b, pal_note *note)
+static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, blurred *b, pal_diagnostic *diag)
 {
     float kernel[3][2 * MOST_RADIUS + 1];
     int radius[3], low[3];
@@ -305,14 +305,14 @@ static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, b
         n *= (size_t)b->n[a];
     }
     if (n > 16 * c->n_voxel + spare_voxel)
-        return pal_note_set(note, PAL_ERR_BUDGET, "voxels of %.3g x %.3g x %.3g mm are too unequal to blur by %.3g mm",
-                            1e3 * axis_length(to_m, 0), 1e3 * axis_length(to_m, 1), 1e3 * axis_length(to_m, 2),
-                            1e3 * sigma_m);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_BUDGET, "voxels of %.3g x %.3g x %.3g mm are too unequal to blur by %.3g mm",
+            1e3 * axis_length(to_m, 0), 1e3 * axis_length(to_m, 1), 1e3 * axis_length(to_m, 2), 1e3 * sigma_m);
     float *other = malloc(n * sizeof *other);
     b->value = calloc(n, sizeof *b->value);
     if (!other || !b->value) {
         free(other);
-        return pal_note_set(note, PAL_ERR_MEMORY, "no memory to blur %zu voxels", n);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to blur %zu voxels", n);
     }
     const uint8_t *m = c->mask;
     for (int z = 0; z < c->n[2]; z++)
@@ -446,7 +446,7 @@ static pal_err shape_surface(pal_surface *s, const double m[12], const pal_label
 }
 
 pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
-                                 const pal_label_surface_options *options, pal_surface *out, pal_note *note)
+                                 const pal_label_surface_options *options, pal_surface *out, pal_diagnostic *diag)
 {
     static const pal_label_surface_options plain = {-1, -1, 0, false};
     const pal_label_surface_options *o = options ? options : &plain;
@@ -455,23 +455,23 @@ pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
     pal_surface s = {0};
     const double *m = volume->to_m;
     double coarse = fmax(axis_length(m, 0), fmax(axis_length(m, 1), axis_length(m, 2)));
-    pal_err err = crop_label(volume, label, &c, note);
-    if (!err && !o->all_components) err = keep_largest(&c, note);
-    if (!err) err = blur_mask(&c, m, o->blur_m < 0 ? coarse : o->blur_m, &b, note);
+    pal_err err = crop_label(volume, label, &c, diag);
+    if (!err && !o->all_components) err = keep_largest(&c, diag);
+    if (!err) err = blur_mask(&c, m, o->blur_m < 0 ? coarse : o->blur_m, &b, diag);
     if (!err) {
         pal_contour_box box = box_of(&c, m, o->target_tri);
-        err = pal_contour(field_at, &b, &box, &s, note);
+        err = pal_contour(field_at, &b, &box, &s, diag);
         /* a speck may fall between the lattice points */
         for (int k = 0; k < 4 && err == PAL_ERR_REFUSED; k++) {
             box.spacing_m /= 2;
-            err = pal_contour(field_at, &b, &box, &s, note);
+            err = pal_contour(field_at, &b, &box, &s, diag);
         }
     }
     free(b.value);
     free(c.mask);
     if (!err) {
         err = shape_surface(&s, m, o, (double)c.n_label * fabs(determinant(m)));
-        if (err) pal_note_set(note, err, "no memory for the surface of label %d", label);
+        if (err) pal_diagnostic_set(diag, err, "no memory for the surface of label %d", label);
     }
     if (err)
         pal_surface_free(&s);

@@ -19,7 +19,7 @@
 #include <strings.h>
 #include <zlib.h>
 
-static const int64_t most_voxel = (int64_t)1 << 29;
+static const int64_t max_voxel = (int64_t)1 << 29;
 static const size_t most_file = (size_t)4 << 30;
 /* a piece holds whole voxels of any type */
 enum { HEADER_MOST = 1 << 16, PIECE = 1 << 16, NIFTI_HEAD = 348 };
@@ -36,7 +36,7 @@ typedef struct header {
 
 typedef struct source {
     const char *name;
-    pal_note *note;
+    pal_diagnostic *diag;
     const uint8_t *bytes; /* as stored          */
     size_t n_byte;
     bool packed;
@@ -49,14 +49,14 @@ static pal_err refuse(const source *s, const char *unit, int64_t at, const char 
 {
     va_list list;
     va_start(list, format);
-    pal_err err = pal_file_refuse(s->note, s->name, unit, at, format, list);
+    pal_err err = pal_file_refuse(s->diag, s->name, unit, at, format, list);
     va_end(list);
     return err;
 }
 
 static pal_err no_memory(const source *s, size_t n)
 {
-    return pal_note_set(s->note, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", s->name, n);
+    return pal_diagnostic_set(s->diag, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", s->name, n);
 }
 
 static bool is_gzip(const uint8_t *bytes, size_t n_byte)
@@ -302,7 +302,7 @@ static pal_err inr_header(const source *s, const uint8_t *b, size_t n, header *h
         while (n_key > 0 && key[n_key - 1] == ' ') n_key--;
         if (!inr_entry((const char *)key, n_key, &scan, &w, h))
             return refuse(s, "line", scan.line, "the value of %.*s is %s", (int)(n_key < 20 ? n_key : 20),
-                          (const char *)key, pal_text_show(&scan).text);
+                          (const char *)key, pal_text_excerpt_at(&scan).text);
     }
     return inr_check(s, &w, h);
 }
@@ -353,9 +353,10 @@ static pal_err take_voxels(const source *s, const header *h, unpacker *u, size_t
 static pal_err read_voxels(const source *s, const header *h, pal_label_volume *out)
 {
     int64_t n = h->n[0] * h->n[1] * h->n[2];
-    if (h->n[0] * h->n[1] > most_voxel || n > most_voxel)
-        return pal_note_set(s->note, PAL_ERR_BUDGET, "%s: byte 0: %lld x %lld x %lld voxels, at most %lld are read",
-                            s->name, (long long)h->n[0], (long long)h->n[1], (long long)h->n[2], (long long)most_voxel);
+    if (h->n[0] * h->n[1] > max_voxel || n > max_voxel)
+        return pal_diagnostic_set(s->diag, PAL_ERR_BUDGET,
+                                  "%s: byte 0: %lld x %lld x %lld voxels, at most %lld are read", s->name,
+                                  (long long)h->n[0], (long long)h->n[1], (long long)h->n[2], (long long)max_voxel);
     unpacker u;
     int32_t *label = NULL;
     PAL_TRY(unpack_begin(&u, s));
@@ -384,11 +385,11 @@ static pal_err view_head(const source *s, uint8_t *room, size_t most, const uint
 }
 
 pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_label_volume *out,
-                               pal_note *note)
+                               pal_diagnostic *diag)
 {
     char shown[128];
-    pal_file_show_name(shown, name);
-    source s = {.name = shown, .note = note, .bytes = bytes, .n_byte = n_byte, .packed = is_gzip(bytes, n_byte)};
+    pal_file_printable_name(shown, name);
+    source s = {.name = shown, .diag = diag, .bytes = bytes, .n_byte = n_byte, .packed = is_gzip(bytes, n_byte)};
     if (n_byte == 0) return refuse(&s, "byte", 0, "the file is empty");
     uint8_t room[HEADER_MOST];
     const uint8_t *head;
@@ -404,12 +405,12 @@ pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_
     return err ? err : read_voxels(&s, &h, out);
 }
 
-pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_note *note)
+pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, most_file, &bytes, &n_byte, note));
-    pal_err err = pal_label_volume_parse(path, bytes, n_byte, out, note);
+    PAL_TRY(pal_file_read(path, most_file, &bytes, &n_byte, diag));
+    pal_err err = pal_label_volume_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }

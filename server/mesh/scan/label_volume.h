@@ -4,8 +4,8 @@
  *
  * Axes: NIfTI's sform, else qform, else pixdim maps voxel indices to millimetres; INRIMAGE uses VX VY VZ (mm) and
  * VX index order x fastest. A mapping that mirrors keeps the surface's outward orientation. Thread: [load]. */
-#ifndef PAL_MESH_LABEL_VOLUME_H
-#define PAL_MESH_LABEL_VOLUME_H
+#ifndef PAL_MESH_SCAN_LABEL_VOLUME_H
+#define PAL_MESH_SCAN_LABEL_VOLUME_H
 #include "server/mesh/geometry/surface.h"
 
 typedef struct pal_label_volume {
@@ -16,9 +16,9 @@ typedef struct pal_label_volume {
     char format[16];    /* "nifti" | "inr"                                    */
 } pal_label_volume;
 
-pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_note *note);
+pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagnostic *diag);
 pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_label_volume *out,
-                               pal_note *note);
+                               pal_diagnostic *diag);
 void pal_label_volume_free(pal_label_volume *volume);
 /* does this file name or content look like a label volume? (for choosing the reader) */
 bool pal_label_volume_is(const char *path);
@@ -43,5 +43,5 @@ typedef struct pal_label_surface_options {
  * for any body of more than 1000 voxels. REFUSED with the labels that exist when this one does not, BUDGET when the
  * voxels' sides are so unequal that the blur would cost far more than the label's box; MEMORY. */
 pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
-                                 const pal_label_surface_options *options, pal_surface *out, pal_note *note);
+                                 const pal_label_surface_options *options, pal_surface *out, pal_diagnostic *diag);
 #endif

@@ -2,16 +2,16 @@
  *
  * The splitter's two patterns give the corners away; whatever else has five tetrahedra to a cube is read by position:
  * five consecutive tetrahedra are a cube when they have eight nodes between them, which lie at the corners of a cube of
- * edge h_m along the axes, and when their volumes, each positive, sum to the cube's. */
+ * edge edge_m along the axes, and when their volumes, each positive, sum to the cube's. */
 #include "server/mesh/volume/hexes.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/voxel/voxel_share.h"
+#include "server/mesh/voxel/voxel_fraction.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* relative to h_m: what single precision in a file may have moved a node by, at some hundred voxels across */
+/* relative to edge_m: what single precision in a file may have moved a node by, at some hundred voxels across */
 #define AWAY 1e-4
 
 void pal_hexes_free(pal_hexes *hexes)
@@ -37,8 +37,8 @@ static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node
     /* where the corners stand among the twenty */
     static const uint8_t FIRST[2][8] = {{0, 1, 2, 4, 3, 8, 12, 7}, {2, 0, 4, 1, 8, 3, 7, 12}};
     int parity = five[16] == five[2];
-    const uint8_t *corner = pal_voxel_five[parity][0];
-    double h = tets->h_m, away = AWAY * h;
+    const uint8_t *corner = pal_voxel_tets[parity][0];
+    double h = tets->edge_m, away = AWAY * h;
     int32_t differ = 0;
     int n_away = 0;
     for (int c = 0; c < 8; c++) node[c] = five[FIRST[parity][c]];
@@ -56,7 +56,7 @@ static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node
 /* corner bits of each node from its place in the box of the twenty corners; false when one is at no corner */
 static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node[8])
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, h = tets->h_m;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, h = tets->edge_m;
     for (int i = 0; i < 20; i++)
         for (int k = 0; k < 3; k++) low[k] = fmin(low[k], tets->x[3 * (size_t)five[i] + (size_t)k]);
     for (int c = 0; c < 8; c++) node[c] = -1;
@@ -81,24 +81,24 @@ static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node
     return fabs(sum - 6 * h * h * h) <= 60 * AWAY * h * h * h;
 }
 
-pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_note *note)
+pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag)
 {
-    if (tets->n_tet == 0 || tets->n_tet % 5 || !(tets->h_m > 0))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%d tetrahedra are no voxels of five each", tets->n_tet);
+    if (tets->n_tet == 0 || tets->n_tet % 5 || !(tets->edge_m > 0))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d tetrahedra are no voxels of five each", tets->n_tet);
     pal_hexes hexes = {.n_hex = tets->n_tet / 5};
     hexes.node = pal_voxels_array((size_t)hexes.n_hex * 8 * sizeof *hexes.node);
     hexes.fill = pal_voxels_array((size_t)hexes.n_hex * sizeof *hexes.fill);
     if (!hexes.node || !hexes.fill) {
         pal_hexes_free(&hexes);
-        return pal_note_set(note, PAL_ERR_MEMORY, "out of memory for %d voxels", tets->n_tet / 5);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "out of memory for %d voxels", tets->n_tet / 5);
     }
     for (size_t e = 0; e < (size_t)hexes.n_hex; e++) {
         hexes.fill[e] = 1;
         const int32_t *five = tets->tet + 20 * e;
         if (read_pattern(tets, five, hexes.node + 8 * e) || find_corners(tets, five, hexes.node + 8 * e)) continue;
         pal_hexes_free(&hexes);
-        return pal_note_set(note, PAL_ERR_REFUSED, "tetrahedra %zu to %zu do not fill a voxel of %g m", 5 * e,
-                            5 * e + 4, tets->h_m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tetrahedra %zu to %zu do not fill a voxel of %g m", 5 * e,
+                                  5 * e + 4, tets->edge_m);
     }
     *out = hexes;
     return PAL_ERR_OK;
@@ -106,19 +106,19 @@ pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_note *note)
 
 /* the lattice around the voxels, one voxel wider on every side; low relative to the surface's origin */
 static pal_err find_grid(const pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, pal_voxels *grid,
-                         pal_note *note)
+                         pal_diagnostic *diag)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, h = tets->h_m;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, h = tets->edge_m;
     for (size_t i = 0; i < 8 * (size_t)hexes->n_hex; i++)
         for (size_t k = 0; k < 3; k++) {
             double x = tets->x[3 * (size_t)hexes->node[i] + k];
             low[k] = fmin(low[k], x);
             high[k] = fmax(high[k], x);
         }
-    grid->h_m = h;
+    grid->edge_m = h;
     for (int k = 0; k < 3; k++) {
         double n = (high[k] - low[k]) / h;
-        if (!(n < 2000)) return pal_note_set(note, PAL_ERR_REFUSED, "the mesh is %.0f voxels across", n);
+        if (!(n < 2000)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the mesh is %.0f voxels across", n);
         grid->n[k] = (int)(n + 0.5) + 2;
         grid->low_m[k] = low[k] - h + tets->origin_m[k] - surface->origin_m[k];
     }
@@ -148,7 +148,7 @@ static void deal_layers(filler *f, const pal_hexes *hexes, const pal_tets *tets,
             int at[3];
             for (int k = 0; k < 3; k++) {
                 double x = tets->x[3 * (size_t)hexes->node[8 * e] + (size_t)k] + shift[k];
-                at[k] = (int)((x - g->low_m[k]) / g->h_m + 0.5);
+                at[k] = (int)((x - g->low_m[k]) / g->edge_m + 0.5);
             }
             if (pass == 0) {
                 f->start[at[2] + 2]++;
@@ -161,11 +161,12 @@ static void deal_layers(filler *f, const pal_hexes *hexes, const pal_tets *tets,
     }
 }
 
-pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, int n_sub, pal_note *note)
+pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, int n_sub,
+                       pal_diagnostic *diag)
 {
     pal_voxels grid = {0};
     if (hexes->n_hex == 0) return PAL_ERR_OK;
-    PAL_TRY(find_grid(hexes, tets, surface, &grid, note));
+    PAL_TRY(find_grid(hexes, tets, surface, &grid, diag));
     filler f = {.grid = &grid, .fill = hexes->fill};
     f.place = malloc((size_t)hexes->n_hex * 2 * sizeof *f.place);
     f.start = calloc((size_t)grid.n[2] + 2, sizeof *f.start);
@@ -174,11 +175,12 @@ pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface
         double shift[3];
         pal_sub3(shift, tets->origin_m, surface->origin_m);
         deal_layers(&f, hexes, tets, shift);
-        err = pal_voxels_share(surface, &grid, NULL, n_sub, take_layer, &f, NULL, note);
+        err = pal_voxels_fraction(surface, &grid, NULL, n_sub, take_layer, &f, NULL, diag);
     }
     if (!err) hexes->measured = true;
     free(f.place);
     free(f.start);
-    return err == PAL_ERR_MEMORY ? pal_note_set(note, err, "out of memory for the fill of %d voxels", hexes->n_hex)
-                                 : err;
+    return err == PAL_ERR_MEMORY
+               ? pal_diagnostic_set(diag, err, "out of memory for the fill of %d voxels", hexes->n_hex)
+               : err;
 }

@@ -112,7 +112,7 @@ static void lay_cells(pal_locate *l)
         find_box(l, e, a, b);
         for (int k = 0; k < 3; k++) l->low[k] = fmin(l->low[k], a[k]), high[k] = fmax(high[k], b[k]);
     }
-    l->cell_m = l->tets->h_m;
+    l->cell_m = l->tets->edge_m;
     for (;; l->cell_m *= 1.25) {
         double n[3];
         for (int k = 0; k < 3; k++) n[k] = fmax(1, ceil((high[k] - l->low[k]) / l->cell_m - HAIR));
@@ -125,7 +125,7 @@ static void lay_cells(pal_locate *l)
 pal_err pal_locate_create(const pal_tets *tets, const pal_hexes *hexes, pal_locate **out)
 {
     int n_element = hexes ? hexes->n_hex : tets->n_tet;
-    if (n_element == 0 || !(tets->h_m > 0)) return PAL_ERR_REFUSED;
+    if (n_element == 0 || !(tets->edge_m > 0)) return PAL_ERR_REFUSED;
     pal_locate *l = calloc(1, sizeof *l);
     if (!l) return PAL_ERR_MEMORY;
     l->tets = tets, l->hexes = hexes, l->n_element = n_element;
@@ -236,7 +236,7 @@ static void look_into(const pal_locate *l, size_t cell, const double x[3], neare
     for (int64_t i = l->start[cell]; i < l->start[cell + 1]; i++) {
         int e = l->element[i];
         double away = element_distance(l, e, x);
-        if (away < INSIDE * l->tets->h_m) away = 0;
+        if (away < INSIDE * l->tets->edge_m) away = 0;
         if (away < best->away || (away == best->away && e < best->element)) *best = (nearest){e, away};
     }
 }

@@ -6,7 +6,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/polygon.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ typedef struct cutter {
     double low[3], h; /* of the voxel lattice */
     double normal[3]; /* of the triangle at hand */
     double crumb_m2;
-    pal_piece *piece;
+    pal_quadrature_point *piece;
     size_t n, cap;
     bool full; /* out of memory */
 } cutter;
@@ -43,11 +43,11 @@ static double area_of(const cutter *c, const pal_polygon *p)
     return sum;
 }
 
-static pal_piece *next_piece(cutter *c)
+static pal_quadrature_point *next_piece(cutter *c)
 {
     if (c->n == c->cap) {
         size_t cap = c->cap ? 2 * c->cap : 256;
-        pal_piece *piece = cap <= INT32_MAX ? realloc(c->piece, cap * sizeof *piece) : NULL;
+        pal_quadrature_point *piece = cap <= INT32_MAX ? realloc(c->piece, cap * sizeof *piece) : NULL;
         if (!piece) {
             c->full = true;
             return NULL;
@@ -72,7 +72,7 @@ static void add_points(cutter *c, const pal_polygon *p, int element)
         for (int q = 0; q < 6; q++) {
             double x[3] = {0};
             for (int k = 0; k < 3; k++) pal_axpy3(x, pal_tri_gauss[q][k], corner[k]);
-            pal_piece *piece = next_piece(c);
+            pal_quadrature_point *piece = next_piece(c);
             if (!piece) return;
             piece->element = element;
             piece->area_m2 = area * pal_tri_gauss[q][3];
@@ -90,7 +90,7 @@ static int element_at_middle(const cutter *c, const pal_polygon *p, double *outs
 }
 
 /* heights of the corners over face f of a tetrahedron, rounding taken off; true when they lie on both sides */
-static bool find_heights(const cutter *c, const pal_polygon *p, int element, int f, double height[PAL_POLYGON_MOST])
+static bool find_heights(const cutter *c, const pal_polygon *p, int element, int f, double height[PAL_POLYGON_MAX])
 {
     bool below = false, above = false;
     for (int i = 0; i < p->n; i++) {
@@ -105,7 +105,7 @@ static bool find_heights(const cutter *c, const pal_polygon *p, int element, int
 
 static void peel(cutter *c, pal_polygon *p, int depth)
 {
-    double outside, height[PAL_POLYGON_MOST];
+    double outside, height[PAL_POLYGON_MAX];
     if (p->n < 3 || area_of(c, p) <= c->crumb_m2) return;
     int element = element_at_middle(c, p, &outside);
     for (int f = 0; f < 4 && depth < MOST_PEEL && outside == 0; f++) {
@@ -175,12 +175,12 @@ static void find_low(cutter *c)
 }
 
 pal_err pal_locate_surface(const pal_locate *locate, const pal_surface *surface, const double low[3],
-                           const double high[3], const double *normal, pal_piece **out, int *n_piece)
+                           const double high[3], const double *normal, pal_quadrature_point **out, int *n_piece)
 {
     double unit[3];
     cutter c = {.locate = locate};
     c.tets = pal_locate_mesh(locate, &c.hex);
-    c.h = c.tets->h_m;
+    c.h = c.tets->edge_m;
     find_low(&c);
     if (normal && !pal_unit3(unit, normal, 0)) normal = NULL;
     for (size_t t = 0; t < (size_t)surface->n_tri && !c.full; t++)

@@ -46,7 +46,8 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_near = n_frame ? PAL_SKIN_NEAR * n_vertex : 0;
+             n_frame = count[5], n_fan = count[6], n_fill = count[7],
+             n_near = n_frame ? PAL_SKIN_NEIGHBOURS * n_vertex : 0;
     const section all[N_SECTION] = {
         {&p->surface.x, 8, 3 * n_vertex},
         {&p->surface.tri, 4, 3 * n_tri},
@@ -56,7 +57,7 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
         {&p->tets.on_surface, 1, n_node},
         {&p->skin.frame, 4, n_frame},
         {&p->skin.frame_edge, 4, 2 * n_frame},
-        {&p->skin.frame_turn, 4, 2 * n_frame},
+        {&p->skin.frame_rotation, 4, 2 * n_frame},
         {&p->skin.frame_rest, 4, 3 * n_frame},
         {&p->skin.fan_start, 4, n_frame + 1},
         {&p->skin.fan, 4, 2 * n_fan},
@@ -101,28 +102,29 @@ void pal_prepared_free(pal_prepared *prepared)
 }
 
 /* the hexahedra of a split, their fill when it is asked for or decided what was kept */
-static pal_err make_hexes(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *p, pal_note *note)
+static pal_err make_hexes(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *p,
+                          pal_diagnostic *diag)
 {
-    PAL_TRY(pal_hexes_find(&p->tets, &p->hexes, note));
-    if (!options->fill && !(options->least_fill > 0)) return PAL_ERR_OK;
-    return pal_hexes_fill(&p->hexes, &p->tets, surface, 0, note);
+    PAL_TRY(pal_hexes_find(&p->tets, &p->hexes, diag));
+    if (!options->fill && !(options->min_fill > 0)) return PAL_ERR_OK;
+    return pal_hexes_fill(&p->hexes, &p->tets, surface, 0, diag);
 }
 
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
-                          pal_prepare_report *report, pal_note *note)
+                          pal_prepare_report *report, pal_diagnostic *diag)
 {
     pal_prepared p = {0};
     pal_prepare_report told = {0};
     pal_voxels voxels = {0};
-    PAL_TRY(pal_voxels_fill(surface, options, &voxels, &told.voxel, note));
+    PAL_TRY(pal_voxels_fill(surface, options, &voxels, &told.voxel, diag));
     told.n_voxel = voxels.n_inside + voxels.n_border;
     double began = pal_clock_s();
     pal_err err = pal_voxels_split(&voxels, &p.tets);
     pal_voxels_free(&voxels);
-    if (err) return pal_note_set(note, err, "cannot split %lld voxels into tetrahedra", (long long)told.n_voxel);
+    if (err) return pal_diagnostic_set(diag, err, "cannot split %lld voxels into tetrahedra", (long long)told.n_voxel);
     double split = pal_clock_s();
     told.split_s = split - began;
-    if ((err = make_hexes(surface, options, &p, note))) {
+    if ((err = make_hexes(surface, options, &p, diag))) {
         pal_prepared_free(&p);
         return err;
     }
@@ -133,7 +135,7 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
     if (!err) err = pal_surface_copy(surface, &p.surface);
     if (err) {
         pal_prepared_free(&p);
-        return pal_note_set(note, err, "cannot bind %d vertices to the mesh", surface->n_vertex);
+        return pal_diagnostic_set(diag, err, "cannot bind %d vertices to the mesh", surface->n_vertex);
     }
     told.volume_m3 = pal_tets_volume(&p.tets);
     if (told.voxel.surface_volume_m3 > 0)
@@ -152,7 +154,7 @@ pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out)
         for (int k = 0; k < 3; k++)
             sum += pal_dist3(surface->x + 3 * (size_t)surface->tri[3 * t + k],
                              surface->x + 3 * (size_t)surface->tri[3 * t + (k + 1) % 3]);
-    p.tets.h_m = sum > 0 ? sum / (3.0 * surface->n_tri) : 1;
+    p.tets.edge_m = sum > 0 ? sum / (3.0 * surface->n_tri) : 1;
     pal_copy3(p.tets.origin_m, surface->origin_m);
     *out = p;
     return PAL_ERR_OK;
@@ -226,7 +228,7 @@ pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, si
     put_u64(bytes + 16, n_byte);
     for (int k = 0; k < N_COUNT; k++) put_u64(bytes + HEAD + 8 * k, count[k]);
     memcpy(bytes + HEAD + 8 * N_COUNT, p.tets.origin_m, 24);
-    memcpy(bytes + HEAD + 8 * N_COUNT + 24, &p.tets.h_m, 8);
+    memcpy(bytes + HEAD + 8 * N_COUNT + 24, &p.tets.edge_m, 8);
     size_t at = round_up(l.table + ENTRY * N_SECTION);
     for (int k = 0; k < N_SECTION; k++) {
         uint8_t *entry = bytes + l.table + (size_t)ENTRY * (size_t)k;
@@ -246,23 +248,23 @@ pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, si
     return PAL_ERR_OK;
 }
 
-pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_note *note)
+pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
     if (pal_prepared_bytes(prepared, &bytes, &n_byte))
-        return pal_note_set(note, PAL_ERR_MEMORY, "%s: out of memory while writing", path);
-    pal_err err = pal_file_write(path, bytes, n_byte, note);
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: out of memory while writing", path);
+    pal_err err = pal_file_write(path, bytes, n_byte, diag);
     free(bytes);
     return err;
 }
 
-pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_note *note)
+pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, (size_t)8 << 30, &bytes, &n_byte, note));
-    pal_err err = pal_prepared_parse(path, bytes, n_byte, out, note);
+    PAL_TRY(pal_file_read(path, (size_t)8 << 30, &bytes, &n_byte, diag));
+    pal_err err = pal_prepared_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }
@@ -309,7 +311,7 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
     uint64_t n_node = count[2], n_frame = count[5];
     if (!all_finite(surface->x, 3 * count[0]) || !all_finite(tets->x, 3 * n_node)) return "a position is not finite";
     if (!all_finite(tets->origin_m, 3)) return "the origin is not finite";
-    if (!(tets->h_m > 0) || !isfinite(tets->h_m)) return "the voxel edge is not positive";
+    if (!(tets->edge_m > 0) || !isfinite(tets->edge_m)) return "the voxel edge is not positive";
     if (!all_within(surface->tri, 3 * count[1], 0, count[0])) return "a triangle's corner is out of range";
     if (!all_within(tets->tet, 4 * count[3], 0, n_node)) return "a tetrahedron's corner is out of range";
     if (!all_within(tets->face, 3 * count[4], 0, n_node)) return "a boundary face's corner is out of range";
@@ -319,9 +321,9 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         if (skin->frame_edge[2 * f] < 0) return "a skin frame has no edge";
     if (!fans_are_rows(skin, count[6])) return "the skin's fans are not ascending rows";
     if (!all_within(skin->fan, 2 * count[6], 0, n_node)) return "a skin fan's corner is out of range";
-    uint64_t n_near = n_frame ? PAL_SKIN_NEAR * count[0] : 0;
+    uint64_t n_near = n_frame ? PAL_SKIN_NEIGHBOURS * count[0] : 0;
     if (!all_within(skin->near, n_near, 0, n_frame)) return "a vertex's skin frame is out of range";
-    if (!all_finite_float(skin->coef, 4 * n_near) || !all_finite_float(skin->frame_turn, 2 * n_frame) ||
+    if (!all_finite_float(skin->coef, 4 * n_near) || !all_finite_float(skin->frame_rotation, 2 * n_frame) ||
         !all_finite_float(skin->frame_rest, 3 * n_frame))
         return "a skin weight is not finite";
     for (uint64_t i = 0; i < n_node; i++)
@@ -332,34 +334,35 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
 }
 
 static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, layout *l, uint64_t count[N_COUNT],
-                         pal_note *note)
+                         pal_diagnostic *diag)
 {
     if (n_byte < HEAD || memcmp(bytes, MAGIC, 8))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 0: not a prepared mesh", name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 0: not a prepared mesh", name);
     uint32_t version = get_u32(bytes + 8);
     *l = layout_of(version);
     if ((version != VERSION && version != VERSION_2) || get_u32(bytes + 12) != (uint32_t)l->n_section)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d",
-                            name, version, get_u32(bytes + 12), VERSION, N_SECTION, VERSION_2, N_SECTION_2);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d", name, version,
+            get_u32(bytes + 12), VERSION, N_SECTION, VERSION_2, N_SECTION_2);
     if (get_u64(bytes + 16) != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 16: %llu bytes announced, %zu are there", name,
-                            (unsigned long long)get_u64(bytes + 16), n_byte);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 16: %llu bytes announced, %zu are there", name,
+                                  (unsigned long long)get_u64(bytes + 16), n_byte);
     if (get_u64(bytes + 24) != pal_prepared_checksum(bytes, n_byte))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte 24: the checksum does not fit the content", name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 24: the checksum does not fit the content", name);
     for (int k = 0; k < N_COUNT; k++) count[k] = 0;
     for (int k = 0; k < l->n_count; k++) {
         count[k] = get_u64(bytes + HEAD + 8 * k);
         if (count[k] > INT32_MAX / 8)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
-                                (unsigned long long)count[k]);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
+                                      (unsigned long long)count[k]);
     }
     return PAL_ERR_OK;
 }
 
 /* copies the sections to the heap after checking that each lies in the file with the size the counts call for */
 static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_byte, const layout *l,
-                             section s[N_SECTION], pal_note *note)
+                             section s[N_SECTION], pal_diagnostic *diag)
 {
     uint64_t end = l->table + ENTRY * (size_t)l->n_section;
     for (int k = 0; k < l->n_section; k++) {
@@ -367,28 +370,29 @@ static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_by
         uint64_t at = get_u64(entry + 16), size = s[k].n * s[k].n_byte;
         if (get_u32(entry) != (uint32_t)k + 1 || get_u32(entry + 4) != s[k].n_byte || get_u64(entry + 8) != s[k].n ||
             at < end || at % 64 || at > n_byte || size > n_byte - at)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: byte %zu: section %d does not fit the counts or the file",
-                                name, l->table + (size_t)ENTRY * (size_t)k, k + 1);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                      "%s: byte %zu: section %d does not fit the counts or the file", name,
+                                      l->table + (size_t)ENTRY * (size_t)k, k + 1);
         end = at + size;
         void *array = malloc(size ? size : 1);
         memcpy(s[k].pointer, &array, sizeof array);
-        if (!array) return pal_note_set(note, PAL_ERR_MEMORY, "%s: out of memory for section %d", name, k + 1);
+        if (!array) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: out of memory for section %d", name, k + 1);
         if (size) memcpy(array, bytes + at, size);
     }
     return PAL_ERR_OK;
 }
 
 /* the hexahedra of the checked tetrahedra; with the fill the file has, which must be theirs */
-static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pal_note *note)
+static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pal_diagnostic *diag)
 {
     float *fill = p->hexes.fill;
     p->hexes.fill = NULL;
     pal_err err = pal_hexes_find(&p->tets, &p->hexes, NULL);
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "%s: out of memory for the voxels", name);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "%s: out of memory for the voxels", name);
     if (err == PAL_ERR_REFUSED && n_fill == 0) err = PAL_ERR_OK;
     if (err == PAL_ERR_REFUSED || (!err && n_fill > 0 && n_fill != (uint64_t)p->hexes.n_hex))
-        err = pal_note_set(note, PAL_ERR_REFUSED, "%s: fill of %llu voxels, the mesh has %d", name,
-                           (unsigned long long)n_fill, p->hexes.n_hex);
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: fill of %llu voxels, the mesh has %d", name,
+                                 (unsigned long long)n_fill, p->hexes.n_hex);
     if (err || n_fill == 0) {
         free(fill);
         return err;
@@ -399,30 +403,31 @@ static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pa
     return PAL_ERR_OK;
 }
 
-pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out, pal_note *note)
+pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out,
+                           pal_diagnostic *diag)
 {
     pal_prepared p = {0};
     uint64_t count[N_COUNT];
     section s[N_SECTION];
     layout l = layout_of(VERSION);
-    PAL_TRY(read_head(name, bytes, n_byte, &l, count, note));
+    PAL_TRY(read_head(name, bytes, n_byte, &l, count, diag));
     list_sections(&p, count, s);
-    pal_err err = read_sections(name, bytes, n_byte, &l, s, note);
+    pal_err err = read_sections(name, bytes, n_byte, &l, s, diag);
     if (!err) {
         const uint8_t *place = bytes + l.table - 32;
         put_counts(&p, count);
         memcpy(p.tets.origin_m, place, 24);
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);
-        memcpy(&p.tets.h_m, place + 24, 8);
+        memcpy(&p.tets.edge_m, place + 24, 8);
         const char *fault = find_fault(&p, count);
-        if (fault) err = pal_note_set(note, PAL_ERR_REFUSED, "%s: %s", name, fault);
+        if (fault) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", name, fault);
     }
     if (!err && (err = pal_tets_check(&p.tets, NULL)) == PAL_ERR_REFUSED) {
-        pal_note inner;
+        pal_diagnostic inner;
         pal_tets_check(&p.tets, &inner);
-        pal_note_set(note, err, "%s: %.400s", name, inner.text);
+        pal_diagnostic_set(diag, err, "%s: %.400s", name, inner.text);
     }
-    if (!err) err = read_hexes(name, count[7], &p, note);
+    if (!err) err = read_hexes(name, count[7], &p, diag);
     if (err)
         pal_prepared_free(&p);
     else

@@ -2,8 +2,8 @@
  * that is simulated on the surface itself (model adaptive_springs) it is the surface alone.
  * One file, little-endian, sections with counts and a checksum; loading never trusts a count or an index.
  * Thread: [load]. */
-#ifndef PAL_MESH_PREPARED_H
-#define PAL_MESH_PREPARED_H
+#ifndef PAL_MESH_VOLUME_PREPARED_H
+#define PAL_MESH_VOLUME_PREPARED_H
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 #include "server/mesh/volume/hexes.h"
@@ -12,7 +12,7 @@
 
 typedef struct pal_prepared {
     pal_surface surface; /* what is shown                                    */
-    pal_tets tets;       /* what is simulated, same origin_m as the surface; none: n_node 0, h_m its mean edge */
+    pal_tets tets;       /* what is simulated, same origin_m as the surface; none: n_node 0, edge_m its mean edge */
     pal_skin skin;       /* surface on tets; none: n_vertex 0                */
     pal_hexes hexes;     /* the same body as cubes; n_hex 0: it is no voxels */
 } pal_prepared;
@@ -26,17 +26,18 @@ typedef struct pal_prepare_report {
 } pal_prepare_report;
 
 /* surface -> voxels -> tets, hexes -> skin; copies the surface; one error names the step; the fill of the hexes is
- * measured when options->fill or options->least_fill asks for it, else it is 1 */
+ * measured when options->fill or options->min_fill asks for it, else it is 1 */
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
-                          pal_prepare_report *report, pal_note *note);
+                          pal_prepare_report *report, pal_diagnostic *diag);
 /* the surface alone, copied, without tetrahedra, hexahedra and skin; MEMORY */
 pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out);
 void pal_prepared_free(pal_prepared *prepared);
-pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_note *note);
-pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_note *note);
+pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_diagnostic *diag);
+pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_diagnostic *diag);
 /* the same from memory (files of version 2 have no fill: it is 1, not measured): name is used in messages only; every
  * count, index and number is checked */
-pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out, pal_note *note);
+pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out,
+                           pal_diagnostic *diag);
 /* the file's bytes, which the caller frees; MEMORY */
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes, size_t *n_byte);
 /* what the checksum at byte 24 must be; 0 when there are fewer than 32 bytes */

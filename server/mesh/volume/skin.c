@@ -6,7 +6,7 @@
 #include "server/mesh/volume/skin.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/geometry/near.h"
+#include "server/mesh/geometry/kd_tree.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ void pal_skin_free(pal_skin *skin)
 {
     free(skin->frame);
     free(skin->frame_edge);
-    free(skin->frame_turn);
+    free(skin->frame_rotation);
     free(skin->frame_rest);
     free(skin->fan_start);
     free(skin->fan);
@@ -119,25 +119,25 @@ static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_c
     double *place = malloc((size_t)n_candidate * 3 * sizeof *place);
     if (!place) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_candidate; i++) pal_copy3(place + 3 * (size_t)i, tets->x + 3 * (size_t)candidate[i]);
-    pal_near *tree = NULL;
-    pal_err err = pal_near_create(place, n_candidate, &tree);
+    pal_kd_tree *tree = NULL;
+    pal_err err = pal_kd_tree_create(place, n_candidate, &tree);
     free(place);
     if (err) return err;
-    double on_node2 = ON_NODE * ON_NODE * tets->h_m * tets->h_m;
+    double on_node2 = ON_NODE * ON_NODE * tets->edge_m * tets->edge_m;
     for (size_t v = 0; v < (size_t)skin->n_vertex; v++) {
-        int32_t *index = skin->near + PAL_SKIN_NEAR * v;
-        double distance2[PAL_SKIN_NEAR], weight[PAL_SKIN_NEAR] = {0}, sum = 0;
-        int n = pal_near_find(tree, x + 3 * v, PAL_SKIN_NEAR, index, distance2);
+        int32_t *index = skin->near + PAL_SKIN_NEIGHBOURS * v;
+        double distance2[PAL_SKIN_NEIGHBOURS], weight[PAL_SKIN_NEIGHBOURS] = {0}, sum = 0;
+        int n = pal_kd_tree_nearest(tree, x + 3 * v, PAL_SKIN_NEIGHBOURS, index, distance2);
         /* a vertex on a node has that node five times, once with all the weight */
         if (distance2[0] <= on_node2) n = 1;
-        for (int k = n; k < PAL_SKIN_NEAR; k++) index[k] = index[0];
+        for (int k = n; k < PAL_SKIN_NEIGHBOURS; k++) index[k] = index[0];
         for (int k = 0; k < n; k++) sum += weight[k] = n == 1 ? 1 : distance2[0] / distance2[k];
-        for (int k = 0; k < PAL_SKIN_NEAR; k++) {
-            skin->coef[4 * (PAL_SKIN_NEAR * v + (size_t)k) + 3] = (float)(weight[k] / sum);
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
+            skin->coef[4 * (PAL_SKIN_NEIGHBOURS * v + (size_t)k) + 3] = (float)(weight[k] / sum);
             index[k] = candidate[index[k]];
         }
     }
-    pal_near_destroy(tree);
+    pal_kd_tree_destroy(tree);
     return PAL_ERR_OK;
 }
 
@@ -179,7 +179,7 @@ static void choose_edges(const double *x, int node, const int32_t *fan, int n_fa
 static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int32_t *fan, int32_t *place,
                            pal_skin *skin)
 {
-    size_t n_near = PAL_SKIN_NEAR * (size_t)skin->n_vertex, n_fan = 0;
+    size_t n_near = PAL_SKIN_NEIGHBOURS * (size_t)skin->n_vertex, n_fan = 0;
     int n_frame = 0;
     memset(place, 0, (size_t)tets->n_node * sizeof *place);
     for (size_t i = 0; i < n_near; i++) place[skin->near[i]] = 1;
@@ -196,11 +196,12 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
     skin->n_frame = n_frame;
     skin->frame = malloc(room * sizeof *skin->frame);
     skin->frame_edge = malloc(room * 2 * sizeof *skin->frame_edge);
-    skin->frame_turn = malloc(room * 2 * sizeof *skin->frame_turn);
+    skin->frame_rotation = malloc(room * 2 * sizeof *skin->frame_rotation);
     skin->frame_rest = malloc(room * 3 * sizeof *skin->frame_rest);
     skin->fan_start = malloc((room + 1) * sizeof *skin->fan_start);
     skin->fan = malloc((n_fan ? n_fan : 1) * 2 * sizeof *skin->fan);
-    if (!skin->frame || !skin->frame_edge || !skin->frame_turn || !skin->frame_rest || !skin->fan_start || !skin->fan)
+    if (!skin->frame || !skin->frame_edge || !skin->frame_rotation || !skin->frame_rest || !skin->fan_start ||
+        !skin->fan)
         return PAL_ERR_MEMORY;
     skin->fan_start[0] = 0;
     for (int i = 0; i < tets->n_node; i++) {
@@ -210,7 +211,7 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
         skin->frame[f] = i;
         memcpy(skin->fan + 2 * (size_t)skin->fan_start[f], fan + 2 * (size_t)start[i], 2 * (size_t)n * sizeof *fan);
         skin->fan_start[f + 1] = skin->fan_start[f] + n;
-        choose_edges(tets->x, i, fan + 2 * (size_t)start[i], n, skin->frame_edge + 2 * f, skin->frame_turn + 2 * f,
+        choose_edges(tets->x, i, fan + 2 * (size_t)start[i], n, skin->frame_edge + 2 * f, skin->frame_rotation + 2 * f,
                      skin->frame_rest + 3 * f);
     }
     return PAL_ERR_OK;
@@ -223,9 +224,9 @@ static pal_err store_offsets(const pal_tets *tets, const double *x, pal_skin *sk
     if (!frames) return PAL_ERR_MEMORY;
     pal_skin_frames(skin, tets->x, frames);
     for (size_t v = 0; v < (size_t)skin->n_vertex; v++)
-        for (size_t k = 0; k < PAL_SKIN_NEAR; k++) {
-            int32_t f = skin->near[PAL_SKIN_NEAR * v + k];
-            float *coef = skin->coef + 4 * (PAL_SKIN_NEAR * v + k);
+        for (size_t k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
+            int32_t f = skin->near[PAL_SKIN_NEIGHBOURS * v + k];
+            float *coef = skin->coef + 4 * (PAL_SKIN_NEIGHBOURS * v + k);
             double from_node[3];
             pal_sub3(from_node, x + 3 * v, tets->x + 3 * (size_t)skin->frame[f]);
             for (int axis = 0; axis < 3; axis++) {
@@ -244,8 +245,8 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
     pal_skin skin = {.n_vertex = n_vertex, .n_node = tets->n_node};
     size_t n = n_vertex ? (size_t)n_vertex : 1;
     int32_t *start = NULL, *fan = NULL, *candidate = malloc((size_t)tets->n_node * sizeof *candidate);
-    skin.near = malloc(n * PAL_SKIN_NEAR * sizeof *skin.near);
-    skin.coef = calloc(n * PAL_SKIN_NEAR * 4, sizeof *skin.coef);
+    skin.near = malloc(n * PAL_SKIN_NEIGHBOURS * sizeof *skin.near);
+    skin.coef = calloc(n * PAL_SKIN_NEIGHBOURS * 4, sizeof *skin.coef);
     pal_err err = candidate && skin.near && skin.coef ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) err = node_fans(tets, &start, &fan);
     if (!err) {
@@ -272,7 +273,7 @@ static void frame_edge(const pal_skin *skin, size_t f, const double *x, const do
     tangential(o, x + 3 * (size_t)edge[0], X, Y);
     double share = unit_or_less(Y, (double)skin->frame_rest[3 * f + 1]);
     if (share == 1 || edge[1] < 0) return;
-    double t[3], z[3], c = (double)skin->frame_turn[2 * f], s = (double)skin->frame_turn[2 * f + 1];
+    double t[3], z[3], c = (double)skin->frame_rotation[2 * f], s = (double)skin->frame_rotation[2 * f + 1];
     tangential(o, x + 3 * (size_t)edge[1], X, t);
     unit_or_less(t, (double)skin->frame_rest[3 * f + 2]);
     pal_cross3(z, X, t);
@@ -311,10 +312,10 @@ void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, floa
         to[0] = (float)o[0], to[1] = (float)o[1], to[2] = (float)o[2];
     }
     for (size_t v = 0; v < (size_t)skin->n_vertex; v++) {
-        const int32_t *near = skin->near + PAL_SKIN_NEAR * v;
-        const float *c = skin->coef + 4 * PAL_SKIN_NEAR * v;
+        const int32_t *near = skin->near + PAL_SKIN_NEIGHBOURS * v;
+        const float *c = skin->coef + 4 * PAL_SKIN_NEIGHBOURS * v;
         column X = {0}, Y = {0}, Z = {0}, P = {0};
-        for (int k = 0; k < PAL_SKIN_NEAR; k++, c += 4) {
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++, c += 4) {
             const column *axes = (const column *)((const float *)frames + 16 * (size_t)near[k]);
             X += axes[0] * c[0];
             Y += axes[1] * c[1];
@@ -329,8 +330,8 @@ void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, floa
 void pal_skin_vertex(const pal_skin *skin, const double *x, const void *frames, int vertex, double out[3])
 {
     double sum[3] = {0};
-    for (size_t k = 0; k < PAL_SKIN_NEAR; k++) {
-        size_t i = PAL_SKIN_NEAR * (size_t)vertex + k, f = (size_t)skin->near[i];
+    for (size_t k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
+        size_t i = PAL_SKIN_NEIGHBOURS * (size_t)vertex + k, f = (size_t)skin->near[i];
         const float *axes = (const float *)frames + 16 * f, *c = skin->coef + 4 * i;
         pal_axpy3(sum, (double)c[3], x + 3 * (size_t)skin->frame[f]);
         for (int axis = 0; axis < 3; axis++)

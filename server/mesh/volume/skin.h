@@ -14,28 +14,28 @@
  *
  * Binding is [load]; evaluation is [sim], without heap use. One pal_skin may serve several threads; each needs its own
  * frames buffer. */
-#ifndef PAL_MESH_SKIN_H
-#define PAL_MESH_SKIN_H
+#ifndef PAL_MESH_VOLUME_SKIN_H
+#define PAL_MESH_VOLUME_SKIN_H
 #include "server/base/arena.h"
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
-enum { PAL_SKIN_NEAR = 5 };
+enum { PAL_SKIN_NEIGHBOURS = 5 };
 
 typedef struct pal_skin {
-    int n_vertex;        /* shown vertices                                                               */
-    int n_frame;         /* surface nodes that some vertex uses                                          */
-    int n_node;          /* nodes of the mesh, for checks                                                */
-    int32_t *frame;      /* node of each frame, ascending                          [n_frame]             */
-    int32_t *frame_edge; /* other ends of its two candidate edges (second may be -1) [n_frame][2]        */
-    float *frame_turn;   /* cos, sin of the angle about X from second to first edge at rest [n_frame][2] */
-    float *frame_rest;   /* rest lengths: sum of the fan's cross products, m^2; tangential parts of the two edges, m
-                                                                                   [n_frame][3]          */
-    int32_t *fan_start;  /* boundary faces around each frame's node, as sparse rows [n_frame+1]          */
-    int32_t *fan;        /* the two other corners of each face, in outward order    [fan_start[n_frame]][2] */
-    int32_t *near;       /* frames of each vertex                                   [n_vertex][5]        */
-    float *coef;         /* weight w (sum 1 over a row) and offset o in the frame's axes, m, as
-                            w oX, w oY, w oZ, w                                     [n_vertex][5][4]     */
+    int n_vertex;          /* shown vertices                                                               */
+    int n_frame;           /* surface nodes that some vertex uses                                          */
+    int n_node;            /* nodes of the mesh, for checks                                                */
+    int32_t *frame;        /* node of each frame, ascending                          [n_frame]             */
+    int32_t *frame_edge;   /* other ends of its two candidate edges (second may be -1) [n_frame][2]        */
+    float *frame_rotation; /* cos, sin of the angle about X from second to first edge at rest [n_frame][2] */
+    float *frame_rest;     /* rest lengths: sum of the fan's cross products, m^2; tangential parts of the two edges, m
+                                                                                     [n_frame][3]          */
+    int32_t *fan_start;    /* boundary faces around each frame's node, as sparse rows [n_frame+1]          */
+    int32_t *fan;          /* the two other corners of each face, in outward order    [fan_start[n_frame]][2] */
+    int32_t *near;         /* frames of each vertex                                   [n_vertex][5]        */
+    float *coef;           /* weight w (sum 1 over a row) and offset o in the frame's axes, m, as
+                              w oX, w oY, w oZ, w                                     [n_vertex][5][4]     */
 } pal_skin;
 
 /* binds vertices x [n_vertex][3] (same frame as tets->x) to the mesh; heap arrays, pal_skin_free; MEMORY, REFUSED when

@@ -2,9 +2,9 @@
  *
  * Components join runs, not voxels: a run meets the runs of the row before and of the plane before that overlap it,
  * found by walking both rows side by side. */
-#include "server/mesh/voxel/voxel_scan.h"
+#include "server/mesh/voxel/voxel_scanline.h"
 
-#include "server/num/roots.h"
+#include "server/num/union_find.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -118,7 +118,7 @@ static void join_rows(const runs *r, int32_t *parent, int64_t row, int64_t other
     int64_t i = r->start[row], j = r->start[other];
     while (i < r->start[row + 1] && j < r->start[other + 1]) {
         if (r->item[i].from < r->item[j].to && r->item[j].from < r->item[i].to)
-            pal_roots_join(parent, (int32_t)i, (int32_t)j);
+            pal_union_find_join(parent, (int32_t)i, (int32_t)j);
         if (r->item[i].to < r->item[j].to)
             i++;
         else
@@ -133,7 +133,7 @@ static void clear_smaller(pal_bits *bits, const runs *r, int32_t *parent, const 
         if (parent[i] == i && size[i] > size[best]) best = i;
     for (int64_t row = 0; row < n_row; row++)
         for (int64_t i = r->start[row]; i < r->start[row + 1]; i++)
-            if (pal_root(parent, (int32_t)i) != best)
+            if (pal_union_find_root(parent, (int32_t)i) != best)
                 clear_run(bits->word + (size_t)bits->n_word * (size_t)row, r->item[i].from, r->item[i].to);
 }
 
@@ -158,7 +158,7 @@ pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
     int64_t *size = ok ? calloc(r.n ? (size_t)r.n : 1, sizeof *size) : NULL;
     ok = parent && size;
     if (ok) {
-        pal_roots_clear(parent, (int)r.n);
+        pal_union_find_init(parent, (int)r.n);
         int64_t row = 0;
         for (int z = 0; z < bits->n[2]; z++)
             for (int y = 0; y < bits->n[1]; y++, row++) {
@@ -167,7 +167,7 @@ pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
             }
         int n = 0;
         for (int64_t i = 0; i < r.n; i++) {
-            int32_t root = pal_root(parent, (int32_t)i);
+            int32_t root = pal_union_find_root(parent, (int32_t)i);
             n += root == i;
             size[root] += r.item[i].to - r.item[i].from;
         }

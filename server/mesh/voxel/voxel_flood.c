@@ -21,7 +21,7 @@ typedef struct flood {
 
 static void centre_of(const pal_voxels *g, const int32_t at[3], double out[3])
 {
-    for (int k = 0; k < 3; k++) out[k] = g->low_m[k] + g->h_m * (at[k] + 0.5);
+    for (int k = 0; k < 3; k++) out[k] = g->low_m[k] + g->edge_m * (at[k] + 0.5);
 }
 
 /* marks a voxel and remembers it; false: out of memory */
@@ -66,7 +66,7 @@ static bool seed_point(const flood *f, const pal_surface *s, int t, double side,
 {
     const int32_t *c = s->tri + 3 * (size_t)t;
     const double *a = s->x + 3 * (size_t)c[0], *b = s->x + 3 * (size_t)c[1], *e = s->x + 3 * (size_t)c[2];
-    double u[3], v[3], inward[3], start[3], h = f->grid->h_m;
+    double u[3], v[3], inward[3], start[3], h = f->grid->edge_m;
     pal_sub3(u, b, a);
     pal_sub3(v, e, a);
     pal_cross3(inward, u, v);
@@ -80,7 +80,7 @@ static bool seed_point(const flood *f, const pal_surface *s, int t, double side,
 }
 
 pal_err pal_voxels_flood(const pal_surface *surface, const pal_box_tree *tree, const pal_voxels *grid, pal_bits *inside,
-                         pal_note *note)
+                         pal_diagnostic *diag)
 {
     flood f = {.tree = tree, .grid = grid, .inside = inside};
     double side = pal_surface_volume(surface) < 0 ? -1 : 1;
@@ -91,7 +91,7 @@ pal_err pal_voxels_flood(const pal_surface *surface, const pal_box_tree *tree, c
         if (!seed_point(&f, surface, t, side, seed)) continue;
         bool within = true;
         for (int k = 0; k < 3; k++) {
-            at[k] = (int32_t)((seed[k] - grid->low_m[k]) / grid->h_m);
+            at[k] = (int32_t)((seed[k] - grid->low_m[k]) / grid->edge_m);
             within &= at[k] >= 0 && at[k] < grid->n[k];
         }
         if (!within || pal_bits_get(inside, at[0], at[1], at[2])) continue;
@@ -102,7 +102,8 @@ pal_err pal_voxels_flood(const pal_surface *surface, const pal_box_tree *tree, c
     free(f.stack);
     if (!ok) return PAL_ERR_MEMORY;
     if (f.leaked)
-        return pal_note_set(note, PAL_ERR_REFUSED, "flood fill leaks: it reached the border of the %d x %d x %d grid",
-                            grid->n[0], grid->n[1], grid->n[2]);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "flood fill leaks: it reached the border of the %d x %d x %d grid", grid->n[0],
+                                  grid->n[1], grid->n[2]);
     return PAL_ERR_OK;
 }

@@ -3,14 +3,14 @@
  *
  * Departure: vertices are shared through two planes of node numbers that move up with the voxels, not through a hash.
  * A first pass counts, so every array is taken once at its size. */
-#include "server/mesh/voxel/voxel_scan.h"
+#include "server/mesh/voxel/voxel_scanline.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 
 /* corner bits x = 1, y = 2, z = 4; every tetrahedron has positive volume */
-const uint8_t pal_voxel_five[2][5][4] = {
+const uint8_t pal_voxel_tets[2][5][4] = {
     {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}},
     {{1, 3, 0, 5}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}, {0, 3, 6, 5}},
 };
@@ -32,8 +32,8 @@ static void find_sides(side_table *table)
                 for (int f = 0; f < 4; f++) {
                     int on = 0;
                     for (int k = 0; k < 3; k++)
-                        on += (pal_voxel_five[parity][t][FACE[f][k]] >> (side / 2) & 1) == (side & 1);
-                    for (int k = 0; on == 3 && k < 3; k++) *to++ = pal_voxel_five[parity][t][FACE[f][k]];
+                        on += (pal_voxel_tets[parity][t][FACE[f][k]] >> (side / 2) & 1) == (side & 1);
+                    for (int k = 0; on == 3 && k < 3; k++) *to++ = pal_voxel_tets[parity][t][FACE[f][k]];
                 }
         }
 }
@@ -148,18 +148,18 @@ static void write_nodes(splitter *s, int z)
 {
     const pal_voxels *v = s->voxels;
     int stride = v->n[0] + 1;
-    double place_z = v->low_m[2] + v->h_m * z;
+    double place_z = v->low_m[2] + v->edge_m * z;
     for (int y = 0; y <= v->n[1]; y++) {
         const uint64_t *row[4];
         int32_t *number = s->plane[z & 1] + (size_t)stride * (size_t)y;
-        double place_y = v->low_m[1] + v->h_m * y;
+        double place_y = v->low_m[1] + v->edge_m * y;
         rows_around(s, y, z, row);
         for (int w = 0; w < s->kept.n_word; w++)
             for (uint64_t left = node_word(row, w); left; left &= left - 1) {
                 int x = 64 * w + __builtin_ctzll(left);
                 double *to = s->tets->x + 3 * (size_t)s->n_node;
                 number[x] = (int32_t)s->n_node++;
-                to[0] = v->low_m[0] + v->h_m * x, to[1] = place_y, to[2] = place_z;
+                to[0] = v->low_m[0] + v->edge_m * x, to[1] = place_y, to[2] = place_z;
             }
     }
 }
@@ -180,7 +180,7 @@ static void write_tets(splitter *s, int y, int z)
     for (int w = 0; w < s->kept.n_word; w++)
         for (uint64_t left = row[w]; left; left &= left - 1) {
             int x = 64 * w + __builtin_ctzll(left);
-            const uint8_t *pattern = &pal_voxel_five[(x + y + z) & 1][0][0];
+            const uint8_t *pattern = &pal_voxel_tets[(x + y + z) & 1][0][0];
             corners(s, x, y, z, node);
             for (int k = 0; k < 20; k++) to[k] = node[pattern[k]];
             to += 20;
@@ -215,7 +215,7 @@ static pal_err split(splitter *s)
     count_all(s);
     if (s->n_tet > INT32_MAX / 4 || s->n_node > INT32_MAX || s->n_face > INT32_MAX) return PAL_ERR_BUDGET;
     pal_tets *t = s->tets;
-    *t = (pal_tets){.n_node = (int)s->n_node, .n_tet = (int)s->n_tet, .n_face = (int)s->n_face, .h_m = v->h_m};
+    *t = (pal_tets){.n_node = (int)s->n_node, .n_tet = (int)s->n_tet, .n_face = (int)s->n_face, .edge_m = v->edge_m};
     memcpy(t->origin_m, v->origin_m, sizeof t->origin_m);
     t->x = pal_voxels_array((size_t)s->n_node * 3 * sizeof *t->x);
     t->tet = pal_voxels_array((size_t)s->n_tet * 4 * sizeof *t->tet);

@@ -5,8 +5,8 @@
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
-#include "server/mesh/voxel/voxel_scan.h"
-#include "server/mesh/voxel/voxel_share.h"
+#include "server/mesh/voxel/voxel_fraction.h"
+#include "server/mesh/voxel/voxel_scanline.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,31 +35,32 @@ static bool find_box(const pal_surface *surface, const uint8_t *used, double low
     return low[0] <= high[0];
 }
 
-static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid, pal_note *note)
+static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid,
+                        pal_diagnostic *diag)
 {
     double low[3], high[3], longest = 0;
     if (options->resolution < 1 || options->resolution > MOST_RESOLUTION)
-        return pal_note_set(note, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
-                            MOST_RESOLUTION);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
+                                  MOST_RESOLUTION);
     uint8_t *used = calloc(surface->n_vertex ? (size_t)surface->n_vertex : 1, 1);
     if (!used) return PAL_ERR_MEMORY;
     for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) used[surface->tri[i]] = 1;
     bool any = find_box(surface, used, low, high);
     free(used);
     if (!any)
-        return pal_note_set(note, PAL_ERR_REFUSED, "no volume (reason 1): none of %d triangles has finite corners",
-                            surface->n_tri);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
     for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
     if (!(longest > 0) || !isfinite(longest) || !isnormal(longest / MOST_RESOLUTION / PAL_SCAN_ONE))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "no volume (reason 1): the box of %d triangles is %g x %g x %g m across", surface->n_tri,
-                            high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    grid->h_m = longest / options->resolution;
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "no volume (reason 1): the box of %d triangles is %g x %g x %g m across",
+                                  surface->n_tri, high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    grid->edge_m = longest / options->resolution;
     for (int k = 0; k < 3; k++) {
         double ahead = fmin(fmax(options->ahead[k], 0), 1);
-        int n = (int)ceil((high[k] - low[k]) / grid->h_m + ahead - 1e-6);
+        int n = (int)ceil((high[k] - low[k]) / grid->edge_m + ahead - 1e-6);
         grid->n[k] = (n < 1 ? 1 : n) + 2;
-        grid->low_m[k] = low[k] - (1 + ahead) * grid->h_m;
+        grid->low_m[k] = low[k] - (1 + ahead) * grid->edge_m;
         grid->origin_m[k] = surface->origin_m[k];
     }
     return PAL_ERR_OK;
@@ -129,14 +130,14 @@ static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_com
 
 /* border, what of it is dropped, pieces, counts, budget, bytes */
 static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_voxel_options *options,
-                           pal_voxels *voxels, pal_voxel_report *report, pal_note *note)
+                           pal_voxels *voxels, pal_voxel_report *report, pal_diagnostic *diag)
 {
     pal_bits border;
     pal_err err = PAL_ERR_OK;
     PAL_TRY(pal_bits_create(inside->n, &border));
     if (options->border) find_border(inside, &border);
-    if (options->border && options->least_fill > 0)
-        err = pal_voxels_drop(surface, options, voxels, inside, &border, report, note);
+    if (options->border && options->min_fill > 0)
+        err = pal_voxels_drop(surface, options, voxels, inside, &border, report, diag);
     if (!err) err = count_pieces(inside, &border, &report->n_component);
     if (err) {
         pal_bits_free(&border);
@@ -144,11 +145,12 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     }
     voxels->n_inside = pal_bits_count(inside);
     voxels->n_border = pal_bits_count(&border);
-    int64_t most = options->most_voxel > 0 ? options->most_voxel : MOST_VOXEL;
+    int64_t most = options->max_voxel > 0 ? options->max_voxel : MOST_VOXEL;
     if (voxels->n_inside + voxels->n_border > most) {
         pal_bits_free(&border);
-        return pal_note_set(note, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
-                            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)most);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
+            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)most);
     }
     voxels->kind = calloc((size_t)voxels->n[0] * (size_t)voxels->n[1] * (size_t)voxels->n[2], 1);
     if (voxels->kind) write_kind(inside, &border, voxels->kind);
@@ -157,23 +159,23 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
 }
 
 pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
-                        pal_voxel_report *report, pal_note *note)
+                        pal_voxel_report *report, pal_diagnostic *diag)
 {
     double began = pal_clock_s();
     pal_voxels voxels = {0};
     pal_voxel_report told = {0};
     pal_bits inside = {0};
-    PAL_TRY(lay_grid(surface, options, &voxels, note));
+    PAL_TRY(lay_grid(surface, options, &voxels, diag));
     pal_err err = pal_bits_create(voxels.n, &inside);
-    if (!err) err = pal_voxels_decide(surface, options, &voxels, &inside, &told, note);
+    if (!err) err = pal_voxels_classify(surface, options, &voxels, &inside, &told, diag);
     int n_before;
     if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
-    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &told, note);
+    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &told, diag);
     pal_bits_free(&inside);
     if (err == PAL_ERR_MEMORY)
-        pal_note_set(note, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);
+        pal_diagnostic_set(diag, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);
     if (err) return err;
-    told.inside_volume_m3 = (double)voxels.n_inside * voxels.h_m * voxels.h_m * voxels.h_m;
+    told.inside_volume_m3 = (double)voxels.n_inside * voxels.edge_m * voxels.edge_m * voxels.edge_m;
     told.fill_s = pal_clock_s() - began - told.tree_s;
     *out = voxels;
     if (report) *report = told;

@@ -9,18 +9,18 @@
  * Refusals for want of a volume carry a number: reason 1, the surface has no extent; reason 2, it is closed but no
  * voxel centre lies inside (the message says which resolution may do); reason 3, it is open and encloses nothing beyond
  * doubt. Thread: [load]. */
-#ifndef PAL_MESH_VOXELS_H
-#define PAL_MESH_VOXELS_H
+#ifndef PAL_MESH_VOXEL_VOXELS_H
+#define PAL_MESH_VOXEL_VOXELS_H
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
 typedef struct pal_voxel_options {
-    int resolution;     /* voxels on the longest axis, 1..1024                                            */
-    bool border;        /* keep the one layer of border voxels outside (paper B); false: inside only      */
-    bool largest_only;  /* keep only the largest face-connected component of inside voxels, and its border */
-    int64_t most_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
-    double least_fill; /* border voxels with a smaller share inside the surface are dropped; 0: none, as in the paper */
-    bool fill;         /* pal_prepared_make only: measure the share of every voxel (least_fill > 0 does so too) */
+    int resolution;    /* voxels on the longest axis, 1..1024                                            */
+    bool border;       /* keep the one layer of border voxels outside (paper B); false: inside only      */
+    bool largest_only; /* keep only the largest face-connected component of inside voxels, and its border */
+    int64_t max_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
+    double min_fill;   /* border voxels with a smaller share inside the surface are dropped; 0: none, as in the paper */
+    bool fill;         /* pal_prepared_make only: measure the share of every voxel (min_fill > 0 does so too) */
     double ahead[3];   /* 0..1 per axis: the grid begins this share of a voxel before the box of the surface, so that
                         * its planes go through a place that matters (a support's border); 0: at the box */
     const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
@@ -28,7 +28,7 @@ typedef struct pal_voxel_options {
 
 typedef struct pal_voxels {
     int n[3];           /* grid size, x fastest                                                */
-    double h_m;         /* voxel edge                                                          */
+    double edge_m;      /* voxel edge                                                          */
     double low_m[3];    /* corner of voxel (0,0,0), relative to origin_m                       */
     double origin_m[3]; /* as in the surface                                                   */
     uint8_t *kind;      /* 0 outside, 1 border, 2 inside                       [n2][n1][n0]    */
@@ -39,8 +39,8 @@ typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
     int n_component;          /* face-connected components of the kept voxels, the border included */
     int64_t n_disagree;       /* voxels that no two axes settle unopposed                          */
-    int64_t n_dropped;        /* border voxels that least_fill dropped                          */
-    int64_t n_edge_only;      /* with least_fill: voxel edges where two kept voxels meet and no third joins them */
+    int64_t n_dropped;        /* border voxels that min_fill dropped                          */
+    int64_t n_edge_only;      /* with min_fill: voxel edges where two kept voxels meet and no third joins them */
     bool open;                /* some edge has an odd number of triangles                           */
     double surface_volume_m3; /* by the divergence theorem, cavities off, holes closed by fans from the middle of
                                * their rims; 0: not known (open, and flood was asked for)           */
@@ -50,7 +50,7 @@ typedef struct pal_voxel_report {
 
 /* REFUSED with numbers when no volume is meant (flat sheet, single triangle, nothing inside), BUDGET, MEMORY */
 pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
-                        pal_voxel_report *report, pal_note *note);
+                        pal_voxel_report *report, pal_diagnostic *diag);
 void pal_voxels_free(pal_voxels *voxels);
 
 /* five tetrahedra per kept voxel, vertices shared, nodes ordered so that neighbours in space are near in memory,

@@ -24,7 +24,7 @@ static void push_from(pal_proxy *proxy, const double p[3], double core)
 
 /* tissue that came closer than allowed moves the proxy, but no faster than the proxy may move tissue: one stray point
  * must not throw it off the organ */
-static void push_out(pal_proxy *proxy, const double *p, int n, const double *core, double most_m)
+static void push_out(pal_proxy *proxy, const double *p, int n, const double *core, double max_m)
 {
     double start[3], way[3];
     pal_copy3(start, proxy->x);
@@ -41,9 +41,9 @@ static void push_out(pal_proxy *proxy, const double *p, int n, const double *cor
     }
     pal_sub3(way, proxy->x, start);
     double length = pal_norm3(way);
-    if (length <= most_m) return;
+    if (length <= max_m) return;
     pal_copy3(proxy->x, start);
-    pal_axpy3(proxy->x, most_m / length, way);
+    pal_axpy3(proxy->x, max_m / length, way);
 }
 
 /* the first point that blocks the way, and how much of the way is free */
@@ -110,14 +110,14 @@ void pal_proxy_move(pal_proxy *proxy, const double target[3], const double *p, i
     pal_copy3(start, proxy->x);
     for (int i = 0; i < n; i++) {
         double depth = fmax(0, limits->radius_m - pal_dist3(p + 3 * i, proxy->x));
-        core[i] = limits->radius_m - fmin(limits->deepest_m, depth + limits->rise_m);
+        core[i] = limits->radius_m - fmin(limits->max_depth_m, depth + limits->max_rise_m);
     }
-    push_out(proxy, p, n, core, limits->rise_m);
+    push_out(proxy, p, n, core, limits->max_rise_m);
 
     pal_sub3(way, target, proxy->x);
     double wanted2 = pal_dot3(way, way), least2 = 1e-18 * limits->radius_m * limits->radius_m;
     /* once blocked it slides no farther than the tool itself moved, or than tissue may be moved */
-    double slide_m = fmax(limits->rise_m, limits->stroke_m);
+    double slide_m = fmax(limits->max_rise_m, limits->tool_move_length_m);
     for (int pass = 0; pass < SLIDE_PASSES && pal_dot3(way, way) > least2; pass++) {
         double part;
         if (pass > 0 && !keep_inside(proxy->x, way, limits)) break;

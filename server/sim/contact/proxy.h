@@ -6,8 +6,8 @@
  * depth of at most `deepest`, and in one sub-step at most `rise` more than it has now: that is the clamp on penetration
  * correction of numerics.md part 3, and because points block a swept sphere no speed passes through.
  * Thread: [sim]. */
-#ifndef PAL_SIM_PROXY_H
-#define PAL_SIM_PROXY_H
+#ifndef PAL_SIM_CONTACT_PROXY_H
+#define PAL_SIM_CONTACT_PROXY_H
 #include <stdbool.h>
 
 typedef struct pal_proxy {
@@ -17,8 +17,8 @@ typedef struct pal_proxy {
 } pal_proxy;
 
 typedef struct pal_proxy_limits {
-    double radius_m, deepest_m, rise_m;
-    double stroke_m;            /* way of the tool itself in this sub-step */
+    double radius_m, max_depth_m, max_rise_m;
+    double tool_move_length_m;  /* way of the tool itself in this sub-step */
     double a[3], b[3], slack_m; /* where contact points are known: the proxy stays within slack of segment a..b */
 } pal_proxy_limits;
 

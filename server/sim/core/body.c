@@ -36,8 +36,8 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     double *x = PAL_NEW(arena, double, n3), *v = PAL_NEW(arena, double, n3), *f = PAL_NEW(arena, double, n3);
     double *load = PAL_NEW(arena, double, n3), *rest = PAL_NEW(arena, double, n3);
     double *mass = PAL_NEW(arena, double, n_node);
-    uint8_t *held = PAL_NEW(arena, uint8_t, n_node);
-    if (!x || !v || !f || !load || !rest || !mass || !held) return PAL_ERR_MEMORY;
+    uint8_t *fixed = PAL_NEW(arena, uint8_t, n_node);
+    if (!x || !v || !f || !load || !rest || !mass || !fixed) return PAL_ERR_MEMORY;
     body->n_dof = body->n_node = body->n_active = n_node;
     body->x = body->d = x;
     body->v = body->dv = v;
@@ -46,11 +46,11 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     body->x_rest = rest;
     body->mass_kg = body->node_mass_kg = mass;
     body->node_rest = rest;
-    body->held = held;
+    body->fixed = fixed;
     return PAL_ERR_OK;
 }
 
-pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows)
+pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
 {
     size_t n3 = 3 * (size_t)rows->n_row;
     PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
@@ -63,15 +63,15 @@ pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_p
     if (!body->d || !body->dv || !body->f || !body->load || !body->node_rest || !body->node_mass_kg)
         return PAL_ERR_MEMORY;
     body->n_node = rows->n_row;
-    body->embed = rows;
+    body->interpolation = rows;
     return PAL_ERR_OK;
 }
 
-void pal_body_place(pal_body *body)
+void pal_body_update_nodes(pal_body *body)
 {
-    if (!body->embed) return;
-    pal_point_rows_place(body->embed, body->x, body->d);
-    pal_point_rows_place(body->embed, body->v, body->dv);
+    if (!body->interpolation) return;
+    pal_interpolation_apply(body->interpolation, body->x, body->d);
+    pal_interpolation_apply(body->interpolation, body->v, body->dv);
 }
 
 double pal_body_kinetic_J(const pal_body *body)
@@ -113,13 +113,13 @@ bool pal_body_finite(const pal_body *body)
     return sum == 0;
 }
 
-void pal_body_add_lag(pal_body *body)
+void pal_body_add_display_offset(pal_body *body)
 {
-    float part = (float)body->lag_part;
+    float part = (float)body->display_offset_part;
     /* of a body that adapts the points in use are written anew each time, the others stay */
-    int n = !body->lag_m ? 0 : body->shell ? body->n_active : body->n_shown;
+    int n = !body->display_offset_m ? 0 : body->adaptive ? body->n_active : body->n_shown;
     for (int k = 0; k < n; k++) {
-        size_t i = 3 * (size_t)(body->shell ? body->active[k] : k);
-        for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->lag_m[c];
+        size_t i = 3 * (size_t)(body->adaptive ? body->active[k] : k);
+        for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->display_offset_m[c];
     }
 }

@@ -1,14 +1,14 @@
 /* The moving arrays of one body. All memory is the world's arena; rows borrow pointers into it. Thread: [sim]. */
-#ifndef PAL_SIM_BODY_H
-#define PAL_SIM_BODY_H
+#ifndef PAL_SIM_CORE_BODY_H
+#define PAL_SIM_CORE_BODY_H
 #include "server/base/arena.h"
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 #include "server/mesh/volume/hexes.h"
 #include "server/mesh/volume/skin.h"
-#include "server/num/point_rows.h"
-#include "server/sim/core/rescue.h"
-#include "server/sim/core/strips.h"
+#include "server/num/interpolation.h"
+#include "server/sim/core/safeguards.h"
+#include "server/sim/core/simd_blocks.h"
 
 /* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
  * Published by an implicit solver that holds a static factor; rows stay apart, the body carries the door. */
@@ -20,7 +20,7 @@ typedef struct pal_compliance {
     bool (*solve)(void *self, const struct pal_body *body, const double *force_N, double *move_m);
 } pal_compliance;
 
-/* what can be shown in colour, computed only while somebody looks (row field_out) */
+/* what can be shown in colour, computed only while somebody looks (row field_output) */
 typedef enum pal_field {
     PAL_FIELD_NONE,
     PAL_FIELD_DISPLACEMENT_M,
@@ -45,79 +45,81 @@ typedef struct pal_shown_field {
 
 typedef struct pal_body {
     const char *name;
-    int n_dof;       /* points the solver moves: control points (A) or mass nodes             */
-    int n_node;      /* points forces act on; equals n_dof when embed is NULL                 */
-    double *x, *v;   /* dof position m (relative to origin_m), velocity m/s     [n_dof][3]    */
-    double *d, *dv;  /* node position, velocity; alias x, v without embed       [n_node][3]   */
-    double *load;    /* loads of CONTACT rows and of `outer`, N, constant in a sub-step [n_node][3] */
-    double *outer;   /* lasting loads set by pal_world_load, N; NULL: none      [n_node][3]   */
-    double *f;       /* node force N                                            [n_node][3]   */
-    double *g;       /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
-    double *mass_kg; /* lumped                                                  [n_dof]       */
+    int n_dof;              /* points the solver moves: control points (A) or mass nodes             */
+    int n_node;             /* points forces act on; equals n_dof when embed is NULL                 */
+    double *x, *v;          /* dof position m (relative to origin_m), velocity m/s     [n_dof][3]    */
+    double *d, *dv;         /* node position, velocity; alias x, v without embed       [n_node][3]   */
+    double *load;           /* loads of CONTACT rows and of `outer`, N, constant in a sub-step [n_node][3] */
+    double *external_force; /* lasting loads set by pal_world_load, N; NULL: none      [n_node][3]   */
+    double *f;              /* node force N                                            [n_node][3]   */
+    double *g;              /* f pulled back to dofs N; aliases f without embed        [n_dof][3]    */
+    double *mass_kg;        /* lumped                                                  [n_dof]       */
     /* nodes as weighted sums of the points the solver moves, d = embed x (A eq. 1); NULL: they are the same. With it,
      * load, outer, f, d, dv are of nodes and x, v, g, mass_kg, held, x_rest of points */
-    const pal_point_rows *embed;
+    const pal_interpolation *interpolation;
     /* masses between points (num/mass_operator.h), which mass_kg sums up row by row; set by the model, NULL: mass_kg is
      * all */
     struct pal_mass_operator *mass_operator;
     double *node_mass_kg; /* lumped at nodes; aliases mass_kg without embed      [n_node]      */
     /* m/s that a shown node gets from an impulse of 1 Ns on it alone, 1/kg, which bounds explicit contact; NULL without
      * embed, where it is 1 / mass [n_node] */
-    double *node_ease_1_kg;
+    double *node_inverse_mass_1_kg;
     double *node_rest; /* rest position of nodes; aliases x_rest without embed [n_node][3]  */
-    uint8_t *held;     /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
+    uint8_t *fixed;    /* 1: fixed in place; 2: led, its v comes from a row       [n_dof]       */
     double *x_rest;    /* rest position m                                         [n_dof][3]    */
-    /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (shell.h) has arrays for its
-     * finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over all is right and
-     * one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
+    /* points in use: those of `active`, or all n_node when it is NULL. A body that adapts (adaptive_surface.h) has
+     * arrays for its finest level; points out of use stand at x_rest with v, f, load and mass 0, so that a loop over
+     * all is right and one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
     const int32_t *active; /* [n_active] */
     int n_active;
-    struct pal_shell *shell; /* NULL: the body does not adapt */
-    struct pal_pack *pack;   /* working arrays of rows and solver (pack.h); NULL: none made */
-    struct pal_solid *solid; /* model subdivision_fem (solid.h); heap, freed with the world; NULL: another model */
-    bool frozen;             /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
-    bool asleep;             /* set by row sleep: at rest, so none of its rows is run until something comes near */
-    bool stale;              /* x has changed since its OUTPUT rows were run                                     */
-    uint64_t n_output;       /* times its OUTPUT rows were run since load: `shown` changed no more often        */
-    double size_m;           /* box diagonal at rest, S of numerics.md part 3                         */
-    double h_m;              /* typical element edge                                                  */
-    double offset_m[3];      /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
-    double dt_limit_s;       /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
-    double load_cap_N;       /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
-    double given_Pa;         /* E that springs stand for whose edges have constants of their own; 0: the material's */
-    pal_rescues rescue;      /* since reset: what kept it within its bounds, and what that took         */
-    char why[PAL_WHY];       /* one sentence while frozen, else empty                                   */
-    /* extra drag, and for how long yet, after a change that puts work in (brake.h); 0: none */
-    double brake_1_s, brake_s;
-    /* what a corner of a full voxel, or of a solid's mean cell, weighs (pal_body_bears_N); 0: of another body */
-    double corner_kg;
+    struct pal_adaptive_surface *adaptive; /* NULL: the body does not adapt */
+    struct pal_active_nodes *pack;         /* working arrays of rows and solver (active_nodes.h); NULL: none made */
+    struct pal_subdivision_solid
+        *solid;  /* model subdivision_fem (subdivision_solid.h); heap, freed with the world; NULL: another model */
+    bool frozen; /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
+    bool asleep; /* set by row sleep: at rest, so none of its rows is run until something comes near */
+    bool stale;  /* x has changed since its OUTPUT rows were run                                     */
+    uint64_t n_output;         /* times its OUTPUT rows were run since load: `shown` changed no more often        */
+    double length_scale_m;     /* box diagonal at rest, S of numerics.md part 3                         */
+    double edge_m;             /* typical element edge                                                  */
+    double offset_m[3];        /* position in the scene frame = x + offset_m (scene frame: first body's mesh frame) */
+    double dt_limit_s;         /* largest stable sub-step, from the SOLVE row; infinite when unconditional */
+    double load_cap_N;         /* most load on one node, 10 E h^2 (numerics.md part 3); larger ones are shortened */
+    double spring_young_Pa;    /* E that springs stand for whose edges have constants of their own; 0: the material's */
+    pal_safeguards safeguards; /* since reset: what kept it within its bounds, and what that took         */
+    char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty                                   */
+    /* extra drag, and for how long yet, after a change that puts work in (stiffening_damper.h); 0: none */
+    double stiffening_damping_1_s, stiffening_damping_s;
+    /* what a corner of a full voxel, or of a solid's mean cell, weighs (pal_body_node_load_cap_N); 0: of another body
+     */
+    double full_corner_kg;
 
     bool implicit; /* the solver takes stiffness implicitly: contact need not be soft enough for explicit steps */
     bool wants_compliance; /* a CONTACT row asks for it: set in its make; the SOLVE row is made after all others */
     const pal_compliance *compliance; /* NULL: none */
-    /* the elements of model fem, for evaluation through shape functions; NULL: none. Corners as in num/shape.h, tet10
-     * with its middle nodes [n_element][n_corner] */
+    /* the elements of model fem, for evaluation through shape functions; NULL: none. Corners as in
+     * num/shape_functions.h, tet10 with its middle nodes [n_element][n_corner] */
     const int32_t *element;
     int n_element, n_corner;
     const float *fill; /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
 
     /* geometry at rest, borrowed from the scene's prepared mesh by the model; NULL when the model has none */
-    const pal_tets *tets;   /* its nodes are the body's first ones */
-    const pal_hexes *hexes; /* the same nodes as cubes; NULL: none */
-    pal_slots *slots;       /* memory order of the nodes for kernels; NULL: none made       */
-    /* what springs run on where they are turned over (spring_tangle.h); NULL: they never untangle */
-    struct pal_spring_tangle *tangle;
+    const pal_tets *tets;       /* its nodes are the body's first ones */
+    const pal_hexes *hexes;     /* the same nodes as cubes; NULL: none */
+    pal_node_order *node_order; /* memory order of the nodes for kernels; NULL: none made       */
+    /* what springs run on where they are turned over (spring_recovery.h); NULL: they never untangle */
+    struct pal_spring_recovery *recovery;
     const pal_surface *surface; /* shown surface at rest                                       */
     const pal_skin *skin;       /* surface on nodes; NULL: shown vertices are the surface nodes */
     /* what is shown: all of these are set by the OUTPUT row's make; none: n_shown 0 */
     double *skin_axes; /* current frames of skin, kept between calls  [n_frame][9]    */
     int n_shown;       /* shown vertices                                              */
     float *shown;      /* written by the OUTPUT row, m, body frame    [n_shown][3]    */
-    /* while a switch is let in (ease.h): how far the surface that was shown before lies from where the OUTPUT rows put
-     * it. lag_part of it is added to what they write and to every point that tools touch, so that what is felt is what
-     * is seen; NULL: no switch is let in */
-    const float *lag_m;                            /* m, body frame [n_shown][3] */
-    double lag_part;                               /* 1 when it takes over, falls to 0 */
+    /* while a switch is let in (blend_component.h): how far the surface that was shown before lies from where the
+     * OUTPUT rows put it. display_offset_part of it is added to what they write and to every point that tools touch, so
+     * that what is felt is what is seen; NULL: no switch is let in */
+    const float *display_offset_m;                 /* m, body frame [n_shown][3] */
+    double display_offset_part;                    /* 1 when it takes over, falls to 0 */
     const int32_t *shown_face;                     /* of solids: control face of each shown triangle, -1: an inner one
                                                     * of a cut; NULL: another body              [surface->n_tri] */
     const int32_t *shown_node;                     /* node of each shown vertex when skin is NULL [n_shown]       */
@@ -134,37 +136,37 @@ static inline int pal_body_point(const pal_body *body, int k)
 /* nodes in use, as points: for (k < pal_body_nodes(body)) i = pal_body_point(body, k) */
 static inline int pal_body_nodes(const pal_body *body)
 {
-    return body->embed ? body->n_node : body->n_active;
+    return body->interpolation ? body->n_node : body->n_active;
 }
 /* load_cap_N of a body of this material: by what its edges are, where their constants are given */
-static inline double pal_body_cap_N(const pal_body *body, double young_Pa)
+static inline double pal_body_load_cap_N(const pal_body *body, double young_Pa)
 {
-    return 10 * (body->given_Pa > 0 ? body->given_Pa : young_Pa) * body->h_m * body->h_m;
+    return 10 * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m * body->edge_m;
 }
 /* most of a lasting load that a node bears (less of it beyond 2 S from its rest place, world_load.c): load_cap_N, and
  * of that the part that the node is of the corner of a full voxel, or of a solid's mean cell, as a sliver is as much
  * softer */
-static inline double pal_body_bears_N(const pal_body *body, int node)
+static inline double pal_body_node_load_cap_N(const pal_body *body, int node)
 {
-    double part = body->corner_kg > 0 ? body->node_mass_kg[node] / body->corner_kg : 1;
+    double part = body->full_corner_kg > 0 ? body->node_mass_kg[node] / body->full_corner_kg : 1;
     return part < 1 ? part * body->load_cap_N : body->load_cap_N;
 }
 /* how easily a node moves, 1/kg; 0: it is held */
-static inline double pal_body_ease(const pal_body *body, int node)
+static inline double pal_body_inverse_mass_1_kg(const pal_body *body, int node)
 {
-    if (body->node_ease_1_kg) return body->node_ease_1_kg[node];
-    return body->held[node] ? 0 : 1 / body->mass_kg[node];
+    if (body->node_inverse_mass_1_kg) return body->node_inverse_mass_1_kg[node];
+    return body->fixed[node] ? 0 : 1 / body->mass_kg[node];
 }
 
 /* arrays for n points without embed, all active, zeroed, f = g, d = x, dv = v; MEMORY. [load] */
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node);
 /* the same for n_dof points that carry rows->n_row nodes: d, dv, g, node masses and rest of their own; embed = rows,
  * which is borrowed. active stays NULL, n_active n_dof; MEMORY. [load] */
-pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_point_rows *rows);
+pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_interpolation *rows);
 /* d = embed x and dv = embed v, after x and v were set; nothing without embed. [sim] */
-void pal_body_place(pal_body *body);
-/* after the OUTPUT rows: what is shown as it lags (lag_m); nothing without it. [sim] */
-void pal_body_add_lag(pal_body *body);
+void pal_body_update_nodes(pal_body *body);
+/* after the OUTPUT rows: what is shown as it lags (display_offset_m); nothing without it. [sim] */
+void pal_body_add_display_offset(pal_body *body);
 /* sums over the body [sim] */
 double pal_body_kinetic_J(const pal_body *body);
 void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3]);

@@ -1,11 +1,12 @@
 /* Brushes: forces that a hand has on a body while it sculpts (A 4.1, Fig. 9), held by a tool's slot each, set and ended
- * between steps (brush_rows.h, world.h). All of a body's brushes are one CONTACT row, `brush`, with memory of its own.
+ * between steps (brush_components.h, world.h). All of a body's brushes are one CONTACT row, `brush`, with memory of its
+ * own.
  *
  * Force, pressure and lift come in over 10 steps, follow a change of them over 10 steps and go out over 10. Bodies
  * whose shown vertices are nodes have brushes; those that adapt or have a skin do not. [sim], heap only in set and
  * destroy. */
-#ifndef PAL_SIM_BRUSH_H
-#define PAL_SIM_BRUSH_H
+#ifndef PAL_SIM_CORE_BRUSH_H
+#define PAL_SIM_CORE_BRUSH_H
 #include "server/sim/core/effect.h"
 
 typedef enum pal_brush_kind {
@@ -28,16 +29,16 @@ typedef struct pal_brush {
 } pal_brush;
 
 /* numbers of any body; REFUSED names the one out of range [any] */
-pal_err pal_brush_check(const pal_brush *brush, pal_note *note);
+pal_err pal_brush_check(const pal_brush *brush, pal_diagnostic *diag);
 
 /* the row; it is no entry of scenes */
 extern const pal_effect pal_effect_brush;
 /* an empty one. REFUSED: the body has no brushes; MEMORY */
-pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, void **self);
+pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *diag, void **self);
 /* A slot's brush; one of the same kind at the same places goes on with its new numbers, another begins in its place.
  * REFUSED: a number, nothing of the body within reach, a handle stiffer than the body's nodes take, a pressure above
  * 10 E; MEMORY. Nothing has changed then */
-pal_err pal_brush_set(void *self, const pal_body *body, int slot, const pal_brush *brush, pal_note *note);
+pal_err pal_brush_set(void *self, const pal_body *body, int slot, const pal_brush *brush, pal_diagnostic *diag);
 /* The brushes of `before`, of another body with the same rest frame that stands in this one's place, go on here, as far
  * as they have come in: a pressure on the triangles within its reach; a handle pulls each of its nodes by what it
  * pulled the old ones near it by. A brush that this body does not take, or without memory, is over. Both stand still */

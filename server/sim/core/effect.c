@@ -5,28 +5,28 @@
 
 #include <string.h>
 
-pal_err pal_gather(pal_step *step)
+pal_err pal_assemble_forces(pal_step *step)
 {
     pal_body *body = step->body;
     for (int k = 0; k < body->n_active && body->active; k++) {
         size_t i = 3 * (size_t)body->active[k];
         for (size_t c = 0; c < 3; c++) body->f[i + c] = body->load[i + c];
     }
-    pal_body_place(body);
+    pal_body_update_nodes(body);
     if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
-        pal_row *row = &step->force[i];
-        if (step->drag_apart && row->effect->drag) continue;
+        pal_component *row = &step->force[i];
+        if (step->drag_separate && row->effect->drag) continue;
         row->n_run++;
         PAL_TRY(row->effect->run(row->self, step));
         uint64_t now = pal_clock_ns();
         row->spent_ns += now - before;
         before = now;
     }
-    if (body->embed) {
+    if (body->interpolation) {
         memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-        pal_point_rows_pull(body->embed, body->f, body->g);
+        pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
     }
     return PAL_ERR_OK;
 }

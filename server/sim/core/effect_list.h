@@ -1,8 +1,8 @@
 /* The one table of effects, solvers and models. Adding one is its file in effects/, solvers/ or models/, which defines
  * `const pal_effect pal_effect_NAME` (or `pal_model_NAME`), its line in CMakeLists.txt and its line here. Tests loop
  * over these tables, so a new entry is covered by every test that holds for all. Thread: any (constants). */
-#ifndef PAL_SIM_EFFECT_LIST_H
-#define PAL_SIM_EFFECT_LIST_H
+#ifndef PAL_SIM_CORE_EFFECT_LIST_H
+#define PAL_SIM_CORE_EFFECT_LIST_H
 #include "server/sim/core/effect.h"
 #include "server/sim/core/model.h"
 
@@ -27,13 +27,13 @@
     X(sdirk2)                                                                                                          \
     X(static_newton)                                                                                                   \
     X(tool_push)                                                                                                       \
-    X(tool_grab)                                                                                                       \
+    X(tool_grasp)                                                                                                      \
     X(refine)                                                                                                          \
     X(finite_guard)                                                                                                    \
     X(sleep)                                                                                                           \
-    X(surface_out)                                                                                                     \
-    X(skin_out)                                                                                                        \
-    X(field_out)
+    X(surface_output)                                                                                                  \
+    X(skin_output)                                                                                                     \
+    X(field_output)
 
 #define PAL_MODEL_LIST(X) X(tet_springs) X(fem) X(adaptive_springs) X(subdivision_fem)
 

@@ -1,7 +1,7 @@
 /* Materials of regions and strokes of the brush. */
 #include "server/base/vec3.h"
 #include "server/num/trilinear.h"
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -35,7 +35,7 @@ static double on_grid(const pal_region *r, const double *value, const double x[3
     return pal_trilinear_at(&grid, value, x);
 }
 
-void pal_material_over(const pal_body_def *def, const pal_material *base, const double x[3], pal_material *out)
+void pal_material_overlay(const pal_body_def *def, const pal_material *base, const double x[3], pal_material *out)
 {
     *out = *base;
     for (int i = 0; i < def->n_region; i++) {
@@ -53,7 +53,7 @@ void pal_material_over(const pal_body_def *def, const pal_material *base, const 
 
 void pal_material_at(const pal_body_def *def, const double x[3], pal_material *out)
 {
-    pal_material_over(def, &def->material, x, out);
+    pal_material_overlay(def, &def->material, x, out);
 }
 
 /* ---- strokes ---- */
@@ -78,84 +78,85 @@ void pal_material_painted(const pal_body_def *def, const double x[3], pal_materi
     }
 }
 
-pal_err pal_stroke_check(const pal_stroke *s, pal_note *note)
+pal_err pal_stroke_check(const pal_stroke *s, pal_diagnostic *diag)
 {
     for (int c = 0; c < 3; c++)
         if (!(fabs(s->at_m[c]) <= 1e9))
-            return pal_note_set(note, PAL_ERR_REFUSED, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
     if (!(s->radius_m > 0 && s->radius_m <= 1e9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "radius_m: %g, wanted more than 0", s->radius_m);
-    if (!(s->soft >= 0 && s->soft <= 1)) return pal_note_set(note, PAL_ERR_REFUSED, "soft: %g, wanted 0 to 1", s->soft);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "radius_m: %g, wanted more than 0", s->radius_m);
+    if (!(s->soft >= 0 && s->soft <= 1))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "soft: %g, wanted 0 to 1", s->soft);
     if (!(s->young_factor >= 1e-6 && s->young_factor <= 1e6))
-        return pal_note_set(note, PAL_ERR_REFUSED, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
     if (!(s->density_factor >= 1e-6 && s->density_factor <= 1e6))
-        return pal_note_set(note, PAL_ERR_REFUSED, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
     return PAL_ERR_OK;
 }
 
 /* ---- checks ---- */
 
-static pal_err refuse(const pal_body_def *def, int index, pal_note *note, const char *key, double value,
+static pal_err refuse(const pal_body_def *def, int index, pal_diagnostic *diag, const char *key, double value,
                       const char *wanted)
 {
-    return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" regions[%d].%s: %g, wanted %s", def->name, index, key,
-                        value, wanted);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" regions[%d].%s: %g, wanted %s", def->name, index, key,
+                              value, wanted);
 }
 
 /* a constant or what a grid gives at its nodes; NaN constants: not given */
 static pal_err check_number(const pal_body_def *def, int index, const char *key, double constant, const double *grid,
-                            double low, double high, pal_note *note)
+                            double low, double high, pal_diagnostic *diag)
 {
     const pal_region *r = &def->region[index];
     char wanted[64];
     snprintf(wanted, sizeof wanted, "a number in [%g, %g]", low, high);
     size_t n = grid ? (size_t)r->n[0] * (size_t)r->n[1] * (size_t)r->n[2] : 0;
     if (!grid && !isnan(constant) && !(constant >= low && constant <= high))
-        return refuse(def, index, note, key, constant, wanted);
+        return refuse(def, index, diag, key, constant, wanted);
     for (size_t i = 0; i < n; i++)
         if (!(grid[i] >= low && grid[i] <= high)) {
             char at[64];
             snprintf(at, sizeof at, "%s[%zu]", key, i);
-            return refuse(def, index, note, at, grid[i], wanted);
+            return refuse(def, index, diag, at, grid[i], wanted);
         }
     return PAL_ERR_OK;
 }
 
-static pal_err check_extent(const pal_body_def *def, int index, pal_note *note)
+static pal_err check_extent(const pal_body_def *def, int index, pal_diagnostic *diag)
 {
     static const char *const axis[] = {"low_m[0]", "low_m[1]", "low_m[2]"};
     const pal_region *r = &def->region[index];
     bool grid = r->kind == PAL_REGION_GRID, label = r->kind == PAL_REGION_LABEL;
     for (int c = 0; c < 3; c++) {
-        if (!isfinite(r->low_m[c])) return refuse(def, index, note, axis[c], r->low_m[c], "a finite number");
+        if (!isfinite(r->low_m[c])) return refuse(def, index, diag, axis[c], r->low_m[c], "a finite number");
         if (!label && !(r->high_m[c] >= r->low_m[c] && isfinite(r->high_m[c])))
-            return refuse(def, index, note, "high_m", r->high_m[c], "a corner above low_m");
+            return refuse(def, index, diag, "high_m", r->high_m[c], "a corner above low_m");
         if ((grid || label) && !(r->n[c] >= 1 && r->n[c] <= 4096))
-            return refuse(def, index, note, "n", r->n[c], "1 to 4096 along each axis");
+            return refuse(def, index, diag, "n", r->n[c], "1 to 4096 along each axis");
         if (grid && r->n[c] > 1 && !(r->high_m[c] > r->low_m[c]))
-            return refuse(def, index, note, "high_m", r->high_m[c], "a corner above low_m");
+            return refuse(def, index, diag, "high_m", r->high_m[c], "a corner above low_m");
         if (label && !(r->spacing_m[c] > 0 && isfinite(r->spacing_m[c])))
-            return refuse(def, index, note, "spacing_m", r->spacing_m[c], "a length above 0");
+            return refuse(def, index, diag, "spacing_m", r->spacing_m[c], "a length above 0");
     }
-    if (label && !r->label) return refuse(def, index, note, "label", 0, "a label volume");
-    if (label && !(r->is >= 0 && r->is <= 255)) return refuse(def, index, note, "is", r->is, "a label of 0 to 255");
+    if (label && !r->label) return refuse(def, index, diag, "label", 0, "a label volume");
+    if (label && !(r->is >= 0 && r->is <= 255)) return refuse(def, index, diag, "is", r->is, "a label of 0 to 255");
     return PAL_ERR_OK;
 }
 
-pal_err pal_region_check(const pal_body_def *def, int index, pal_note *note)
+pal_err pal_region_check(const pal_body_def *def, int index, pal_diagnostic *diag)
 {
     const pal_region *r = &def->region[index];
-    if ((unsigned)r->kind > PAL_REGION_GRID) return refuse(def, index, note, "kind", r->kind, "box, label or grid");
-    PAL_TRY(check_extent(def, index, note));
+    if ((unsigned)r->kind > PAL_REGION_GRID) return refuse(def, index, diag, "kind", r->kind, "box, label or grid");
+    PAL_TRY(check_extent(def, index, diag));
     bool grid = r->kind == PAL_REGION_GRID;
     const double *young = grid ? r->grid_young_Pa : NULL, *poisson = grid ? r->grid_poisson : NULL,
                  *density = grid ? r->grid_density_kg_m3 : NULL;
     if (!young && !poisson && !density && isnan(r->young_Pa) && isnan(r->poisson) && isnan(r->density_kg_m3))
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "body \"%s\" regions[%d]: gives neither young_Pa, poisson nor "
-                            "density_kg_m3",
-                            def->name, index);
-    PAL_TRY(check_number(def, index, "young_Pa", r->young_Pa, young, 1e-6, 1e15, note));
-    PAL_TRY(check_number(def, index, "poisson", r->poisson, poisson, -0.9999, 0.499999, note));
-    return check_number(def, index, "density_kg_m3", r->density_kg_m3, density, 1e-24, 1e24, note);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "body \"%s\" regions[%d]: gives neither young_Pa, poisson nor "
+                                  "density_kg_m3",
+                                  def->name, index);
+    PAL_TRY(check_number(def, index, "young_Pa", r->young_Pa, young, 1e-6, 1e15, diag));
+    PAL_TRY(check_number(def, index, "poisson", r->poisson, poisson, -0.9999, 0.499999, diag));
+    return check_number(def, index, "density_kg_m3", r->density_kg_m3, density, 1e-24, 1e24, diag);
 }

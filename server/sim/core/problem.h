@@ -1,9 +1,9 @@
 /* A load-case problem as plain structs: a body, its supports and load cases with reference answers, as the format
  * "palpate-reference-1" has them (server/scene/problem_file.h reads it, server/solve/solve.h solves it). SI.
  * Thread: [load]. */
-#ifndef PAL_SIM_PROBLEM_H
-#define PAL_SIM_PROBLEM_H
-#include "server/sim/core/def.h"
+#ifndef PAL_SIM_CORE_PROBLEM_H
+#define PAL_SIM_CORE_PROBLEM_H
+#include "server/sim/core/definition.h"
 
 enum { PAL_PROBLEM_REGIONS = 8, PAL_PROBLEM_CASES = 16, PAL_PROBLEM_LOADS = 8, PAL_PROBLEM_REFERENCES = 16 };
 

@@ -1,14 +1,14 @@
 /* Sums over a body's points. */
 #include "server/sim/core/sums.h"
 
-#include "server/sim/core/lanes.h"
+#include "server/sim/core/simd.h"
 
 static double sum_lanes(pal_v8 a)
 {
     return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
 }
 
-double pal_sum_motion(int n, const double *mass_kg, const double *v)
+double pal_sum_mv2(int n, const double *mass_kg, const double *v)
 {
     pal_v8 a = {0}, b = {0}, c = {0};
     double sum = 0;
@@ -28,7 +28,7 @@ double pal_sum_motion(int n, const double *mass_kg, const double *v)
     return sum + sum_lanes(a + b + c);
 }
 
-double pal_sum_way(int n, const double *f, const double *x, const double *x0)
+double pal_sum_work(int n, const double *f, const double *x, const double *x0)
 {
     pal_v8 a = {0}, b = {0};
     double sum = 0;
@@ -49,7 +49,7 @@ bool pal_copy_finite(int n, const double *from, double *to)
     int i = 0;
     for (; i + 8 <= n; i += 8) {
         const pal_v8 p = pal_load8(from + i);
-        *(pal_lanes *)(to + i) = p;
+        *(pal_v8_unaligned *)(to + i) = p;
         a += 0 * p;
     }
     for (; i < n; i++) {

@@ -19,7 +19,7 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m)
     return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
 }
 
-void pal_tool_take(pal_tool *tool, const pal_pose *pose)
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose)
 {
     if (pose) {
         tool->next = *pose;
@@ -38,15 +38,15 @@ void pal_tool_take(pal_tool *tool, const pal_pose *pose)
         if (tool->ramp < 1e-9) tool->ramp = 0;
     }
     tool->present = pose != NULL;
-    tool->grab = tool->present && (tool->next.buttons & 1);
-    tool->gripping = tool->holding;
+    tool->grasp = tool->present && (tool->next.buttons & 1);
+    tool->grasped_before = tool->holding;
     tool->touching = tool->holding = false;
     tool->n_patch = 0;
-    tool->has_grip = false;
+    tool->has_grasp = false;
     for (int c = 0; c < 3; c++) tool->force_N[c] = tool->mean_force_N[c] = 0;
 }
 
-void pal_tools_advance(pal_tools *tools, int sub, int n_sub, double dt_s)
+void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s)
 {
     for (int t = 0; t < tools->n_tool; t++) {
         pal_tool *tool = &tools->tool[t];
@@ -62,7 +62,7 @@ void pal_tools_advance(pal_tools *tools, int sub, int n_sub, double dt_s)
     }
 }
 
-void pal_tools_finish(pal_tools *tools, int n_sub)
+void pal_tools_end_step(pal_tools *tools, int n_sub)
 {
     for (int t = 0; t < tools->n_tool; t++) {
         pal_tool *tool = &tools->tool[t];

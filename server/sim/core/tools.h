@@ -1,13 +1,13 @@
 /* Tools: poses in, forces and contact patches out. A tool is a sphere moved by one holder. World-frame SI; forces are
  * those that act on the tool (so on the hand); what acts on tissue is the opposite. Thread: [sim]. */
-#ifndef PAL_SIM_TOOLS_H
-#define PAL_SIM_TOOLS_H
+#ifndef PAL_SIM_CORE_TOOLS_H
+#define PAL_SIM_CORE_TOOLS_H
 #include "server/base/err.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { PAL_TOOL_MAX = 8, PAL_PATCH_MAX = 4 };
+enum { PAL_TOOL_MAX = 8, PAL_CONTACT_PATCH_MAX = 4 };
 
 /* what a client says of its tool */
 typedef struct pal_pose {
@@ -21,7 +21,7 @@ typedef struct pal_pose {
 
 /* local tangent contact model for a haptic bridge (haptics.md 2.3): plane of zero force in the tool centre's
  * configuration space. F = n (k1 d + k2 d^2 - b n.v), d = n.(p - x) > 0 in contact */
-typedef struct pal_patch {
+typedef struct pal_contact_patch {
     int16_t id, group;      /* id persists while the neighbourhood does; convex contacts share a group */
     double point_m[3];      /* p: zero-force surface                                                  */
     double normal[3];       /* n: outward unit                                                        */
@@ -31,7 +31,7 @@ typedef struct pal_patch {
     double kt_N_m;          /* tangential stiffness                                                   */
     double mu_static, mu_dynamic;
     double radius_m; /* validity                                                               */
-} pal_patch;
+} pal_contact_patch;
 
 /* one tool during a step. `here` moves linearly from `last` to `next` over the sub-steps, so that a fast tool sweeps */
 typedef struct pal_tool {
@@ -41,15 +41,15 @@ typedef struct pal_tool {
     pal_pose next, last; /* pose asked for at the end of this step, pose at the end of the step before   */
     double here_m[3];    /* position at the end of the current sub-step                                  */
     double velocity_m_s[3]; /* of `here`                                                                    */
-    bool grab;              /* bit 0 of next.buttons while present                                          */
+    bool grasp;             /* bit 0 of next.buttons while present                                          */
     double force_N[3];      /* on the tool, this sub-step; CONTACT rows add                                 */
     double mean_force_N[3]; /* mean over the step's sub-steps                                               */
-    bool gripping;          /* held tissue in the step before: what it holds it does not push as well */
+    bool grasped_before;    /* held tissue in the step before: what it holds it does not push as well */
     bool touching, holding; /* pressed tissue, grabbed tissue in this step                                  */
     int n_patch;
-    pal_patch patch[PAL_PATCH_MAX]; /* written by CONTACT rows in the last sub-step                           */
-    bool has_grip;                  /* bilateral part: f = f0 - k (x - x0) - b v                              */
-    double grip_x0_m[3], grip_f0_N[3], grip_k_N_m[6], grip_b_Ns_m; /* k: xx xy xz yy yz zz                    */
+    pal_contact_patch patch[PAL_CONTACT_PATCH_MAX]; /* written by CONTACT rows in the last sub-step */
+    bool has_grasp; /* bilateral part: f = f0 - k (x - x0) - b v                              */
+    double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m; /* k: xx xy xz yy yz zz                    */
 } pal_tool;
 
 typedef struct pal_tools {
@@ -62,9 +62,9 @@ typedef struct pal_tools {
 bool pal_pose_ok(const pal_pose *pose, double limit_m);
 /* before a step: take over the pose asked for (NULL: let go), update ramp; the jump of a tool that appears is not swept
  */
-void pal_tool_take(pal_tool *tool, const pal_pose *pose);
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose);
 /* before sub-step `sub` of `n_sub`: here, velocity, zero force */
-void pal_tools_advance(pal_tools *tools, int sub, int n_sub, double dt_s);
+void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
 /* after the step: mean force, last = next */
-void pal_tools_finish(pal_tools *tools, int n_sub);
+void pal_tools_end_step(pal_tools *tools, int n_sub);
 #endif

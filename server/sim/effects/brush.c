@@ -49,23 +49,25 @@ static bool same3(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-pal_err pal_brush_check(const pal_brush *b, pal_note *note)
+pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
 {
     if (b->kind != PAL_BRUSH_INFLATE && b->kind != PAL_BRUSH_CURVE)
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: there is no kind %d", (int)b->kind);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: there is no kind %d", (int)b->kind);
     bool curve = b->kind == PAL_BRUSH_CURVE;
     if (!pal_finite3(b->at_m) || (curve && (!pal_finite3(b->to_m) || !pal_finite3(b->lift_m))))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: a place or lift_m is no number");
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: a place or lift_m is no number");
     if (!within(b->radius_m, 1e-9, 1e9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: radius_m %g, wanted 1e-9 to 1e9", b->radius_m);
-    if (!within(b->soft, 0, 1)) return pal_note_set(note, PAL_ERR_REFUSED, "brush: soft %g, wanted 0 to 1", b->soft);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: radius_m %g, wanted 1e-9 to 1e9", b->radius_m);
+    if (!within(b->soft, 0, 1))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: soft %g, wanted 0 to 1", b->soft);
     if (!curve && !within(b->pressure_Pa, -1e9, 1e9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: pressure_Pa %g, wanted -1e9 to 1e9", b->pressure_Pa);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, wanted -1e9 to 1e9", b->pressure_Pa);
     if (curve && !within(b->stiffness_N_m, 1e-9, 1e9))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: stiffness_N_m %g, wanted 1e-9 to 1e9", b->stiffness_N_m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: stiffness_N_m %g, wanted 1e-9 to 1e9",
+                                  b->stiffness_N_m);
     if (curve && same3(b->at_m, b->to_m))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: both ends of the curve are at %g %g %g m", b->at_m[0],
-                            b->at_m[1], b->at_m[2]);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: both ends of the curve are at %g %g %g m", b->at_m[0],
+                                  b->at_m[1], b->at_m[2]);
     return PAL_ERR_OK;
 }
 
@@ -109,15 +111,15 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
 }
 
 /* arrays of a slot for what the brush reaches; weights of a handle sum up to 1 */
-static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_note *note)
+static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
     const int n = curve ? body->n_shown : body->surface->n_tri;
     double t = 0, sum = 0, most = 0;
     for (int i = 0; i < n; i++) s->n += reach(body, b, i, &t) > 0;
     if (s->n == 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: nothing of body \"%s\" is within radius_m %g of it",
-                            body->name, b->radius_m);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: nothing of body \"%s\" is within radius_m %g of it",
+                                  body->name, b->radius_m);
     s->item = PAL_NEW(s->arena, int32_t, s->n);
     s->weight = PAL_NEW(s->arena, double, s->n);
     s->begin = PAL_NEW(s->arena, double, curve ? 3 * (size_t)s->n : 1);
@@ -133,11 +135,11 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_note 
     }
     if (!curve) return PAL_ERR_OK;
     for (int k = 0; k < s->n; k++) s->weight[k] /= sum;
-    double limit = body->load_cap_N / body->h_m * sum / most;
+    double limit = body->load_cap_N / body->edge_m * sum / most;
     if (b->stiffness_N_m > limit)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes", b->stiffness_N_m,
-                            body->name, limit, s->n);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes",
+                                  b->stiffness_N_m, body->name, limit, s->n);
     return PAL_ERR_OK;
 }
 
@@ -162,13 +164,13 @@ static bool goes_on(const slot *s, const pal_brush *b)
            (same3(s->brush.to_m, b->to_m) && s->brush.stiffness_N_m == b->stiffness_N_m);
 }
 
-pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, void **self)
+pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *diag, void **self)
 {
-    if (body->shell || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
-                            body->shell  ? "its surface adapts"
-                            : body->skin ? "it is shown by a skin; take output \"surface_out\""
-                                         : "it shows nothing");
+    if (body->adaptive || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
+                                  body->adaptive ? "its surface adapts"
+                                  : body->skin   ? "it is shown by a skin; take output \"surface_out\""
+                                                 : "it shows nothing");
     brush_row *row = PAL_NEW(arena, brush_row, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->body = body;
@@ -176,28 +178,28 @@ pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_note *note, v
     return PAL_ERR_OK;
 }
 
-pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pal_brush *b, pal_note *note)
+pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pal_brush *b, pal_diagnostic *diag)
 {
     slot *s = &((brush_row *)self)->slot[slot_index], fresh = {.brush = *b};
-    PAL_TRY(pal_brush_check(b, note));
-    if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->size_m))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
-                            pal_norm3(b->lift_m), body->name, 10 * body->size_m);
+    PAL_TRY(pal_brush_check(b, diag));
+    if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->length_scale_m))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
+                                  pal_norm3(b->lift_m), body->name, 10 * body->length_scale_m);
     /* 10 E: beyond it loads on nodes are shortened, and sub-steps become too many to be live */
-    const double most_Pa = body->load_cap_N / (body->h_m * body->h_m);
+    const double most_Pa = body->load_cap_N / (body->edge_m * body->edge_m);
     if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= most_Pa))
-        return pal_note_set(note, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
-                            b->pressure_Pa, body->name, most_Pa);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
+                                  b->pressure_Pa, body->name, most_Pa);
     if (goes_on(s, b)) {
         s->brush = *b;
         s->n_left = RAMP;
         return PAL_ERR_OK;
     }
     fresh.arena = pal_arena_create(4096, true);
-    pal_err err = fresh.arena ? fill(body, b, &fresh, note) : PAL_ERR_MEMORY;
+    pal_err err = fresh.arena ? fill(body, b, &fresh, diag) : PAL_ERR_MEMORY;
     if (err) {
         pal_arena_destroy(fresh.arena);
-        return err == PAL_ERR_MEMORY ? pal_note_set(note, err, "no memory for a brush on body \"%s\"", body->name)
+        return err == PAL_ERR_MEMORY ? pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", body->name)
                                      : err;
     }
     goal(b, fresh.now);

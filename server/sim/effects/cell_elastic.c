@@ -6,52 +6,53 @@
  *
  * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when the model
  * has taken others (painting, a live edit of the material), the constants are made anew before they are used next.
- * Elements that are turned over run on the edges of their cells (cell_tangle.h), which body->rescue counts and times.
+ * Elements that are turned over run on the edges of their cells (cell_recovery.h), which body->rescue counts and times.
  * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
  * of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_law.h"
-#include "server/sim/recovery/brake.h"
+#include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/cell_kernel.h"
 
 #include <math.h>
 #include <string.h>
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    const pal_solid *solid = build->body->solid;
+    const pal_subdivision_solid *solid = build->body->solid;
     const char *name = "polar";
     if (!solid)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
-                            item->path, item->name);
-    PAL_TRY(pal_item_text(item, "operator", &name, build->note));
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
+                                  item->path, item->name);
+    PAL_TRY(pal_entry_read_text(item, "operator", &name, build->diag));
     if (strcmp(name, "polar") != 0 && strcmp(name, "edges") != 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.operator: \"%s\" is neither polar nor edges", item->path,
-                            name);
-    PAL_TRY(pal_item_done(item, build->note));
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.operator: \"%s\" is neither polar nor edges",
+                                  item->path, name);
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
     bool polar = strcmp(name, "polar") == 0;
-    PAL_TRY(pal_cells_elastic_make(solid, polar ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena, row, build->note));
-    return polar && build->body->implicit ? pal_kept_make(build->body->n_node, build->arena, &row->kept) : PAL_ERR_OK;
+    PAL_TRY(pal_cells_elastic_make(solid, polar ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena, row, build->diag));
+    return polar && build->body->implicit ? pal_force_cache_make(build->body->n_node, build->arena, &row->kept)
+                                          : PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_body *body = step->body;
-    const bool tangled = row->tangle.n_patch > 0;
+    const bool has_inversion = row->recovery.n_patch > 0;
     pal_cells_elastic_refresh(row);
-    body->rescue.n_tangled += row->tangle.n_tangled, body->rescue.n_split += row->tangle.n_change;
-    row->tangle.n_tangled = row->tangle.n_change = 0;
-    const uint64_t before = tangled ? pal_clock_ns() : 0;
-    if (pal_kept_at(&row->kept, body->d))
-        pal_kept_add(&row->kept, body->f);
+    body->safeguards.n_inversion += row->recovery.n_inversion, body->safeguards.n_split += row->recovery.n_change;
+    row->recovery.n_inversion = row->recovery.n_change = 0;
+    const uint64_t before = has_inversion ? pal_clock_ns() : 0;
+    if (pal_force_cache_matches(&row->kept, body->d))
+        pal_force_cache_add(&row->kept, body->f);
     else
         pal_cells_elastic_force(row, body->d, body->f);
-    if (tangled) body->rescue.ns += pal_clock_ns() - before;
+    if (has_inversion) body->safeguards.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 
@@ -59,8 +60,9 @@ static double energy(void *self, const pal_body *body)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
-    return pal_kept_close(&row->kept, pal_cells_elastic_energy(row, body->d, pal_kept_open(&row->kept, body->d)));
+    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
+    return pal_force_cache_commit(&row->kept,
+                                  pal_cells_elastic_energy(row, body->d, pal_force_cache_begin(&row->kept, body->d)));
 }
 
 static void reset(void *self, const pal_body *body)
@@ -83,20 +85,20 @@ static bool is_loaded(const pal_step *step)
 {
     const pal_body *body = step->body;
     double sum = 0;
-    for (int i = 0; i < 3 * body->n_node && body->outer; i++) sum += fabs(body->outer[i]);
+    for (int i = 0; i < 3 * body->n_node && body->external_force; i++) sum += fabs(body->external_force[i]);
     for (int i = 0; i < step->n_force; i++) sum += step->force[i].effect->energy && !step->force[i].effect->internal;
     return sum > 0;
 }
 
-static unsigned untangle(void *self, pal_step *step)
+static unsigned recover(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    const bool changed = pal_cell_tangle_look(&row->tangle, row, step->body, is_loaded(step));
-    if (changed) pal_kept_forget(&row->kept);
-    if (row->tangle.firmed_J > 0) pal_brake_hold(step->body, row->tangle.firmed_J);
-    const unsigned now = row->tangle.still ? PAL_TANGLED | PAL_TANGLE_STILL : PAL_TANGLED;
-    return (row->tangle.n_patch > 0 ? now : 0) | (changed ? PAL_TANGLE_CHANGED : 0);
+    const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, is_loaded(step));
+    if (changed) pal_force_cache_invalidate(&row->kept);
+    if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
+    const unsigned now = row->recovery.still ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
+    return (row->recovery.n_patch > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
 /* at rest, which solvers ask for between steps, there are no patches */
@@ -104,7 +106,7 @@ static void linearise(void *self, const pal_body *body)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    row->tangle.off = body->d == body->node_rest;
+    row->recovery.off = body->d == body->node_rest;
     pal_cells_elastic_linearise(row, body->d);
 }
 
@@ -156,7 +158,7 @@ const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
                                             .run = run,
                                             .energy = energy,
                                             .reset = reset,
-                                            .untangle = untangle,
+                                            .recover = recover,
                                             .tangent = &tangent,
                                             .measure = measure,
                                             .fields = PAL_ELASTIC_FIELDS};

@@ -3,9 +3,9 @@
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
  * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
- * are turned over its edges keep vectors (spring_tangle.h), whose forces and energy are this row's. */
+ * are turned over its edges keep vectors (spring_recovery.h), whose forces and energy are this row's. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_tangle.h"
+#include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
 
@@ -13,7 +13,7 @@
 #define LEAST_Q 1e-18
 
 typedef struct edge_distance {
-    pal_spring_row row; /* first: see pal_spring_row_material */
+    pal_spring_set row; /* first: see pal_spring_set_material */
     int n_dof;
     double *node_bound; /* sum of 2 q / l0^2 over the edges of each node            [n_dof] */
     double *node_J;     /* constants at the nodes, of a grid; NULL: all are row.k_J [n_dof] */
@@ -23,22 +23,22 @@ static void sum_bounds(edge_distance *e)
 {
     for (int i = 0; i < e->n_dof; i++) e->node_bound[i] = 0;
     for (int i = 0; i < 2 * e->row.n_item; i++) {
-        int lane = e->row.strips.place[i / 2];
+        int lane = e->row.simd_blocks.place[i / 2];
         const double q = e->row.all ? e->row.all[lane] : e->row.q[lane];
         e->node_bound[e->row.item[i]] += 2 * q * e->row.w[lane] * e->row.w[lane];
     }
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     edge_distance *e = PAL_NEW(build->arena, edge_distance, 1);
     int32_t *edge;
     int n_edge;
-    PAL_TRY(pal_spring_row_check(item, build));
+    PAL_TRY(pal_spring_set_check(item, build));
     if (!e) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_edges(build->body->tets, &edge, &n_edge));
-    pal_err err =
-        pal_spring_row_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge, 1e-9 * build->body->size_m, &e->row);
+    pal_err err = pal_spring_set_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge,
+                                      1e-9 * build->body->length_scale_m, &e->row);
     free(edge);
     PAL_TRY(err);
     e->n_dof = build->body->n_dof;
@@ -51,7 +51,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         pal_spring_nodes(&build->def->spring_grid, PAL_SPRING_DISTANCE, build->body, e->node_J);
     }
     if (e->row.spring.given)
-        build->body->given_Pa = pal_spring_young_Pa(&e->row, build->body, build->def->material.poisson);
+        build->body->spring_young_Pa = pal_spring_young_Pa(&e->row, build->body, build->def->material.poisson);
     *self = e;
     return PAL_ERR_OK;
 }
@@ -62,17 +62,17 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
     const pal_v8 floor = LEAST_Q - (pal_v8){0}, one = 1 - (pal_v8){0};
     pal_v8 dx = pal_load8(p[1][0]) - pal_load8(p[0][0]), dy = pal_load8(p[1][1]) - pal_load8(p[0][1]),
            dz = pal_load8(p[1][2]) - pal_load8(p[0][2]), w2 = w * w;
-    pal_v8 q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_pick8(w > 0, q, one);
-    *least = pal_pick8(known < *least, known, *least);
-    pal_v8 s = kq * w2 * (pal_inverse_root8(pal_pick8(q < floor, floor, q)) - 1);
+    pal_v8 q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_select8(w > 0, q, one);
+    *least = pal_select8(known < *least, known, *least);
+    pal_v8 s = kq * w2 * (pal_inverse_sqrt8(pal_select8(q < floor, floor, q)) - 1);
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
 
 /* adds what the kernel leaves out: edges without length push their ends apart along the rest direction */
-static void reopen(const pal_spring_row *row, const pal_body *body)
+static void reopen(const pal_spring_set *row, const pal_body *body)
 {
     for (int i = 0; i < row->n_item; i++) {
-        int a = 3 * row->item[2 * i], b = 3 * row->item[2 * i + 1], lane = row->strips.place[i];
+        int a = 3 * row->item[2 * i], b = 3 * row->item[2 * i + 1], lane = row->simd_blocks.place[i];
         double d[3], w = row->w[lane];
         pal_sub3(d, body->d + b, body->d + a);
         if (pal_dot3(d, d) * w * w >= LEAST_Q) continue;
@@ -83,7 +83,7 @@ static void reopen(const pal_spring_row *row, const pal_body *body)
     }
 }
 
-static pal_spring_row *springs(void *self)
+static pal_spring_set *springs(void *self)
 {
     return &((edge_distance *)self)->row;
 }
@@ -92,26 +92,26 @@ static pal_err run(void *self, pal_step *step)
 {
     const edge_distance *e = self;
     pal_body *body = step->body;
-    pal_slots_load(body->slots, body->d);
-    double least = pal_spring_run(&e->row, body->slots, kernel, 2);
-    pal_slots_add(body->slots, body->f);
+    pal_node_order_load(body->node_order, body->d);
+    double least = pal_spring_run(&e->row, body->node_order, kernel, 2);
+    pal_node_order_add(body->node_order, body->f);
     if (least < LEAST_Q) reopen(&e->row, body);
-    if (e->row.n_off > 0) pal_spring_tangle_force(body->tangle, &e->row, body);
+    if (e->row.n_off > 0) pal_spring_recovery_force(body->recovery, &e->row, body);
     if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    const pal_spring_row *row = &((edge_distance *)self)->row;
+    const pal_spring_set *row = &((edge_distance *)self)->row;
     const double sum = pal_spring_energy(row, body, PAL_SPRING_DISTANCE);
-    return row->n_off > 0 ? sum + pal_spring_tangle_energy(body->tangle, row, body) : sum;
+    return row->n_off > 0 ? sum + pal_spring_recovery_energy(body->recovery, row, body) : sum;
 }
 
 static void reset(void *self, const pal_body *body)
 {
     (void)self;
-    if (body->tangle) pal_spring_tangle_reset(body->tangle);
+    if (body->recovery) pal_spring_recovery_reset(body->recovery);
 }
 
 /* what untangles does not sleep, however still it stands */
@@ -132,24 +132,24 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const edge_distance *e = self;
     /* of patches: stiffness times their time; nodes of none have less */
-    const double c_Js = e->row.spring.c_Js + (e->row.n_off > 0 ? body->tangle->damp_s * e->row.spring.k_J : 0);
+    const double c_Js = e->row.spring.c_Js + (e->row.n_off > 0 ? body->recovery->damp_s * e->row.spring.k_J : 0);
     for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += c_Js * e->node_bound[i];
 }
 
 /* with regions the weights are others by now */
-static pal_err edit(void *self, const pal_body *body, const pal_material *material, pal_note *note)
+static pal_err edit(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)
 {
     edge_distance *e = self;
-    PAL_TRY(pal_spring_row_material(self, body, material, note));
+    PAL_TRY(pal_spring_set_material(self, body, material, diag));
     if (e->row.whole) sum_bounds(e);
     return PAL_ERR_OK;
 }
 
 /* the constants of regions at the nodes: the means over their springs */
-static void measure_regions(const pal_spring_row *row, double *sum, double *volume_m3)
+static void measure_regions(const pal_spring_set *row, double *sum, double *volume_m3)
 {
     for (int i = 0; i < 2 * row->n_item; i++) {
-        int lane = row->strips.place[i / 2], node = row->item[i];
+        int lane = row->simd_blocks.place[i / 2], node = row->item[i];
         const double q = row->all ? row->all[lane] : row->q[lane];
         if (!(row->whole[lane] > 0)) continue;
         sum[node] += row->spring.k_J * q / row->whole[lane];
@@ -183,7 +183,7 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .stiffness = stiffness,
                                              .damping = damping,
                                              .springs = springs,
-                                             .untangle = pal_spring_tangle_ask,
+                                             .recover = pal_spring_recover,
                                              .reset = reset,
                                              .material = edit,
                                              .measure = measure,

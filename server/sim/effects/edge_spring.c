@@ -1,9 +1,10 @@
 /* Row edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and the
  * opposite on the second (C eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
  *
- * Every spring has k times its share (shell.h: the law of the body) and c in the same proportion (C eq. 8: KD_l = KD_0
- * KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides. Constants that are not
- * given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). shell->spring_ramp multiplies k.
+ * Every spring has k times its share (adaptive_surface.h: the law of the body) and c in the same proportion (C eq. 8:
+ * KD_l = KD_0 KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides. Constants
+ * that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). shell->spring_ramp
+ * multiplies k.
  *
  * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
  * so that a collapsed surface opens again.
@@ -12,8 +13,8 @@
  * the order of shell->node: place and velocity of an end are one load, and a force is one load and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/surface/pack.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/active_nodes.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 
@@ -27,7 +28,7 @@ typedef struct edge_spring {
     double k_N_m, c_Ns_m; /* c_Ns_m only when given */
     double thickness_m;
     bool k_given, c_given;
-    const pal_shell *shell;
+    const pal_adaptive_surface *adaptive;
     double young_Pa; /* of the body, to which E of regions is compared */
     float *young;    /* E at the middles of all edges, NaN: the body's; NULL: no regions [n edges] */
 
@@ -47,13 +48,13 @@ static double derived_k(const edge_spring *e, double young_Pa)
 /* a live edit changes the masses after the rows */
 static double damping_now(const edge_spring *e)
 {
-    return e->c_given ? e->c_Ns_m : 0.02 * sqrt(e->k_N_m * e->shell->level_mass_kg[0]);
+    return e->c_given ? e->c_Ns_m : 0.02 * sqrt(e->k_N_m * e->adaptive->level_mass_kg[0]);
 }
 
 /* E at the middles of all edges */
 static pal_err find_young(edge_spring *e, const pal_build *build)
 {
-    const pal_levels *levels = &e->shell->levels;
+    const pal_levels *levels = &e->adaptive->levels;
     int32_t n_edge = levels->first_edge[levels->n_level];
     if (build->def->n_region == 0) return PAL_ERR_OK;
     e->young = PAL_NEW(build->arena, float, n_edge);
@@ -64,7 +65,7 @@ static pal_err find_young(edge_spring *e, const pal_build *build)
         const int32_t *vertex = levels->edge[i].vertex;
         const double *a = levels->x + 3 * (size_t)vertex[0], *b = levels->x + 3 * (size_t)vertex[1];
         double middle[3] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
-        pal_material_over(build->def, &base, middle, &at);
+        pal_material_overlay(build->def, &base, middle, &at);
         e->young[i] = (float)at.young_Pa;
     }
     return PAL_ERR_OK;
@@ -78,7 +79,7 @@ static double young_ratio(const edge_spring *e, int32_t edge)
 
 static pal_err allocate(edge_spring *e, pal_arena *arena)
 {
-    const pal_levels *levels = &e->shell->levels;
+    const pal_levels *levels = &e->adaptive->levels;
     int finest = levels->n_level - 1;
     size_t n_vertex = (size_t)levels->n_vertex[finest];
     size_t n_lane = ((size_t)pal_levels_n_edge(levels, finest) + PAL_LANES - 1) / PAL_LANES * PAL_LANES;
@@ -90,29 +91,29 @@ static pal_err allocate(edge_spring *e, pal_arena *arena)
     return e->place && e->end && e->w2 && e->q && e->bound ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    const pal_shell *shell = build->body->shell;
-    if (!shell)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                            item->path, item->name);
+    const pal_adaptive_surface *adaptive = build->body->adaptive;
+    if (!adaptive)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                                  item->path, item->name);
     edge_spring *e = PAL_NEW(build->arena, edge_spring, 1);
     if (!e) return PAL_ERR_MEMORY;
-    e->shell = shell;
-    e->k_given = pal_item_has(item, "k_N_m");
-    e->c_given = pal_item_has(item, "c_Ns_m");
-    PAL_TRY(pal_item_number(item, "k_N_m", 0, 1e60, &e->k_N_m, build->note));
-    PAL_TRY(pal_item_number(item, "c_Ns_m", 0, 1e60, &e->c_Ns_m, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    e->adaptive = adaptive;
+    e->k_given = pal_entry_has(item, "k_N_m");
+    e->c_given = pal_entry_has(item, "c_Ns_m");
+    PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &e->k_N_m, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &e->c_Ns_m, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     /* the model's key, also for an entry that stands in the place of the model's row */
-    pal_item model = build->def->model;
+    pal_config_entry model = build->def->model;
     e->thickness_m = 0.003;
-    PAL_TRY(pal_item_number(&model, "thickness_m", 0, 1e9, &e->thickness_m, build->note));
+    PAL_TRY(pal_entry_read_number(&model, "thickness_m", 0, 1e9, &e->thickness_m, build->diag));
     e->young_Pa = build->def->material.young_Pa;
     e->k_N_m = derived_k(e, e->young_Pa);
     PAL_TRY(find_young(e, build));
     PAL_TRY(allocate(e, build->arena));
-    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
+    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
     *self = e;
     return PAL_ERR_OK;
 }
@@ -121,14 +122,14 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
  * for whose force the next would have to wait */
 static void take_springs(edge_spring *e)
 {
-    const pal_shell *shell = e->shell;
-    const double *x = shell->levels.x;
-    if (e->revision == shell->revision && e->n_block > 0) return;
-    e->revision = shell->revision;
-    e->n_node = shell->n_node;
-    e->n_block = (shell->n_spring + PAL_LANES - 1) / PAL_LANES;
+    const pal_adaptive_surface *adaptive = e->adaptive;
+    const double *x = adaptive->levels.x;
+    if (e->revision == adaptive->revision && e->n_block > 0) return;
+    e->revision = adaptive->revision;
+    e->n_node = adaptive->n_node;
+    e->n_block = (adaptive->n_spring + PAL_LANES - 1) / PAL_LANES;
     for (int k = 0; k < e->n_node; k++) {
-        e->place[shell->node[k]] = k;
+        e->place[adaptive->node[k]] = k;
         e->bound[k] = 0;
     }
     for (int s = 0; s < PAL_LANES * e->n_block; s++) {
@@ -136,13 +137,14 @@ static void take_springs(edge_spring *e)
         end[0] = end[PAL_LANES] = 0;
         e->w2[s] = e->q[s] = 0;
         int k = s % PAL_LANES * e->n_block + s / PAL_LANES;
-        if (k >= shell->n_spring) continue;
-        int32_t edge = shell->spring[k], a = shell->levels.edge[edge].vertex[0], b = shell->levels.edge[edge].vertex[1];
+        if (k >= adaptive->n_spring) continue;
+        int32_t edge = adaptive->spring[k], a = adaptive->levels.edge[edge].vertex[0],
+                b = adaptive->levels.edge[edge].vertex[1];
         double d[3];
         pal_sub3(d, x + 3 * (size_t)b, x + 3 * (size_t)a);
         end[0] = PAL_LANES * (uint32_t)e->place[a], end[PAL_LANES] = PAL_LANES * (uint32_t)e->place[b];
         e->w2[s] = 1 / pal_dot3(d, d);
-        e->q[s] = (double)shell->spring_share[k] * young_ratio(e, edge);
+        e->q[s] = (double)adaptive->spring_share[k] * young_ratio(e, edge);
         e->bound[e->place[a]] += 2 * e->q[s];
         e->bound[e->place[b]] += 2 * e->q[s];
     }
@@ -172,8 +174,8 @@ PAL_INLINE void measure_blocks(const edge_spring *e, const double *xv, int first
         pal_v8 w2 = pal_load8(e->w2 + PAL_LANES * (first + b)), p[PAL_LANES];
         for (int l = 0; l < PAL_LANES; l++) {
             p[l] = *(const pal_v8 *)(xv + end[PAL_LANES + l]) - *(const pal_v8 *)(xv + end[l]);
-            d[PAL_LANES * b + l] = pal_first(p[l]);
-            p[l] *= pal_join(pal_first(p[l]), pal_first(p[l]));
+            d[PAL_LANES * b + l] = pal_v8_low(p[l]);
+            p[l] *= pal_v8_join(pal_v8_low(p[l]), pal_v8_low(p[l]));
         }
         sum_halves(p, &q[b], &rate[b]);
         q[b] *= w2, rate[b] *= w2;
@@ -181,7 +183,7 @@ PAL_INLINE void measure_blocks(const edge_spring *e, const double *xv, int first
 }
 
 /* with q = (l/l0)^2 and r = 1/sqrt(q): k (l - l0) d/l = k (1 - r) d, and c (dv.d)/l^2 d; returns the least q */
-static double run_springs(const edge_spring *e, const pal_pack *pack, double k, double c)
+static double run_springs(const edge_spring *e, const pal_active_nodes *pack, double k, double c)
 {
     const pal_v8 floor = LEAST_Q - (pal_v8){0}, none = {0}, one = 1 - none;
     pal_v8 least = one;
@@ -194,11 +196,11 @@ static double run_springs(const edge_spring *e, const pal_pack *pack, double k, 
         double s[BATCH * PAL_LANES];
         measure_blocks(e, xv, first, n, d, q, rate);
         for (int b = 0; b < n; b++) {
-            pal_v8 share = pal_load8(e->q + PAL_LANES * (first + b)), known = pal_pick8(share > none, q[b], one);
-            least = pal_pick8(known < least, known, least);
-            pal_v8 r = pal_inverse_root8(pal_pick8(q[b] < floor, floor, q[b])),
+            pal_v8 share = pal_load8(e->q + PAL_LANES * (first + b)), known = pal_select8(share > none, q[b], one);
+            least = pal_select8(known < least, known, least);
+            pal_v8 r = pal_inverse_sqrt8(pal_select8(q[b] < floor, floor, q[b])),
                    s8 = k * (one - r) + c * rate[b] * r * r;
-            *(pal_lanes *)(s + PAL_LANES * b) = pal_pick8(q[b] < floor, none, share * s8);
+            *(pal_v8_unaligned *)(s + PAL_LANES * b) = pal_select8(q[b] < floor, none, share * s8);
         }
         for (int b = 0; b < n; b++) {
             const uint32_t *end = e->end + 2 * PAL_LANES * (first + b);
@@ -219,19 +221,19 @@ static bool spring_ends(const edge_spring *e, int s, int place[2], int32_t verte
     const uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
     for (int k = 0; k < 2; k++) {
         place[k] = (int)(end[k * PAL_LANES] / PAL_LANES);
-        vertex[k] = e->shell->node[place[k]];
+        vertex[k] = e->adaptive->node[place[k]];
     }
     return e->w2[s] > 0;
 }
 
 /* what the vectors leave out: springs without length push their ends apart along the rest direction */
-static void reopen(const edge_spring *e, const pal_pack *pack, double k)
+static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
 {
     for (int s = 0; s < PAL_LANES * e->n_block; s++) {
         int32_t vertex[2];
         int place[2];
         if (!spring_ends(e, s, place, vertex)) continue;
-        pal_quad d = pal_first(pack->xv[place[1]]) - pal_first(pack->xv[place[0]]);
+        pal_quad d = pal_v8_low(pack->xv[place[1]]) - pal_v8_low(pack->xv[place[0]]);
         if (pal_quad_dot(d, d) * e->w2[s] >= LEAST_Q) continue;
         d = pack->rest[place[1]] - pack->rest[place[0]];
         d[3] = 0;
@@ -244,32 +246,32 @@ static pal_err pull(void *self, pal_step *step)
 {
     edge_spring *e = self;
     take_springs(e);
-    double k = e->k_N_m * e->shell->spring_ramp;
+    double k = e->k_N_m * e->adaptive->spring_ramp;
     if (run_springs(e, step->body->pack, k, damping_now(e)) < LEAST_Q) reopen(e, step->body->pack, k);
     return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    return pal_pack_run(self, step, pull);
+    return pal_active_nodes_run(self, step, pull);
 }
 
 static double energy(void *self, const pal_body *body)
 {
     edge_spring *e = self;
     take_springs(e);
-    pal_pack_take(body);
+    pal_active_nodes_load(body);
     pal_v8 sum = {0};
     for (int b = 0; b < e->n_block; b++) {
         pal_quad d[PAL_LANES];
         pal_v8 q, rate, none = {0}, share = pal_load8(e->q + PAL_LANES * b), w2 = pal_load8(e->w2 + PAL_LANES * b);
         measure_blocks(e, (const double *)body->pack->xv, b, 1, d, &q, &rate);
-        pal_v8 strain = pal_root8(q) - 1;
-        sum += pal_pick8(w2 > none, share * strain * strain / w2, none);
+        pal_v8 strain = pal_sqrt8(q) - 1;
+        sum += pal_select8(w2 > none, share * strain * strain / w2, none);
     }
     double half = 0;
     for (int l = 0; l < PAL_LANES; l++) half += 0.5 * sum[l];
-    return e->k_N_m * e->shell->spring_ramp * half;
+    return e->k_N_m * e->adaptive->spring_ramp * half;
 }
 
 /* k at both ends along the spring; across it k (1 - l0/l) is never more for l > l0 and none for l < l0 */
@@ -278,8 +280,8 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     edge_spring *e = self;
     (void)body;
     take_springs(e);
-    double k = e->k_N_m * e->shell->spring_ramp;
-    for (int i = 0; i < e->n_node; i++) bound_N_m[e->shell->node[i]] += k * e->bound[i];
+    double k = e->k_N_m * e->adaptive->spring_ramp;
+    for (int i = 0; i < e->n_node; i++) bound_N_m[e->adaptive->node[i]] += k * e->bound[i];
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
@@ -288,13 +290,13 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
     (void)body;
     take_springs(e);
     double c = damping_now(e);
-    for (int i = 0; i < e->n_node; i++) bound_Ns_m[e->shell->node[i]] += c * e->bound[i];
+    for (int i = 0; i < e->n_node; i++) bound_Ns_m[e->adaptive->node[i]] += c * e->bound[i];
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     edge_spring *e = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     if (!e->k_given) e->young_Pa = to->young_Pa;
     e->k_N_m = derived_k(e, e->young_Pa);
     e->n_block = 0;

@@ -4,23 +4,23 @@
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
  * momentum). Below 1e-12 of its rest area a triangle has no normal and its force fades to nothing. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_tangle.h"
+#include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
 
 /* of (A/A0)^2 */
 #define LEAST_Q 1e-24
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_spring_row *row = PAL_NEW(build->arena, pal_spring_row, 1);
+    pal_spring_set *row = PAL_NEW(build->arena, pal_spring_set, 1);
     int32_t *face;
     int n_face;
-    PAL_TRY(pal_spring_row_check(item, build));
+    PAL_TRY(pal_spring_set_check(item, build));
     if (!row) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_faces(build->body->tets, &face, &n_face));
-    double size = build->body->size_m;
-    pal_err err = pal_spring_row_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, row);
+    double size = build->body->length_scale_m;
+    pal_err err = pal_spring_set_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, row);
     free(face);
     *self = row;
     return err;
@@ -36,7 +36,7 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
     pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;
     pal_v8 nx = ay * bz - az * by, ny = az * bx - ax * bz, nz = ax * by - ay * bx;
     pal_v8 q = (nx * nx + ny * ny + nz * nz) * w2;
-    pal_v8 t = kq * w2 * (pal_inverse_root8(pal_pick8(q < floor, floor, q)) - 1);
+    pal_v8 t = kq * w2 * (pal_inverse_sqrt8(pal_select8(q < floor, floor, q)) - 1);
     nx *= t, ny *= t, nz *= t;
     f[0][0] = by * nz - bz * ny, f[0][1] = bz * nx - bx * nz, f[0][2] = bx * ny - by * nx;
     f[1][0] = ny * az - nz * ay, f[1][1] = nz * ax - nx * az, f[1][2] = nx * ay - ny * ax;
@@ -53,26 +53,26 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     }
     if (bend) {
         pal_v8 size = pal_cross_length8(e[0], e[1]), c = size * w - 1;
-        pal_v8 cw = kq * w * pal_pick8(c > 0, c, flat);
-        along += cw / pal_pick8(c > 0, size, flat + 1);
+        pal_v8 cw = kq * w * pal_select8(c > 0, c, flat);
+        along += cw / pal_select8(c > 0, size, flat + 1);
         flat = 2 * cw;
     }
     pal_v8 sum = length[0] + length[1] + length[2];
     for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
 }
 
-static pal_spring_row *springs(void *self)
+static pal_spring_set *springs(void *self)
 {
     return self;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    const pal_spring_row *row = self;
+    const pal_spring_set *row = self;
     pal_body *body = step->body;
-    pal_slots_load(body->slots, body->d);
-    pal_spring_run(row, body->slots, kernel, 3);
-    pal_slots_add(body->slots, body->f);
+    pal_node_order_load(body->node_order, body->d);
+    pal_spring_run(row, body->node_order, kernel, 3);
+    pal_node_order_add(body->node_order, body->f);
     if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_AREA);
     return PAL_ERR_OK;
 }
@@ -84,15 +84,15 @@ static double energy(void *self, const pal_body *body)
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const pal_spring_row *row = self;
-    pal_spring_bound(row, body->slots, body->d, bound_kernel, 3, row->spring.k_J, true, bound_N_m);
+    const pal_spring_set *row = self;
+    pal_spring_bound(row, body->node_order, body->d, bound_kernel, 3, row->spring.k_J, true, bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    const pal_spring_row *row = self;
+    const pal_spring_set *row = self;
     if (row->spring.c_Js > 0)
-        pal_spring_bound(row, body->slots, body->d, bound_kernel, 3, row->spring.c_Js, false, bound_Ns_m);
+        pal_spring_bound(row, body->node_order, body->d, bound_kernel, 3, row->spring.c_Js, false, bound_Ns_m);
 }
 
 const pal_effect pal_effect_face_area = {.name = "face_area",
@@ -104,5 +104,5 @@ const pal_effect pal_effect_face_area = {.name = "face_area",
                                          .stiffness = stiffness,
                                          .damping = damping,
                                          .springs = springs,
-                                         .untangle = pal_spring_tangle_ask,
-                                         .material = pal_spring_row_material};
+                                         .recover = pal_spring_recover,
+                                         .material = pal_spring_set_material};

@@ -6,12 +6,12 @@
  * body->why names the point, the element and the number.
  * Of a body whose points carry nodes (pal_body.embed) the points are looked at and put back, the speed is that of the
  * nodes.
- * Of a body that adapts (sim/shell.h) the active points are looked at and copied. Which are active is not taken back:
- * one that came into use since the last good state is put between the ends of its edge. */
+ * Of a body that adapts (sim/adaptive_surface.h) the active points are looked at and copied. Which are active is not
+ * taken back: one that came into use since the last good state is put between the ends of its edge. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/core/sums.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -30,8 +30,8 @@ typedef struct finite_guard {
 static double auto_speed(const finite_guard *guard, const pal_material *material)
 {
     double wave = sqrt(material->young_Pa / material->density_kg_m3);
-    double fall = sqrt(guard->gravity_m_s2 * guard->body->size_m);
-    return 20 * (wave + fall) + 10 * guard->body->size_m;
+    double fall = sqrt(guard->gravity_m_s2 * guard->body->length_scale_m);
+    return 20 * (wave + fall) + 10 * guard->body->length_scale_m;
 }
 
 static void keep(finite_guard *guard, const pal_body *body)
@@ -65,35 +65,35 @@ static void put_back(finite_guard *guard, pal_body *body)
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     for (int k = 0; k < body->n_active && guard->kept; k++) {
         int32_t i = body->active[k];
-        last_place(guard, &body->shell->levels, i, body->x + 3 * (size_t)i);
+        last_place(guard, &body->adaptive->levels, i, body->x + 3 * (size_t)i);
         pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
     }
     if (guard->kept) return;
     memcpy(body->x, guard->x, n_byte);
     memset(body->v, 0, n_byte);
-    pal_body_place(body);
+    pal_body_update_nodes(body);
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_diagnostic *diag)
 {
     finite_guard *guard = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     if (guard->asked_speed_m_s == 0) guard->speed_m_s = auto_speed(guard, mat);
     return PAL_ERR_OK;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     pal_body *body = build->body;
     double reach = 10, speed = 0;
-    PAL_TRY(pal_item_number(item, "reach", 0.1, 1000, &reach, build->note));
-    PAL_TRY(pal_item_number(item, "speed_m_s", 0, 1e9, &speed, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_read_number(item, "reach", 0.1, 1000, &reach, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "speed_m_s", 0, 1e9, &speed, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     finite_guard *guard = PAL_NEW(build->arena, finite_guard, 1);
     if (!guard) return PAL_ERR_MEMORY;
     guard->x = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-    if (body->shell) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
-    if (!guard->x || (body->shell && !guard->kept)) return PAL_ERR_MEMORY;
+    if (body->adaptive) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
+    if (!guard->x || (body->adaptive && !guard->kept)) return PAL_ERR_MEMORY;
     guard->body = body;
     guard->reach = reach;
     guard->gravity_m_s2 = fabs(build->scene->gravity_m_s2);
@@ -108,7 +108,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 /* true when every number is finite and within bounds; comparisons are written so that NaN fails them */
 static bool sound(const finite_guard *guard, const pal_body *body)
 {
-    double energy = 0, limit = guard->reach * body->size_m;
+    double energy = 0, limit = guard->reach * body->length_scale_m;
     const int n = body->active ? 0 : 3 * body->n_dof;
     int64_t far = 0;
     for (int k = 0; k < body->n_active && body->active; k++) {
@@ -118,11 +118,11 @@ static bool sound(const finite_guard *guard, const pal_body *body)
         energy += body->mass_kg[i] * pal_dot3(v, v);
     }
     for (int i = 0; i < n; i++) far += fabs(body->x[i] - body->x_rest[i]) <= limit ? 0 : 1;
-    if (body->embed) {
+    if (body->interpolation) {
         for (int i = 0; i < n; i++) energy += 0 * body->v[i];
-        energy += pal_sum_motion(body->n_node, body->node_mass_kg, body->dv);
+        energy += pal_sum_mv2(body->n_node, body->node_mass_kg, body->dv);
     } else if (!body->active)
-        energy += pal_sum_motion(body->n_dof, body->mass_kg, body->v);
+        energy += pal_sum_mv2(body->n_dof, body->mass_kg, body->v);
     return far == 0 && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
@@ -130,9 +130,9 @@ static bool sound(const finite_guard *guard, const pal_body *body)
  * is judged */
 static void tell(const finite_guard *guard, pal_body *body)
 {
-    double far_m = 0, fast_m_s = 0, limit = guard->reach * body->size_m;
+    double far_m = 0, fast_m_s = 0, limit = guard->reach * body->length_scale_m;
     double twice_J =
-        body->embed ? pal_sum_motion(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
+        body->interpolation ? pal_sum_mv2(body->n_node, body->node_mass_kg, body->dv) : 2 * pal_body_kinetic_J(body);
     int far = -1, fast = -1;
     bool number = pal_body_finite(body);
     for (int k = 0; k < body->n_active && number; k++) {

@@ -6,11 +6,11 @@ typedef struct gravity {
     double g[3]; /* m/s^2 */
 } gravity;
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     double size = build->scene->gravity_m_s2;
-    PAL_TRY(pal_item_number(item, "acceleration_m_s2", -1e4, 1e4, &size, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_read_number(item, "acceleration_m_s2", -1e4, 1e4, &size, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     gravity *row = PAL_NEW(build->arena, gravity, 1);
     if (!row) return PAL_ERR_MEMORY;
     pal_scale3(row->g, -size, build->scene->up);

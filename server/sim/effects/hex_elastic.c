@@ -13,20 +13,20 @@
 
 #include <string.h>
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_hex_wish wish = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .untangle = true};
+    pal_hex_options wish = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true};
     const char *element = "hex8_bbar";
-    PAL_TRY(pal_item_text(item, "element", &element, build->note));
+    PAL_TRY(pal_entry_read_text(item, "element", &element, build->diag));
     wish.element = strcmp(element, "hex8_bbar") ? PAL_HEX_FULL : PAL_HEX_BBAR;
     if (wish.element == PAL_HEX_FULL && strcmp(element, "hex8"))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.element: \"%s\" is neither hex8_bbar nor hex8",
-                            item->path, element);
-    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->note));
-    PAL_TRY(pal_item_bool(item, "fill", &wish.fill, build->note));
-    PAL_TRY(pal_item_bool(item, "untangle", &wish.untangle, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
-    pal_hex_row *row = PAL_NEW(build->arena, pal_hex_row, 1);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.element: \"%s\" is neither hex8_bbar nor hex8",
+                                  item->path, element);
+    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "fill", &wish.fill, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "recover", &wish.recover, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    pal_elastic_hexes *row = PAL_NEW(build->arena, pal_elastic_hexes, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
     return pal_hex_make(&wish, build, item->path, row);
@@ -34,47 +34,47 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 
 static pal_err run(void *self, pal_step *step)
 {
-    pal_hex_row *row = self;
+    pal_elastic_hexes *row = self;
     pal_body *body = step->body;
-    if (!row->implicit) pal_hex_untangle(row, body);
-    body->rescue.n_tangled += row->n_tangled, body->rescue.n_split += row->n_switch;
-    row->n_tangled = row->n_switch = 0;
-    if (row->tangled) {
+    if (!row->implicit) pal_hex_recover(row, body);
+    body->safeguards.n_inversion += row->n_inversion, body->safeguards.n_split += row->n_switch;
+    row->n_inversion = row->n_switch = 0;
+    if (row->has_inversion) {
         uint64_t before = pal_clock_ns();
         pal_elastic_tets_force(row->split, body->d, body->f);
-        body->rescue.ns += pal_clock_ns() - before;
+        body->safeguards.ns += pal_clock_ns() - before;
         return PAL_ERR_OK;
     }
-    if (pal_kept_at(&row->kept, body->d)) {
-        pal_kept_add(&row->kept, body->f);
+    if (pal_force_cache_matches(&row->kept, body->d)) {
+        pal_force_cache_add(&row->kept, body->f);
         return PAL_ERR_OK;
     }
-    pal_slots_load(body->slots, body->d);
+    pal_node_order_load(body->node_order, body->d);
     if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_force(row, body->slots);
+        pal_hex_neo_force(row, body->node_order);
     else
-        pal_hex_corot_force(row, body->slots);
-    pal_slots_add(body->slots, body->f);
+        pal_hex_corot_force(row, body->node_order);
+    pal_node_order_add(body->node_order, body->f);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    pal_hex_row *row = self;
-    if (row->tangled) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
-    pal_slots_load(body->slots, body->d);
-    double *forces = pal_kept_open(&row->kept, body->d);
-    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->slots, forces)
-                                                 : pal_hex_corot_energy(row, body->slots, forces);
-    if (forces) pal_slots_add(body->slots, forces);
-    return pal_kept_close(&row->kept, sum);
+    pal_elastic_hexes *row = self;
+    if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
+    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
+    pal_node_order_load(body->node_order, body->d);
+    double *forces = pal_force_cache_begin(&row->kept, body->d);
+    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->node_order, forces)
+                                                 : pal_hex_corot_energy(row, body->node_order, forces);
+    if (forces) pal_node_order_add(body->node_order, forces);
+    return pal_force_cache_commit(&row->kept, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    pal_hex_row *row = self;
-    if (row->tangled) {
+    pal_elastic_hexes *row = self;
+    if (row->has_inversion) {
         pal_elastic_tets_bound(row->split, body->d, bound_N_m);
         return;
     }
@@ -83,12 +83,12 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
         return;
     }
     for (int e = 0; e < row->n_hex; e++)
-        for (int c = 0; c < 8; c++) bound_N_m[row->hexes->node[8 * e + c]] += row->bound[row->strips.place[e]];
+        for (int c = 0; c < 8; c++) bound_N_m[row->hexes->node[8 * e + c]] += row->bound[row->simd_blocks.place[e]];
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    (void)body, (void)note;
+    (void)body, (void)diag;
     pal_hex_material(self, to);
     return PAL_ERR_OK;
 }
@@ -101,48 +101,48 @@ static void reset(void *self, const pal_body *body)
 
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_hex_row *row = self;
+    const pal_elastic_hexes *row = self;
     *out = (pal_cliques){.n_item = row->n_hex, .n_corner = 8, .node = row->hexes->node};
     return true;
 }
 
 static void linearise(void *self, const pal_body *body)
 {
-    pal_hex_row *row = self;
-    pal_hex_untangle(row, body);
-    if (row->implicit && row->split) row->n_switch += pal_elastic_tets_look(row->split, body, row->tangled);
-    if (row->tangled) {
+    pal_elastic_hexes *row = self;
+    pal_hex_recover(row, body);
+    if (row->implicit && row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
+    if (row->has_inversion) {
         pal_elastic_tets_linearise(row->split, body->d);
         return;
     }
-    pal_slots_load(body->slots, body->d);
+    pal_node_order_load(body->node_order, body->d);
     if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_linearise(row, body->slots);
+        pal_hex_neo_linearise(row, body->node_order);
     else
-        pal_hex_corot_linearise(row, body->slots);
+        pal_hex_corot_linearise(row, body->node_order);
 }
 
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
-    const pal_hex_row *row = self;
+    const pal_elastic_hexes *row = self;
     (void)c;
-    if (row->tangled) {
+    if (row->has_inversion) {
         pal_elastic_tets_multiply(row->split, k, p, out);
         return;
     }
-    pal_slots_load(body->slots, p);
+    pal_node_order_load(body->node_order, p);
     if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_multiply(row, body->slots, k);
+        pal_hex_neo_multiply(row, body->node_order, k);
     else
-        pal_hex_corot_multiply(row, body->slots, k);
-    pal_slots_add(body->slots, out);
+        pal_hex_corot_multiply(row, body->node_order, k);
+    pal_node_order_add(body->node_order, out);
 }
 
-static void assemble(void *self, const pal_body *body, double k, double c, pal_blocks *to)
+static void assemble(void *self, const pal_body *body, double k, double c, pal_block_matrix *to)
 {
-    pal_hex_row *row = self;
+    pal_elastic_hexes *row = self;
     (void)c, (void)body;
-    if (row->tangled)
+    if (row->has_inversion)
         pal_elastic_tets_assemble(row->split, k, to);
     else
         pal_hex_assemble(row, k, to);
@@ -150,9 +150,9 @@ static void assemble(void *self, const pal_body *body, double k, double c, pal_b
 
 static void rotate(void *self, const pal_body *body, double *turn)
 {
-    const pal_hex_row *row = self;
+    const pal_elastic_hexes *row = self;
     (void)body;
-    if (row->tangled)
+    if (row->has_inversion)
         pal_elastic_tets_rotate(row->split, turn);
     else
         pal_hex_rotate(row, turn);
@@ -160,8 +160,8 @@ static void rotate(void *self, const pal_body *body, double *turn)
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    pal_hex_row *row = self;
-    if (row->tangled)
+    pal_elastic_hexes *row = self;
+    if (row->has_inversion)
         pal_elastic_tets_measure(row->split, body->d, field, sum, volume_m3);
     else
         pal_hex_measure(row, body, field, sum, volume_m3);
@@ -169,8 +169,8 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 
 static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)
 {
-    pal_hex_row *row = self;
-    if (row->tangled)
+    pal_elastic_hexes *row = self;
+    if (row->has_inversion)
         pal_elastic_tets_stress(row->split, body->d, take, user);
     else
         pal_hex_stress(row, body, take, user);

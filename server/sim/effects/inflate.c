@@ -17,7 +17,7 @@
  * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
@@ -39,22 +39,22 @@ typedef struct inflate {
 /* stiff parts of pressure are at most this often stiff_Pa */
 static const double most = 10;
 
-static pal_err read_keys(inflate *row, pal_item *item, pal_note *note)
+static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *diag)
 {
     static const char *const names[] = {"pressure", "gas", "fluid"};
     const char *kind = names[PRESSURE];
-    PAL_TRY(pal_item_text(item, "kind", &kind, note));
+    PAL_TRY(pal_entry_read_text(item, "kind", &kind, diag));
     while (row->kind <= FLUID && strcmp(kind, names[row->kind]) != 0) row->kind++;
     if (row->kind > FLUID)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s.kind: \"%s\", wanted \"pressure\", \"gas\" or \"fluid\"",
-                            item->path, kind);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.kind: \"%s\", wanted \"pressure\", \"gas\" or \"fluid\"",
+                                  item->path, kind);
     row->ramp_s = 0.5;
     row->stiff_Pa = row->kind == GAS ? 101325 : row->kind == FLUID ? 20000 : 0;
-    PAL_TRY(pal_item_number(item, "pressure_Pa", -1e12, 1e12, &row->pressure_Pa, note));
-    PAL_TRY(pal_item_number(item, "ramp_s", 0, 1e6, &row->ramp_s, note));
-    if (row->kind == GAS) PAL_TRY(pal_item_number(item, "absolute_Pa", 0, 1e12, &row->stiff_Pa, note));
-    if (row->kind == FLUID) PAL_TRY(pal_item_number(item, "bulk_Pa", 0, 1e12, &row->stiff_Pa, note));
-    return pal_item_done(item, note);
+    PAL_TRY(pal_entry_read_number(item, "pressure_Pa", -1e12, 1e12, &row->pressure_Pa, diag));
+    PAL_TRY(pal_entry_read_number(item, "ramp_s", 0, 1e6, &row->ramp_s, diag));
+    if (row->kind == GAS) PAL_TRY(pal_entry_read_number(item, "absolute_Pa", 0, 1e12, &row->stiff_Pa, diag));
+    if (row->kind == FLUID) PAL_TRY(pal_entry_read_number(item, "bulk_Pa", 0, 1e12, &row->stiff_Pa, diag));
+    return pal_entry_check_unused(item, diag);
 }
 
 /* 6 V of a triangle and a point */
@@ -73,34 +73,34 @@ static double volume(const double *x, const int32_t *tri, int n_tri)
     return sum / 6;
 }
 
-static pal_err check_surface(inflate *row, const pal_item *item, const pal_build *build)
+static pal_err check_surface(inflate *row, const pal_config_entry *item, const pal_build *build)
 {
-    const pal_shell *shell = build->body->shell;
-    if (!shell)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                            item->path, item->name);
-    const pal_levels *levels = &shell->levels;
+    const pal_adaptive_surface *adaptive = build->body->adaptive;
+    if (!adaptive)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                                  item->path, item->name);
+    const pal_levels *levels = &adaptive->levels;
     int n_open = 0, last = levels->n_level - 1;
     for (int32_t e = 0; e < pal_levels_n_edge(levels, 0); e++) n_open += levels->edge[e].face[1] < 0;
     if (n_open > 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path, item->name,
-                            n_open);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path,
+                                  item->name, n_open);
     row->fine_m3 =
         volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
-    double size = build->body->size_m, least_m3 = LEAST_FILL * size * size * size;
+    double size = build->body->length_scale_m, least_m3 = LEAST_FILL * size * size * size;
     if (!(fabs(row->fine_m3) > least_m3))
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
-                            fabs(row->fine_m3));
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
+                                  fabs(row->fine_m3));
     return PAL_ERR_OK;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     inflate keys = {.revision = UINT64_MAX};
     PAL_TRY(check_surface(&keys, item, build));
-    PAL_TRY(read_keys(&keys, item, build->note));
+    PAL_TRY(read_keys(&keys, item, build->diag));
     inflate *row = PAL_NEW(build->arena, inflate, 1);
     if (!row) return PAL_ERR_MEMORY;
     *row = keys;
@@ -111,11 +111,11 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 }
 
 /* V_rest of what is drawn now; where that encloses next to nothing, that of the finest level */
-static void follow(inflate *row, const pal_shell *shell)
+static void follow(inflate *row, const pal_adaptive_surface *adaptive)
 {
-    if (row->revision == shell->revision) return;
-    row->revision = shell->revision;
-    row->rest_m3 = volume(shell->levels.x, shell->tri, shell->n_tri);
+    if (row->revision == adaptive->revision) return;
+    row->revision = adaptive->revision;
+    row->rest_m3 = volume(adaptive->levels.x, adaptive->tri, adaptive->n_tri);
     if (!(row->rest_m3 / row->fine_m3 > 0.01)) row->rest_m3 = row->fine_m3;
 }
 
@@ -123,13 +123,13 @@ static void follow(inflate *row, const pal_shell *shell)
  * exact gradient, and V is a third of the sum of x . dV/dx */
 static double measure_volume(inflate *row, const pal_body *body)
 {
-    const pal_shell *shell = body->shell;
+    const pal_adaptive_surface *adaptive = body->adaptive;
     const double *from = body->d + 3 * (size_t)pal_body_point(body, 0);
     double sum = 0;
     for (int k = 0; k < body->n_active; k++)
         memset(row->gradient + 3 * (size_t)pal_body_point(body, k), 0, 3 * sizeof(double));
-    for (int t = 0; t < shell->n_tri; t++) {
-        const int32_t *tri = shell->tri + 3 * (size_t)t;
+    for (int t = 0; t < adaptive->n_tri; t++) {
+        const int32_t *tri = adaptive->tri + 3 * (size_t)t;
         const double *a = body->d + 3 * (size_t)tri[0];
         double p[3], q[3], n[3];
         pal_sub3(p, body->d + 3 * (size_t)tri[1], a);
@@ -175,7 +175,7 @@ static answer answer_to(const inflate *row, double s)
 /* p V_0/V_rest: the force is that times row->gradient; s and the gradient at the present positions */
 static double push(inflate *row, const pal_body *body, double *s)
 {
-    follow(row, body->shell);
+    follow(row, body->adaptive);
     *s = measure_volume(row, body) / row->rest_m3;
     double p = row->share * row->pressure_Pa + row->stiff_Pa * answer_to(row, *s).value;
     return p * fabs(row->fine_m3) / row->rest_m3;
@@ -210,7 +210,7 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     inflate *row = self;
-    const pal_shell *shell = body->shell;
+    const pal_adaptive_surface *adaptive = body->adaptive;
     double s, sum = 0;
     (void)push(row, body, &s);
     const answer now = answer_to(row, s);
@@ -220,14 +220,14 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         const double *g = row->gradient + 3 * (size_t)i;
-        if (!body->held[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
+        if (!body->fixed[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
     }
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         bound_N_m[i] += k * sum * body->mass_kg[i];
     }
-    for (int t = 0; t < shell->n_tri && p != 0; t++) {
-        const int32_t *tri = shell->tri + 3 * (size_t)t;
+    for (int t = 0; t < adaptive->n_tri && p != 0; t++) {
+        const int32_t *tri = adaptive->tri + 3 * (size_t)t;
         for (int c = 0; c < 3; c++) {
             int32_t a = tri[(c + 1) % 3], b = tri[(c + 2) % 3];
             double middle[3];

@@ -20,28 +20,28 @@ typedef struct moving_support {
     double rise_s, period_s;
 } moving_support;
 
-static pal_err read_keys(moving_support *row, pal_item *item, pal_note *note, double low[3], double high[3],
-                         double *lowest)
+static pal_err read_keys(moving_support *row, pal_config_entry *item, pal_diagnostic *diag, double low[3],
+                         double high[3], double *lowest)
 {
     double degrees = 0;
-    bool box = pal_item_has(item, "low_m") || pal_item_has(item, "high_m");
-    if (box && pal_item_has(item, "lowest"))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", item->path);
-    if (box && !(pal_item_has(item, "low_m") && pal_item_has(item, "high_m")))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", item->path);
+    bool box = pal_entry_has(item, "low_m") || pal_entry_has(item, "high_m");
+    if (box && pal_entry_has(item, "lowest"))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", item->path);
+    if (box && !(pal_entry_has(item, "low_m") && pal_entry_has(item, "high_m")))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", item->path);
     if (box) *lowest = NAN;
-    PAL_TRY(pal_item_numbers(item, "low_m", 3, low, note));
-    PAL_TRY(pal_item_numbers(item, "high_m", 3, high, note));
-    PAL_TRY(pal_item_number(item, "lowest", 0, 1, lowest, note));
-    PAL_TRY(pal_item_numbers(item, "shift_m", 3, row->shift_m, note));
-    PAL_TRY(pal_item_numbers(item, "turn_axis", 3, row->axis, note));
-    PAL_TRY(pal_item_number(item, "turn_deg", -1e6, 1e6, &degrees, note));
-    PAL_TRY(pal_item_number(item, "rise_s", 0, 1e6, &row->rise_s, note));
-    PAL_TRY(pal_item_number(item, "period_s", 0, 1e6, &row->period_s, note));
-    PAL_TRY(pal_item_done(item, note));
+    PAL_TRY(pal_entry_read_numbers(item, "low_m", 3, low, diag));
+    PAL_TRY(pal_entry_read_numbers(item, "high_m", 3, high, diag));
+    PAL_TRY(pal_entry_read_number(item, "lowest", 0, 1, lowest, diag));
+    PAL_TRY(pal_entry_read_numbers(item, "shift_m", 3, row->shift_m, diag));
+    PAL_TRY(pal_entry_read_numbers(item, "turn_axis", 3, row->axis, diag));
+    PAL_TRY(pal_entry_read_number(item, "turn_deg", -1e6, 1e6, &degrees, diag));
+    PAL_TRY(pal_entry_read_number(item, "rise_s", 0, 1e6, &row->rise_s, diag));
+    PAL_TRY(pal_entry_read_number(item, "period_s", 0, 1e6, &row->period_s, diag));
+    PAL_TRY(pal_entry_check_unused(item, diag));
     row->angle = degrees * M_PI / 180;
     if (!pal_unit3(row->axis, row->axis, 0))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: turn_axis has no direction", item->path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: turn_axis has no direction", item->path);
     return PAL_ERR_OK;
 }
 
@@ -52,7 +52,7 @@ static bool inside(const double x[3], const double low[3], const double high[3])
     return true;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     pal_body *body = build->body;
     double low[3] = {0}, high[3] = {0}, lowest = 0.05, least = INFINITY, most = -INFINITY;
@@ -60,7 +60,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     moving_support *row = PAL_NEW(build->arena, moving_support, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->axis[2] = 1;
-    PAL_TRY(read_keys(row, item, build->note, low, high, &lowest));
+    PAL_TRY(read_keys(row, item, build->diag, low, high, &lowest));
     row->rise_s = fmax(row->rise_s, build->scene->step_s);
     row->node = PAL_NEW(build->arena, int32_t, body->n_dof);
     if (!row->node) return PAL_ERR_MEMORY;
@@ -73,13 +73,13 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     for (int i = 0; i < body->n_dof; i++) {
         const double *x = body->x_rest + 3 * (size_t)i;
         if (isnan(lowest) ? !inside(x, low, high) : pal_dot3(x, up) > top) continue;
-        body->held[i] = 2;
+        body->fixed[i] = 2;
         pal_add3(row->centre, row->centre, x);
         row->node[row->n_node++] = i;
     }
     if (row->n_node == 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: moving_support holds none of the body's %d nodes",
-                            item->path, body->n_dof);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: moving_support holds none of the body's %d nodes",
+                                  item->path, body->n_dof);
     pal_scale3(row->centre, 1.0 / row->n_node, row->centre);
     *self = row;
     return PAL_ERR_OK;
@@ -107,7 +107,7 @@ static pal_err run(void *self, pal_step *step)
         pal_axpy3(way, s, row->shift_m);
         pal_sub3(way, way, body->x + k);
         /* what is rounding only is no motion */
-        bool there = pal_norm3(way) <= 1e-14 * body->size_m;
+        bool there = pal_norm3(way) <= 1e-14 * body->length_scale_m;
         pal_scale3(v, there ? 0 : 1 / step->dt_s, way);
     }
     return PAL_ERR_OK;

@@ -30,24 +30,24 @@ static bool chosen(const double x[3], bool box, const double low[3], const doubl
     return true;
 }
 
-static pal_err read_keys(penalty *row, pal_item *item, const pal_build *build, bool *box, double low[3], double high[3],
-                         double *lowest)
+static pal_err read_keys(penalty *row, pal_config_entry *item, const pal_build *build, bool *box, double low[3],
+                         double high[3], double *lowest)
 {
-    *box = pal_item_has(item, "low_m") || pal_item_has(item, "high_m");
-    if (*box && pal_item_has(item, "lowest"))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", item->path);
-    if (*box && !(pal_item_has(item, "low_m") && pal_item_has(item, "high_m")))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", item->path);
-    PAL_TRY(pal_item_numbers(item, "low_m", 3, low, build->note));
-    PAL_TRY(pal_item_numbers(item, "high_m", 3, high, build->note));
-    PAL_TRY(pal_item_number(item, "lowest", 0, 1, lowest, build->note));
-    row->per_young = pal_item_has(item, "k_N_m") ? 0 : sizes * build->body->size_m;
+    *box = pal_entry_has(item, "low_m") || pal_entry_has(item, "high_m");
+    if (*box && pal_entry_has(item, "lowest"))
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", item->path);
+    if (*box && !(pal_entry_has(item, "low_m") && pal_entry_has(item, "high_m")))
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", item->path);
+    PAL_TRY(pal_entry_read_numbers(item, "low_m", 3, low, build->diag));
+    PAL_TRY(pal_entry_read_numbers(item, "high_m", 3, high, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "lowest", 0, 1, lowest, build->diag));
+    row->per_young = pal_entry_has(item, "k_N_m") ? 0 : sizes * build->body->length_scale_m;
     row->k_N_m = row->per_young * build->def->material.young_Pa;
-    PAL_TRY(pal_item_number(item, "k_N_m", 1e-12, 1e60, &row->k_N_m, build->note));
-    return pal_item_done(item, build->note);
+    PAL_TRY(pal_entry_read_number(item, "k_N_m", 1e-12, 1e60, &row->k_N_m, build->diag));
+    return pal_entry_check_unused(item, build->diag);
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
     double low[3] = {0}, high[3] = {0}, lowest = 0.05, least = INFINITY, most = -INFINITY, mass = 0;
@@ -55,9 +55,9 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     penalty *row = PAL_NEW(build->arena, penalty, 1);
     if (!row) return PAL_ERR_MEMORY;
     PAL_TRY(read_keys(row, item, build, &box, low, high, &lowest));
-    if (body->shell)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: penalty holds no body that adapts: give it supports",
-                            item->path);
+    if (body->adaptive)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: penalty holds no body that adapts: give it supports", item->path);
     row->node = PAL_NEW(build->arena, int32_t, body->n_node);
     row->share = PAL_NEW(build->arena, double, body->n_node);
     if (!row->node || !row->share) return PAL_ERR_MEMORY;
@@ -75,8 +75,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         mass += body->node_mass_kg[i];
     }
     if (row->n_node == 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: penalty holds none of the body's %d nodes", item->path,
-                            body->n_node);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: penalty holds none of the body's %d nodes",
+                                  item->path, body->n_node);
     for (int n = 0; n < row->n_node; n++) row->share[n] /= mass;
     *self = row;
     return PAL_ERR_OK;
@@ -112,13 +112,13 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const penalty *row = self;
-    for (int n = 0; n < row->n_node && !body->embed; n++) bound_N_m[row->node[n]] += row->k_N_m * row->share[n];
+    for (int n = 0; n < row->n_node && !body->interpolation; n++) bound_N_m[row->node[n]] += row->k_N_m * row->share[n];
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     penalty *row = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     if (row->per_young > 0) row->k_N_m = row->per_young * to->young_Pa;
     return PAL_ERR_OK;
 }

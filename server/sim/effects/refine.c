@@ -24,7 +24,7 @@
  * 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (absent: 0.3/h_0); 0 switches a criterion off, and with all three off nothing
  * ever changes. What stands as it was looked at last is looked at again after dwell_s only; until that has found
  * nothing to do, now or later, the body does not sleep (row sleep). dwell_s (0.2), every_s
- * (1/120), most_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
+ * (1/120), max_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/core/effect_list.h"
@@ -37,15 +37,15 @@ enum { NOTHING, SPLIT, JOIN };
 static const double still_h = 1e-4; /* of the mean edge of level 0 */
 
 typedef struct refine {
-    pal_shell *shell;
+    pal_adaptive_surface *adaptive;
     pal_body *body;
     pal_refine_measure measure;
     pal_refine_limits limits;
     bool given_force, given_speed; /* by the scene: a live edit of the material leaves them */
     double k_N_m;                  /* given by the model; 0: from the material             */
-    double thickness_m, h_m, kg_per_density;
+    double thickness_m, edge_m, kg_per_density;
     double dwell_s, every_s, ramp_s;
-    int most_node;
+    int max_node;
 
     double clock_s, wait_s;           /* simulated since reset; until the next evaluation              */
     double seen_s, seen_load2, way_m; /* clock and sum of squared loads at the last one; no node went farther since */
@@ -60,7 +60,7 @@ typedef struct refine {
     double *still, *bound_N_m;        /* velocities 0 [n_vertex][3]; stiffness of the rows [n_vertex]   */
     double spring_slope, shape_slope; /* of the ramps, 1/s                                             */
     double inner_J;                   /* kinetic beside the rigid motion, before the switch             */
-    pal_switch_report report;
+    pal_refine_history report;
 } refine;
 
 /* shares: of the mass, of the energy, of the largest inertia */
@@ -72,7 +72,7 @@ enum { MOST_PATIENCE = 3, LET_DOWN_MOST = 8 };
 
 static void clear(refine *row)
 {
-    const pal_levels *levels = &row->shell->levels;
+    const pal_levels *levels = &row->adaptive->levels;
     for (int32_t f = 0; f < levels->first_face[levels->n_level]; f++) {
         row->switched_s[f] = -INFINITY;
         row->patience[f] = 0;
@@ -81,7 +81,7 @@ static void clear(refine *row)
     row->seen_revision = 0;
     row->put_off = row->seen_twice = false;
     for (int32_t i = 0; i < levels->n_vertex[levels->n_level - 1]; i++) row->seen[i] = 0;
-    row->report = (pal_switch_report){0};
+    row->report = (pal_refine_history){0};
     pal_set3(row->measure.frame.quat + 1, 0, 0, 0);
     row->measure.frame.quat[0] = 1;
 }
@@ -91,28 +91,28 @@ static void derive(refine *row, const pal_material *material)
 {
     double k = row->k_N_m > 0 ? row->k_N_m : 0.5 * sqrt(3) * material->young_Pa * row->thickness_m;
     double m = row->kg_per_density * material->density_kg_m3;
-    if (!row->given_force) row->limits.force_N = 0.005 * k * row->h_m;
-    if (!row->given_speed) row->limits.speed_m_s = 0.05 * row->h_m * sqrt(k / m);
+    if (!row->given_force) row->limits.force_N = 0.005 * k * row->edge_m;
+    if (!row->given_speed) row->limits.speed_m_s = 0.05 * row->edge_m * sqrt(k / m);
 }
 
-static pal_err read_keys(refine *row, pal_item *item, const pal_build *build)
+static pal_err read_keys(refine *row, pal_config_entry *item, const pal_build *build)
 {
-    pal_note *note = build->note;
-    pal_item model = build->def->model;
+    pal_diagnostic *diag = build->diag;
+    pal_config_entry model = build->def->model;
     row->thickness_m = 0.003, row->dwell_s = 0.2, row->every_s = 1.0 / 120, row->ramp_s = 0.15;
-    PAL_TRY(pal_item_number(&model, "thickness_m", 1e-9, 1e9, &row->thickness_m, note));
-    PAL_TRY(pal_item_number(&model, "k_spring_N_m", 0, 1e30, &row->k_N_m, note));
-    row->given_force = pal_item_has(item, "force_N"), row->given_speed = pal_item_has(item, "speed_m_s");
-    row->limits.curvature_1_m = 0.3 / row->h_m;
+    PAL_TRY(pal_entry_read_number(&model, "thickness_m", 1e-9, 1e9, &row->thickness_m, diag));
+    PAL_TRY(pal_entry_read_number(&model, "k_spring_N_m", 0, 1e30, &row->k_N_m, diag));
+    row->given_force = pal_entry_has(item, "force_N"), row->given_speed = pal_entry_has(item, "speed_m_s");
+    row->limits.curvature_1_m = 0.3 / row->edge_m;
     derive(row, &build->def->material);
-    PAL_TRY(pal_item_number(item, "force_N", 0, 1e12, &row->limits.force_N, note));
-    PAL_TRY(pal_item_number(item, "speed_m_s", 0, 1e12, &row->limits.speed_m_s, note));
-    PAL_TRY(pal_item_number(item, "curvature_1_m", 0, 1e12, &row->limits.curvature_1_m, note));
-    PAL_TRY(pal_item_number(item, "dwell_s", 0, 1e6, &row->dwell_s, note));
-    PAL_TRY(pal_item_number(item, "every_s", 0, 1e6, &row->every_s, note));
-    PAL_TRY(pal_item_number(item, "ramp_s", 0, 1e6, &row->ramp_s, note));
-    PAL_TRY(pal_item_count(item, "most_node", 0, INT_MAX, &row->most_node, note));
-    return pal_item_done(item, note);
+    PAL_TRY(pal_entry_read_number(item, "force_N", 0, 1e12, &row->limits.force_N, diag));
+    PAL_TRY(pal_entry_read_number(item, "speed_m_s", 0, 1e12, &row->limits.speed_m_s, diag));
+    PAL_TRY(pal_entry_read_number(item, "curvature_1_m", 0, 1e12, &row->limits.curvature_1_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "dwell_s", 0, 1e6, &row->dwell_s, diag));
+    PAL_TRY(pal_entry_read_number(item, "every_s", 0, 1e6, &row->every_s, diag));
+    PAL_TRY(pal_entry_read_number(item, "ramp_s", 0, 1e6, &row->ramp_s, diag));
+    PAL_TRY(pal_entry_read_count(item, "most_node", 0, INT_MAX, &row->max_node, diag));
+    return pal_entry_check_unused(item, diag);
 }
 
 static double mean_edge(const pal_levels *levels)
@@ -125,25 +125,25 @@ static double mean_edge(const pal_levels *levels)
     return sum / levels->first_edge[1];
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_shell *shell = build->body->shell;
-    if (!shell)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: refine needs a surface of levels, model adaptive_springs", item->path);
-    const pal_levels *levels = &shell->levels;
+    pal_adaptive_surface *adaptive = build->body->adaptive;
+    if (!adaptive)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: refine needs a surface of levels, model adaptive_springs", item->path);
+    const pal_levels *levels = &adaptive->levels;
     size_t n_vertex = (size_t)levels->n_vertex[levels->n_level - 1];
     refine *row = PAL_NEW(build->arena, refine, 1);
     if (!row) return PAL_ERR_MEMORY;
-    row->shell = shell;
+    row->adaptive = adaptive;
     row->body = build->body;
-    row->h_m = mean_edge(levels);
-    row->kg_per_density = shell->level_mass_kg[0] / build->def->material.density_kg_m3;
+    row->edge_m = mean_edge(levels);
+    row->kg_per_density = adaptive->level_mass_kg[0] / build->def->material.density_kg_m3;
     PAL_TRY(read_keys(row, item, build));
-    PAL_TRY(pal_refine_measure_make(&row->measure, shell, build->arena));
+    PAL_TRY(pal_refine_measure_make(&row->measure, adaptive, build->arena));
     row->switched_s = PAL_NEW(build->arena, double, levels->first_face[levels->n_level]);
     row->patience = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
-    row->wish = PAL_NEW(build->arena, uint8_t, shell->n_slot);
+    row->wish = PAL_NEW(build->arena, uint8_t, adaptive->n_slot);
     row->mass_was = PAL_NEW(build->arena, double, n_vertex);
     row->seen = PAL_NEW(build->arena, uint64_t, n_vertex);
     row->still = PAL_NEW(build->arena, double, 3 * n_vertex);
@@ -156,9 +156,9 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    (void)body, (void)note;
+    (void)body, (void)diag;
     derive(self, to);
     return PAL_ERR_OK;
 }
@@ -168,7 +168,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 /* has the face kept its state long enough? */
 static bool settled(const refine *row, int32_t face)
 {
-    bool split = row->shell->face_state[face] == PAL_FACE_SPLIT;
+    bool split = row->adaptive->face_state[face] == PAL_FACE_SPLIT;
     return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->patience[face] : 0) * (1 - 1e-9);
 }
 
@@ -186,13 +186,13 @@ static void note_split(refine *row, int32_t face)
 /* may the leaf be split, and with it the coarser neighbours that 2:1 asks for? */
 static bool may_split(const refine *row, int32_t face)
 {
-    const pal_shell *shell = row->shell;
-    const pal_levels *levels = &shell->levels;
+    const pal_adaptive_surface *adaptive = row->adaptive;
+    const pal_levels *levels = &adaptive->levels;
     if (!settled(row, face)) return false;
     for (int k = 0; k < 3; k++) {
         const pal_winged_edge *edge = &levels->edge[levels->face_edge[3 * (size_t)face + k]];
         int32_t beside = edge->face[edge->face[0] == face];
-        if (beside < 0 || shell->face_state[beside] != PAL_FACE_ABSENT) continue;
+        if (beside < 0 || adaptive->face_state[beside] != PAL_FACE_ABSENT) continue;
         if (!may_split(row, pal_levels_face_parent(levels, beside))) return false;
     }
     return true;
@@ -200,14 +200,14 @@ static bool may_split(const refine *row, int32_t face)
 
 static bool wants_split(const refine *row, int32_t leaf)
 {
-    const pal_shell *shell = row->shell;
-    const pal_levels *levels = &shell->levels;
+    const pal_adaptive_surface *adaptive = row->adaptive;
+    const pal_levels *levels = &adaptive->levels;
     if (levels->face_level[leaf] + 1 >= levels->n_level) return false;
     for (int k = 0; k < 3; k++) {
         int32_t edge = levels->face_edge[3 * (size_t)leaf + k];
-        if (row->measure.mark[levels->face[3 * (size_t)leaf + k]] == PAL_REFINE_STRONG) return true;
-        if (shell->edge_split[edge] > 0 &&
-            row->measure.mark[pal_levels_edge_midpoint(levels, edge)] == PAL_REFINE_STRONG)
+        if (row->measure.mark[levels->face[3 * (size_t)leaf + k]] == PAL_REFINE_REQUESTED) return true;
+        if (adaptive->edge_split[edge] > 0 &&
+            row->measure.mark[pal_levels_edge_midpoint(levels, edge)] == PAL_REFINE_REQUESTED)
             return true;
     }
     return false;
@@ -216,24 +216,25 @@ static bool wants_split(const refine *row, int32_t leaf)
 /* does the edge's midpoint stand where the coarse edge would have it, but for a bend far below the threshold? */
 static bool is_straight(const refine *row, const pal_body *body, int32_t edge)
 {
-    const pal_shell *shell = row->shell;
-    const int32_t *end = shell->levels.edge[edge].vertex, middle = pal_levels_edge_midpoint(&shell->levels, edge);
+    const pal_adaptive_surface *adaptive = row->adaptive;
+    const int32_t *end = adaptive->levels.edge[edge].vertex, middle = pal_levels_edge_midpoint(&adaptive->levels, edge);
     if (!(row->limits.curvature_1_m > 0)) return true;
     double at[3], h = pal_dist3(body->x_rest + 3 * (size_t)end[0], body->x_rest + 3 * (size_t)end[1]);
-    double bend = row->limits.curvature_1_m * ldexp(1, shell->levels.edge_level[edge]);
-    pal_shell_middle(shell, body, edge, at);
+    double bend = row->limits.curvature_1_m * ldexp(1, adaptive->levels.edge_level[edge]);
+    pal_adaptive_midpoint(adaptive, body, edge, at);
     return pal_dist3(at, body->x + 3 * (size_t)middle) < 0.25 * bend * h * h / 8;
 }
 
 static bool wants_join(const refine *row, const pal_body *body, int32_t face)
 {
-    const pal_levels *levels = &row->shell->levels;
+    const pal_levels *levels = &row->adaptive->levels;
     for (int k = 0; k < 3; k++) {
         int32_t middle = pal_levels_edge_midpoint(levels, levels->face_edge[3 * (size_t)face + k]);
         if (row->measure.mark[levels->face[3 * (size_t)face + k]] != PAL_REFINE_QUIET) return false;
         if (row->measure.mark[middle] != PAL_REFINE_QUIET) return false;
         if (!is_straight(row, body, levels->face_edge[3 * (size_t)face + k])) return false;
-        if (body->outer && pal_dot3(body->outer + 3 * (size_t)middle, body->outer + 3 * (size_t)middle) > 0)
+        if (body->external_force &&
+            pal_dot3(body->external_force + 3 * (size_t)middle, body->external_force + 3 * (size_t)middle) > 0)
             return false;
     }
     return true;
@@ -249,15 +250,15 @@ static int32_t parent_of_first(const pal_levels *levels, int32_t leaf)
 /* fills wish for the leaves of the list; false: there is none */
 static bool take_wishes(refine *row, const pal_body *body)
 {
-    const pal_shell *shell = row->shell;
+    const pal_adaptive_surface *adaptive = row->adaptive;
     bool any = false;
     row->put_off = false;
-    for (int k = 0; k < shell->n_leaf; k++) {
-        int32_t leaf = shell->leaf[k], parent = parent_of_first(&shell->levels, leaf);
+    for (int k = 0; k < adaptive->n_leaf; k++) {
+        int32_t leaf = adaptive->leaf[k], parent = parent_of_first(&adaptive->levels, leaf);
         int wish = NOTHING;
         if (wants_split(row, leaf))
             wish = SPLIT;
-        else if (parent >= 0 && pal_shell_can_join(shell, parent) && wants_join(row, body, parent))
+        else if (parent >= 0 && pal_adaptive_can_join(adaptive, parent) && wants_join(row, body, parent))
             wish = JOIN;
         const bool now = wish == SPLIT ? may_split(row, leaf) : wish == NOTHING || settled(row, parent);
         row->put_off |= !now;
@@ -271,18 +272,18 @@ static bool take_wishes(refine *row, const pal_body *body)
 
 static bool grant_wishes(refine *row, pal_body *body)
 {
-    pal_shell *shell = row->shell;
+    pal_adaptive_surface *adaptive = row->adaptive;
     uint64_t n_split = 0, n_join = 0;
-    for (int k = 0; k < shell->n_leaf; k++)
-        if (row->wish[k] == SPLIT && shell->face_state[shell->leaf[k]] == PAL_FACE_LEAF)
-            n_split += (uint64_t)pal_shell_split(shell, body, shell->leaf[k], row->most_node);
+    for (int k = 0; k < adaptive->n_leaf; k++)
+        if (row->wish[k] == SPLIT && adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_LEAF)
+            n_split += (uint64_t)pal_adaptive_split(adaptive, body, adaptive->leaf[k], row->max_node);
     /* every leaf of the list is split at most once in a switch, by its own wish or a neighbour's */
-    for (int k = 0; k < shell->n_leaf && n_split > 0; k++)
-        if (shell->face_state[shell->leaf[k]] == PAL_FACE_SPLIT) note_split(row, shell->leaf[k]);
-    for (int k = 0; k < shell->n_leaf; k++) {
+    for (int k = 0; k < adaptive->n_leaf && n_split > 0; k++)
+        if (adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_SPLIT) note_split(row, adaptive->leaf[k]);
+    for (int k = 0; k < adaptive->n_leaf; k++) {
         if (row->wish[k] != JOIN) continue;
-        int32_t parent = pal_levels_face_parent(&shell->levels, shell->leaf[k]);
-        if (!pal_shell_can_join(shell, parent) || !pal_shell_join(shell, body, parent)) continue;
+        int32_t parent = pal_levels_face_parent(&adaptive->levels, adaptive->leaf[k]);
+        if (!pal_adaptive_can_join(adaptive, parent) || !pal_adaptive_join(adaptive, body, parent)) continue;
         row->switched_s[parent] = row->clock_s;
         n_join++;
     }
@@ -306,11 +307,11 @@ static bool let_down_once(refine *row, pal_step *step)
     /* v as well: the frame of anchors is fitted to it */
     double *v = body->v, *dv = body->dv;
     body->v = body->dv = row->still;
-    bool done = pal_gather(step) == PAL_ERR_OK;
+    bool done = pal_assemble_forces(step) == PAL_ERR_OK;
     body->v = v, body->dv = dv;
     for (int k = 0; k < body->n_active && done; k++) {
         const size_t i = (size_t)pal_body_point(body, k);
-        if (row->seen[i] == row->report.n_switch || body->held[i] || !(row->bound_N_m[i] > 0)) continue;
+        if (row->seen[i] == row->report.n_switch || body->fixed[i] || !(row->bound_N_m[i] > 0)) continue;
         double move[3];
         for (int c = 0; c < 3; c++)
             move[c] = (body->f[3 * i + (size_t)c] - body->load[3 * i + (size_t)c]) / row->bound_N_m[i];
@@ -324,8 +325,8 @@ static bool let_down_once(refine *row, pal_step *step)
 static void let_down(refine *row, pal_step *step)
 {
     const pal_body *body = step->body;
-    const pal_switch_side *before = &row->report.before;
-    const double was = pal_switch_total_J(before) - before->kinetic_J, least = ramp_from * (was + row->inner_J);
+    const pal_refine_balance *before = &row->report.before;
+    const double was = pal_refine_balance_total_J(before) - before->kinetic_J, least = ramp_from * (was + row->inner_J);
     for (int k = 0; k < body->n_active; k++) row->bound_N_m[pal_body_point(body, k)] = 0;
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->stiffness)
@@ -337,7 +338,7 @@ static void let_down(refine *row, pal_step *step)
 /* free, and of the changed region, where that is not all of the body */
 static bool in_region(const refine *row, const pal_body *body, bool whole, int i)
 {
-    if (body->held[i]) return false;
+    if (body->fixed[i]) return false;
     if (whole || row->seen[i] != row->report.n_switch) return true;
     return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
 }
@@ -352,20 +353,20 @@ static double ramp_after(double ramp, double was, double now, double other)
 /* sets the ramps; returns by how much the energy of springs and anchors has grown all the same, J */
 static double keep_elastic(refine *row)
 {
-    const pal_switch_side *before = &row->report.before, *raw = &row->report.raw;
-    pal_shell *shell = row->shell;
-    double was[2] = {shell->spring_ramp, shell->shape_ramp};
+    const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
+    pal_adaptive_surface *adaptive = row->adaptive;
+    double was[2] = {adaptive->spring_ramp, adaptive->shape_ramp};
     double least = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
     if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > least) {
-        shell->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
-        row->spring_slope = (1 - shell->spring_ramp) / row->ramp_s;
+        adaptive->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
+        row->spring_slope = (1 - adaptive->spring_ramp) / row->ramp_s;
     }
     if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > least) {
-        shell->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
-        row->shape_slope = (1 - shell->shape_ramp) / row->ramp_s;
+        adaptive->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
+        row->shape_slope = (1 - adaptive->shape_ramp) / row->ramp_s;
     }
-    return raw->spring_J * shell->spring_ramp / was[0] - before->spring_J + raw->shape_J * shell->shape_ramp / was[1] -
-           before->shape_J;
+    return raw->spring_J * adaptive->spring_ramp / was[0] - before->spring_J +
+           raw->shape_J * adaptive->shape_ramp / was[1] - before->shape_J;
 }
 
 /* the region's free nodes as one: their mean motion is rigid, V + Omega x (x - centre) */
@@ -433,7 +434,7 @@ static bool find_region(const refine *row, const pal_body *body, bool whole, reg
  * was done, which with the whole body never happens */
 static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool whole)
 {
-    const pal_switch_side *before = &row->report.before, *raw = &row->report.raw;
+    const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
     region r;
     double Omega[3], V[3], turn[3], spin[3], push[3], moment[3], arm[3], d[3], rigid[3];
     if (!find_region(row, body, whole, &r, Omega)) return whole;
@@ -475,11 +476,11 @@ static double ease(double ramp, double *slope, double dt_s)
 static void change(refine *row, pal_step *step)
 {
     pal_body *body = step->body;
-    pal_switch_report *report = &row->report;
-    pal_switch_side before;
-    pal_switch_take(&before, step);
+    pal_refine_history *report = &row->report;
+    pal_refine_balance before;
+    pal_refine_balance_compute(&before, step);
     /* a state that is no number is left to the guard */
-    if (!isfinite(pal_switch_total_J(&before))) return;
+    if (!isfinite(pal_refine_balance_total_J(&before))) return;
     region whole;
     double Omega[3];
     row->inner_J = find_region(row, body, true, &whole, Omega) ? whole.inner_J : 0;
@@ -493,14 +494,14 @@ static void change(refine *row, pal_step *step)
         report->n_switch--;
         return;
     }
-    pal_shell_update(row->shell, body);
+    pal_adaptive_update(row->adaptive, body);
     report->time_s = row->clock_s;
     report->before = before;
     if (row->ramp_s > 0) let_down(row, step);
-    pal_switch_take(&report->raw, step);
+    pal_refine_balance_compute(&report->raw, step);
     double gained_J = keep_elastic(row);
     if (!keep_motion(row, body, gained_J, false)) keep_motion(row, body, gained_J, true);
-    pal_switch_take(&report->after, step);
+    pal_refine_balance_compute(&report->after, step);
 }
 
 /* would an evaluation look at what the last one saw? */
@@ -515,7 +516,7 @@ static bool is_still(refine *row, const pal_body *body, double dt_s, double *loa
         *load2 += pal_dot3(body->load + i, body->load + i);
     }
     row->way_m += dt_s * sqrt(most2);
-    return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->h_m &&
+    return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->edge_m &&
            fabs(*load2 - row->seen_load2) <= 1e-6 * *load2;
 }
 
@@ -527,11 +528,11 @@ static bool evaluates(const refine *row)
 static pal_err run(void *self, pal_step *step)
 {
     refine *row = self;
-    pal_shell *shell = row->shell;
+    pal_adaptive_surface *adaptive = row->adaptive;
     row->clock_s += step->dt_s;
     row->wait_s -= step->dt_s;
-    shell->spring_ramp = ease(shell->spring_ramp, &row->spring_slope, step->dt_s);
-    shell->shape_ramp = ease(shell->shape_ramp, &row->shape_slope, step->dt_s);
+    adaptive->spring_ramp = ease(adaptive->spring_ramp, &row->spring_slope, step->dt_s);
+    adaptive->shape_ramp = ease(adaptive->shape_ramp, &row->shape_slope, step->dt_s);
     double load2;
     const bool still = is_still(row, step->body, step->dt_s, &load2);
     if (row->wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
@@ -540,7 +541,7 @@ static pal_err run(void *self, pal_step *step)
     if (still && row->clock_s - row->seen_s < row->dwell_s) return PAL_ERR_OK;
     row->seen_revision = step->body->revision + 1, row->seen_s = row->clock_s;
     row->seen_load2 = load2, row->way_m = 0;
-    pal_refine_mark_nodes(&row->measure, shell, step->body, &row->limits);
+    pal_refine_mark_nodes(&row->measure, adaptive, step->body, &row->limits);
     const uint64_t n_switch = row->report.n_switch;
     if (take_wishes(row, step->body)) change(row, step);
     row->seen_twice = still && row->report.n_switch == n_switch;
@@ -560,18 +561,18 @@ static void reset(void *self, const pal_body *body)
 {
     (void)body;
     refine *row = self;
-    pal_shell_level(row->shell, row->body, row->shell->options.start_level);
-    pal_shell_update(row->shell, row->body);
+    pal_adaptive_set_level(row->adaptive, row->body, row->adaptive->options.start_level);
+    pal_adaptive_update(row->adaptive, row->body);
     clear(row);
 }
 
 /* clocks, patience and factors of the same surface in another world; of another number of levels they begin anew */
-static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
+static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;
     const refine *was = before;
-    const pal_levels *levels = &row->shell->levels;
-    if (by->place || levels->n_level != was->shell->levels.n_level) return;
+    const pal_levels *levels = &row->adaptive->levels;
+    if (by->place || levels->n_level != was->adaptive->levels.n_level) return;
     const size_t n_face = (size_t)levels->first_face[levels->n_level];
     memcpy(row->switched_s, was->switched_s, n_face * sizeof *row->switched_s);
     memcpy(row->patience, was->patience, n_face * sizeof *row->patience);
@@ -582,7 +583,7 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
     memcpy(row->measure.frame.quat, was->measure.frame.quat, sizeof row->measure.frame.quat);
 }
 
-const pal_switch_report *pal_refine_report(const void *self)
+const pal_refine_history *pal_refine_report(const void *self)
 {
     return &((const refine *)self)->report;
 }

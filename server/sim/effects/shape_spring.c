@@ -4,10 +4,10 @@
  * mass, they add up to the same whatever is refined and pull every level alike: translation has (w^2 = k'/m_0).
  *
  * frame "world": the places at rest themselves, R 1, V and Omega 0; the force goes to the ground.
- * frame "body": the rigid frame that fits the body best (shell.h), so that the body may move freely. The fit is
- * weighted by mass as the anchors are; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2, the force
- * is its exact gradient although the frame follows (envelope theorem), and neither force nor damping has a resultant or
- * a moment.
+ * frame "body": the rigid frame that fits the body best (adaptive_surface.h), so that the body may move freely. The fit
+ * is weighted by mass as the anchors are; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2, the
+ * force is its exact gradient although the frame follows (envelope theorem), and neither force nor damping has a
+ * resultant or a moment.
  *
  * Departures: errata C7 (the paper's damping is divided by the spring's length, which is 0 at rest, and its anchors
  * stop rigid motion) and C6 (its constant does not know levels: refinement stiffens 4 times a level).
@@ -16,8 +16,8 @@
  * (as the model has it). What is not given follows a live material edit. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/surface/pack.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/active_nodes.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
@@ -25,7 +25,7 @@ typedef struct shape_spring {
     double k_N_m, c_Ns_m; /* of a node of level 0; c_Ns_m < 0: from k_N_m and its mass */
     double per_young;     /* k_N_m over the material's E; 0: given                      */
     bool world;
-    pal_shell_frame frame; /* of the last run */
+    pal_rigid_fit frame; /* of the last run */
 } shape_spring;
 
 /* x -> R x + shift is the place where a node belongs, v -> V + Omega x x its velocity there; constants per mass */
@@ -38,10 +38,10 @@ static const double anchor_share = 0.3, damping_share = 0.6;
 /* k' as the model's keys have it, and how it goes with E */
 static pal_err derive(shape_spring *row, pal_build *build)
 {
-    pal_item model = build->def->model;
+    pal_config_entry model = build->def->model;
     double thickness_m = 0.003, k_0 = -1, young_Pa = build->def->material.young_Pa;
-    PAL_TRY(pal_item_number(&model, "thickness_m", 1e-9, 1e9, &thickness_m, build->note));
-    PAL_TRY(pal_item_number(&model, "k_spring_N_m", 0, 1e60, &k_0, build->note));
+    PAL_TRY(pal_entry_read_number(&model, "thickness_m", 1e-9, 1e9, &thickness_m, build->diag));
+    PAL_TRY(pal_entry_read_number(&model, "k_spring_N_m", 0, 1e60, &k_0, build->diag));
     row->per_young = k_0 < 0 ? anchor_share * sqrt(0.75) * thickness_m : 0;
     row->k_N_m = k_0 < 0 ? row->per_young * young_Pa : anchor_share * k_0;
     return PAL_ERR_OK;
@@ -49,62 +49,63 @@ static pal_err derive(shape_spring *row, pal_build *build)
 
 static void turn_back(shape_spring *row)
 {
-    row->frame = (pal_shell_frame){.quat = {1, 0, 0, 0}};
+    row->frame = (pal_rigid_fit){.quat = {1, 0, 0, 0}};
 }
 
 static bool is_held(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i]) return true;
+        if (body->fixed[i]) return true;
     return false;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const char *frame = is_held(build->body) ? "world" : "body";
-    if (!build->body->shell)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                            item->path, item->name);
+    if (!build->body->adaptive)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
+                                  item->path, item->name);
     shape_spring *row = PAL_NEW(build->arena, shape_spring, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->c_Ns_m = -1;
-    if (!pal_item_has(item, "k_N_m")) PAL_TRY(derive(row, build));
-    PAL_TRY(pal_item_number(item, "k_N_m", 0, 1e60, &row->k_N_m, build->note));
-    PAL_TRY(pal_item_number(item, "c_Ns_m", 0, 1e60, &row->c_Ns_m, build->note));
-    PAL_TRY(pal_item_text(item, "frame", &frame, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    if (!pal_entry_has(item, "k_N_m")) PAL_TRY(derive(row, build));
+    PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &row->k_N_m, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &row->c_Ns_m, build->diag));
+    PAL_TRY(pal_entry_read_text(item, "frame", &frame, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (strcmp(frame, "body") != 0 && strcmp(frame, "world") != 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.frame: \"%s\", wanted \"body\" or \"world\"", item->path,
-                            frame);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.frame: \"%s\", wanted \"body\" or \"world\"",
+                                  item->path, frame);
     row->world = frame[0] == 'w';
     turn_back(row);
-    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
+    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
     *self = row;
     return PAL_ERR_OK;
 }
 
 /* constants over mass */
-static double stiff_1_s2(const shape_spring *row, const pal_shell *shell)
+static double stiff_1_s2(const shape_spring *row, const pal_adaptive_surface *adaptive)
 {
-    return row->k_N_m * shell->shape_ramp / shell->level_mass_kg[0];
+    return row->k_N_m * adaptive->shape_ramp / adaptive->level_mass_kg[0];
 }
 
-static double damp_1_s(const shape_spring *row, const pal_shell *shell)
+static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adaptive)
 {
-    double m = shell->level_mass_kg[0];
+    double m = adaptive->level_mass_kg[0];
     return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
 }
 
 /* frame: where the last fit ended, and the new one; packed: of body->pack */
-static hold find_hold(const shape_spring *row, const pal_body *body, pal_shell_frame *frame, bool packed)
+static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_fit *frame, bool packed)
 {
-    hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .k = stiff_1_s2(row, body->shell), .c = damp_1_s(row, body->shell)};
+    hold h = {
+        .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .k = stiff_1_s2(row, body->adaptive), .c = damp_1_s(row, body->adaptive)};
     if (row->world) return h;
     double at[3];
     if (packed)
-        pal_shell_fit_pack(body->shell, body->pack, frame);
+        pal_adaptive_fit_rigid_active(body->adaptive, body->pack, frame);
     else
-        pal_shell_fit_frame(body->shell, body, frame);
+        pal_adaptive_fit_rigid(body->adaptive, body, frame);
     memcpy(h.R, frame->R, sizeof h.R);
     pal_mul33(at, h.R, frame->rest_centre_m);
     pal_sub3(h.shift, frame->centre_m, at);
@@ -126,11 +127,11 @@ static pal_err pull(void *self, pal_step *step)
 {
     shape_spring *row = self;
     const pal_body *body = step->body;
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     const hold h = find_hold(row, body, &row->frame, true);
     if (row->world) {
         for (int k = 0; k < body->n_active; k++) {
-            pal_quad rest = pack->rest[k], x = pal_first(pack->xv[k]), v = pal_second(pack->xv[k]);
+            pal_quad rest = pack->rest[k], x = pal_v8_low(pack->xv[k]), v = pal_v8_high(pack->xv[k]);
             const double m = rest[3];
             rest[3] = 0;
             pack->f[k] -= m * h.k * (x - rest) + m * h.c * v;
@@ -149,13 +150,13 @@ static pal_err pull(void *self, pal_step *step)
 
 static pal_err run(void *self, pal_step *step)
 {
-    return pal_pack_run(self, step, pull);
+    return pal_active_nodes_run(self, step, pull);
 }
 
 static double energy(void *self, const pal_body *body)
 {
     const shape_spring *row = self;
-    pal_shell_frame frame = row->frame;
+    pal_rigid_fit frame = row->frame;
     const hold h = find_hold(row, body, &frame, false);
     double sum = 0, u[3];
     for (int k = 0; k < body->n_active; k++) {
@@ -169,7 +170,7 @@ static double energy(void *self, const pal_body *body)
 /* the frame only takes motion away from what is stretched or damped, so the anchors alone bound both */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    double k = stiff_1_s2(self, body->shell);
+    double k = stiff_1_s2(self, body->adaptive);
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         bound_N_m[i] += k * body->mass_kg[i];
@@ -178,17 +179,17 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    double c = damp_1_s(self, body->shell);
+    double c = damp_1_s(self, body->adaptive);
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         bound_Ns_m[i] += c * body->mass_kg[i];
     }
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     shape_spring *row = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     if (row->per_young > 0) row->k_N_m = row->per_young * to->young_Pa;
     return PAL_ERR_OK;
 }

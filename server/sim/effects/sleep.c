@@ -1,7 +1,7 @@
 /* Row sleep: a body at rest costs next to nothing until something comes near (numerics.md part 3: "sleep below
  * threshold").
  *
- * It falls asleep when for `still_s` of simulated time no point was faster than speed_1_s S, the triangles were the
+ * It falls asleep when for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles were the
  * same, no tool was near, no row's force changed by itself with time and refinement had nothing left to do, and when
  * after that the forces left over would move it by less than rest_1_s2 S in s^2, on average over its mass (S: the
  * body's box diagonal). Velocities are then 0, positions stay as they are to the bit, and none of the body's rows is
@@ -16,31 +16,31 @@
  * Departure: numerics.md asks for a threshold of speed alone; a body that creeps against a drag of 1e6 times the
  * critical one is slow and not at rest, hence the forces.
  *
- * Keys: still_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
+ * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
 
 typedef struct sleeper {
-    double still_s, speed_1_s, rest_1_s2;
+    double rest_time_s, speed_1_s, rest_1_s2;
     double calm_s;     /* for so long nothing has moved */
     uint64_t revision; /* of the triangles, meanwhile   */
     bool boxed;        /* box and edge_m are of now     */
     double low[3], high[3], edge_m;
 } sleeper;
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     sleeper *row = PAL_NEW(build->arena, sleeper, 1);
     if (!row) return PAL_ERR_MEMORY;
-    *row = (sleeper){.still_s = 0.5, .speed_1_s = 1e-4, .rest_1_s2 = 1e-4};
-    PAL_TRY(pal_item_number(item, "still_s", 0, 1e9, &row->still_s, build->note));
-    PAL_TRY(pal_item_number(item, "speed_1_s", 0, 1e3, &row->speed_1_s, build->note));
-    PAL_TRY(pal_item_number(item, "rest_1_s2", 0, 1e6, &row->rest_1_s2, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    *row = (sleeper){.rest_time_s = 0.5, .speed_1_s = 1e-4, .rest_1_s2 = 1e-4};
+    PAL_TRY(pal_entry_read_number(item, "rest_time_s", 0, 1e9, &row->rest_time_s, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "speed_1_s", 0, 1e3, &row->speed_1_s, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "rest_1_s2", 0, 1e6, &row->rest_1_s2, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     *self = row;
     return PAL_ERR_OK;
 }
@@ -48,7 +48,7 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 /* no point moves; a speed that is no number is not slow */
 static bool slow(const sleeper *row, const pal_body *body)
 {
-    double most = row->speed_1_s * body->size_m, most2 = most * most;
+    double most = row->speed_1_s * body->length_scale_m, most2 = most * most;
     bool all = true;
     for (int k = 0; k < body->n_active; k++) {
         const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
@@ -58,7 +58,7 @@ static bool slow(const sleeper *row, const pal_body *body)
 }
 
 /* does some row still change something by itself? */
-static bool changes(const pal_row *row, int n, double time_s)
+static bool changes(const pal_component *row, int n, double time_s)
 {
     for (int i = 0; i < n; i++)
         if (row[i].effect->settled_s && !(time_s >= row[i].effect->settled_s(row[i].self))) return true;
@@ -67,15 +67,15 @@ static bool changes(const pal_row *row, int n, double time_s)
 
 static const float *shown_vertex(const pal_body *body, int k)
 {
-    return body->shown + 3 * (size_t)(body->shell ? body->active[k] : k);
+    return body->shown + 3 * (size_t)(body->adaptive ? body->active[k] : k);
 }
 
 /* box of what is shown and its longest edge */
 static void measure(sleeper *row, const pal_body *body)
 {
-    const int32_t *tri = body->shell ? body->shell->tri : body->surface->tri;
-    int n_tri = body->shell ? body->shell->n_tri : body->surface->n_tri;
-    int n_shown = body->shell ? body->n_active : body->n_shown;
+    const int32_t *tri = body->adaptive ? body->adaptive->tri : body->surface->tri;
+    int n_tri = body->adaptive ? body->adaptive->n_tri : body->surface->n_tri;
+    int n_shown = body->adaptive ? body->n_active : body->n_shown;
     double edge2 = 0;
     for (int c = 0; c < 3; c++) row->low[c] = INFINITY, row->high[c] = -INFINITY;
     for (int k = 0; k < n_shown; k++)
@@ -104,7 +104,7 @@ static bool passes_box(const sleeper *row, const double a[3], const double b[3],
 /* does it come within reach of a vertex? */
 static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
 {
-    int n_shown = body->shell ? body->n_active : body->n_shown;
+    int n_shown = body->adaptive ? body->n_active : body->n_shown;
     double way[3], reach2 = reach * reach;
     pal_sub3(way, b, a);
     double way2 = pal_dot3(way, way);
@@ -127,7 +127,7 @@ static bool tool_near(sleeper *row, const pal_step *step)
         double reach = 0, a[3], b[3];
         if (!tool->present && tool->ramp <= 0) continue;
         for (int i = 0; i < step->n_contact; i++) {
-            const pal_row *of = &step->contact[i];
+            const pal_component *of = &step->contact[i];
             if (of->effect->reach_m) reach = fmax(reach, of->effect->reach_m(of->self, tool));
         }
         if (reach == 0) continue;
@@ -147,23 +147,23 @@ static bool balanced(const sleeper *row, pal_step *step)
 {
     const pal_body *body = step->body;
     double force = 0, mass = 0;
-    step->drag_apart = false;
-    if (pal_gather(step)) return false;
+    step->drag_separate = false;
+    if (pal_assemble_forces(step)) return false;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         mass += body->mass_kg[i];
-        if (!body->held[i]) force += pal_norm3(body->g + 3 * (size_t)i);
+        if (!body->fixed[i]) force += pal_norm3(body->g + 3 * (size_t)i);
     }
-    return force <= row->rest_1_s2 * body->size_m * mass;
+    return force <= row->rest_1_s2 * body->length_scale_m * mass;
 }
 
 static void fall_asleep(pal_step *step)
 {
     pal_body *body = step->body;
     for (int k = 0; k < body->n_active; k++) pal_set3(body->v + 3 * (size_t)pal_body_point(body, k), 0, 0, 0);
-    pal_body_place(body);
+    pal_body_update_nodes(body);
     for (int i = 0; i < step->n_contact; i++) {
-        const pal_row *row = &step->contact[i];
+        const pal_component *row = &step->contact[i];
         if (row->effect->reset) row->effect->reset(row->self, body);
     }
     body->asleep = true;
@@ -181,7 +181,7 @@ static pal_err run(void *self, pal_step *step)
                 !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
     row->calm_s = calm ? row->calm_s + step->dt_s : 0;
     /* a hair less, so that a sum of steps is what it is meant to be */
-    if (row->calm_s < row->still_s * (1 - 1e-9)) return PAL_ERR_OK;
+    if (row->calm_s < row->rest_time_s * (1 - 1e-9)) return PAL_ERR_OK;
     row->calm_s = 0;
     if (calm && balanced(row, step)) fall_asleep(step);
     row->boxed = false;

@@ -17,42 +17,43 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/core/kept.h"
+#include "server/sim/core/force_cache.h"
 #include "server/sim/elements/elastic_tet.h"
 
 #include <string.h>
 
-static pal_err read_element(pal_item *item, const pal_build *build, int *n_corner)
+static pal_err read_element(pal_config_entry *item, const pal_build *build, int *n_corner)
 {
     const char *text = build->body->n_corner == 10 ? "tet10" : "tet4";
-    PAL_TRY(pal_item_text(item, "element", &text, build->note));
+    PAL_TRY(pal_entry_read_text(item, "element", &text, build->diag));
     if (strcmp(text, "tet4") && strcmp(text, "tet10"))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.element: \"%s\" is not tet4 or tet10", item->path, text);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.element: \"%s\" is not tet4 or tet10", item->path,
+                                  text);
     *n_corner = strcmp(text, "tet4") ? 10 : 4;
     return PAL_ERR_OK;
 }
 
 typedef struct tet_row {
-    pal_elastic_tets whole;       /* first: tests look at it */
-    pal_elastic_tets *split;      /* NULL: never untangles this way */
-    double *rest;                 /* six times the volume of each piece at rest [n_piece] */
-    double least_volume_m3;       /* of those that are looked at, times six */
-    bool tangled, cheap;          /* cheap: whole.n_inverted tells that the body is tangled */
-    uint64_t n_tangled, n_switch; /* since run, which tells the body */
-    pal_kept kept;                /* under an implicit solver: of `whole` while nothing is inverted */
+    pal_elastic_tets whole;         /* first: tests look at it */
+    pal_elastic_tets *split;        /* NULL: never untangles this way */
+    double *rest;                   /* six times the volume of each piece at rest [n_piece] */
+    double least_volume_m3;         /* of those that are looked at, times six */
+    bool has_inversion, cheap;      /* cheap: whole.n_inverted tells that the body is tangled */
+    uint64_t n_inversion, n_switch; /* since run, which tells the body */
+    pal_force_cache kept;           /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
 /* beyond the first pair a body is tangled, within the second it is whole again */
-static const double most_poisson = 0.3, tangled_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
+static const double max_poisson = 0.3, tangled_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
 
 /* tetrahedra of four nodes on the body's own, eight in one of ten */
-static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_wish *to)
+static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_options *to)
 {
     static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
                                     {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
-    const pal_elastic_tets_wish *from = &row->whole.wish;
+    const pal_elastic_tets_options *from = &row->whole.wish;
     *to = *from;
-    to->law = PAL_LAW_COROTATIONAL, to->untangle = true, to->most_poisson = most_poisson;
+    to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = max_poisson;
     if (from->n_corner == 4) return PAL_ERR_OK;
     to->n_corner = 4, to->n_tet = 8 * from->n_tet;
     int32_t *tet = PAL_NEW(arena, int32_t, 4 * (size_t)to->n_tet);
@@ -76,14 +77,14 @@ static double six_volumes(const double *x, const int32_t *node)
 
 static pal_err make_split(tet_row *row, pal_build *build)
 {
-    const pal_elastic_tets_wish *whole = &row->whole.wish;
-    pal_elastic_tets_wish wish;
+    const pal_elastic_tets_options *whole = &row->whole.wish;
+    pal_elastic_tets_options wish;
     PAL_TRY(cut(row, build->arena, &wish));
     row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
     if (!row->split) return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_tets_make(&wish, build, row->split));
     row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
-    double h = build->body->h_m;
+    double h = build->body->edge_m;
     /* slivers turn over at any touch: what they do tells nothing of the body */
     row->least_volume_m3 = 1e-3 * h * h * h;
     row->rest = PAL_NEW(build->arena, double, wish.n_tet);
@@ -94,10 +95,10 @@ static pal_err make_split(tet_row *row, pal_build *build)
 
 static bool is_tangled(const tet_row *row, const double *x)
 {
-    if (row->cheap && !row->tangled) return row->whole.n_inverted > 0;
-    const double *limit = row->tangled ? whole_det : tangled_det;
+    if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
+    const double *limit = row->has_inversion ? whole_det : tangled_det;
     bool neo = row->whole.wish.law == PAL_LAW_NEO_HOOKEAN;
-    const pal_elastic_tets_wish *pieces = &row->split->wish;
+    const pal_elastic_tets_options *pieces = &row->split->wish;
     for (int i = 0; i < pieces->n_tet; i++) {
         if (fabs(row->rest[i]) < row->least_volume_m3) continue;
         double det = six_volumes(x, pieces->tet + 4 * i) / row->rest[i];
@@ -106,20 +107,20 @@ static bool is_tangled(const tet_row *row, const double *x)
     return false;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
-    pal_elastic_tets_wish wish = {.untangle = true};
+    pal_elastic_tets_options wish = {.recover = true};
     bool fill = true;
-    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->note));
+    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->diag));
     PAL_TRY(read_element(item, build, &wish.n_corner));
-    PAL_TRY(pal_item_bool(item, "fill", &fill, build->note));
-    PAL_TRY(pal_item_bool(item, "untangle", &wish.untangle, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_read_bool(item, "fill", &fill, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "recover", &wish.recover, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     bool own = body->element && body->n_corner == wish.n_corner;
     if (!own && (wish.n_corner == 10 || !body->tets))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: body \"%s\" has no elements of %d nodes", item->path,
-                            body->name, wish.n_corner);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: body \"%s\" has no elements of %d nodes",
+                                  item->path, body->name, wish.n_corner);
     wish.tet = own ? body->element : body->tets->tet;
     wish.n_tet = own ? body->n_element : body->tets->n_tet;
     wish.fill = own && fill ? body->fill : NULL;
@@ -127,40 +128,40 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
     PAL_TRY(pal_elastic_tets_make(&wish, build, &row->whole));
-    if (body->implicit) PAL_TRY(pal_kept_make(body->n_node, build->arena, &row->kept));
-    return wish.untangle && body->implicit && wish.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
+    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &row->kept));
+    return wish.recover && body->implicit && wish.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
 }
 
 /* what the forces come from now */
 static pal_elastic_tets *acting(void *self)
 {
     tet_row *row = self;
-    return row->tangled ? row->split : &row->whole;
+    return row->has_inversion ? row->split : &row->whole;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     tet_row *row = self;
-    step->body->rescue.n_tangled += row->n_tangled, step->body->rescue.n_split += row->n_switch;
-    row->n_tangled = row->n_switch = 0;
-    if (!row->tangled && pal_kept_at(&row->kept, step->body->d)) {
-        pal_kept_add(&row->kept, step->body->f);
+    step->body->safeguards.n_inversion += row->n_inversion, step->body->safeguards.n_split += row->n_switch;
+    row->n_inversion = row->n_switch = 0;
+    if (!row->has_inversion && pal_force_cache_matches(&row->kept, step->body->d)) {
+        pal_force_cache_add(&row->kept, step->body->f);
         return PAL_ERR_OK;
     }
-    uint64_t before = row->tangled ? pal_clock_ns() : 0;
+    uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
     pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
-    if (row->tangled) step->body->rescue.ns += pal_clock_ns() - before;
+    if (row->has_inversion) step->body->safeguards.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
     tet_row *row = self;
-    if (row->tangled) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_kept_at(&row->kept, body->d)) return row->kept.energy_J;
-    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_kept_open(&row->kept, body->d));
+    if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
+    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
+    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->kept, body->d));
     /* what inverted elements borrow may differ the next time it is asked for */
-    return row->whole.n_inverted > 0 ? sum : pal_kept_close(&row->kept, sum);
+    return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->kept, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -168,13 +169,13 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     pal_elastic_tets_bound(acting(self), body->d, bound_N_m);
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     tet_row *row = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     pal_elastic_tets_material(&row->whole, to);
     if (row->split) pal_elastic_tets_material(row->split, to);
-    pal_kept_forget(&row->kept);
+    pal_force_cache_invalidate(&row->kept);
     return PAL_ERR_OK;
 }
 
@@ -183,10 +184,10 @@ static void reset(void *self, const pal_body *body)
     tet_row *row = self;
     (void)body;
     pal_elastic_tets_reset(&row->whole);
-    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_straight = 0;
-    row->tangled = false;
-    pal_kept_forget(&row->kept);
-    row->n_tangled = row->n_switch = 0;
+    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_single_rotation = 0;
+    row->has_inversion = false;
+    pal_force_cache_invalidate(&row->kept);
+    row->n_inversion = row->n_switch = 0;
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
@@ -209,15 +210,15 @@ static bool couple(void *self, pal_cliques *out)
 static void linearise(void *self, const pal_body *body)
 {
     tet_row *row = self;
-    bool before = row->tangled, known = row->split && (before || !row->cheap);
+    bool before = row->has_inversion, known = row->split && (before || !row->cheap);
     bool told = known && is_tangled(row, body->d);
     if (!told) pal_elastic_tets_linearise(&row->whole, body->d);
-    row->tangled = known ? told : row->split && is_tangled(row, body->d);
-    row->n_tangled += row->tangled;
-    row->n_switch += row->tangled != before;
-    if (row->tangled && !before) pal_elastic_tets_reset(row->split);
-    if (row->split) row->n_switch += pal_elastic_tets_look(row->split, body, row->tangled);
-    if (!row->tangled) return;
+    row->has_inversion = known ? told : row->split && is_tangled(row, body->d);
+    row->n_inversion += row->has_inversion;
+    row->n_switch += row->has_inversion != before;
+    if (row->has_inversion && !before) pal_elastic_tets_reset(row->split);
+    if (row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
+    if (!row->has_inversion) return;
     pal_elastic_tets_linearise(row->split, body->d);
 }
 
@@ -227,7 +228,7 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     if (k != 0) pal_elastic_tets_multiply(acting(self), k, p, out);
 }
 
-static void assemble(void *self, const pal_body *body, double k, double c, pal_blocks *to)
+static void assemble(void *self, const pal_body *body, double k, double c, pal_block_matrix *to)
 {
     (void)body, (void)c;
     if (k != 0) pal_elastic_tets_assemble(acting(self), k, to);

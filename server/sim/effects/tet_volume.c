@@ -6,16 +6,16 @@
  * the volume that a regular one has with its edges: it would set the sub-step of the whole body for a volume that is
  * none, and turn over at any touch. Their edges stay; a preflight counts and names them. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_tangle.h"
+#include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    PAL_TRY(pal_spring_row_check(item, build));
+    PAL_TRY(pal_spring_set_check(item, build));
     const pal_tets *tets = build->body->tets;
-    pal_spring_row *row = PAL_NEW(build->arena, pal_spring_row, 1);
+    pal_spring_set *row = PAL_NEW(build->arena, pal_spring_set, 1);
     int32_t *tet = malloc(4 * sizeof *tet * ((size_t)tets->n_tet + 1));
     if (!row || !tet) {
         free(tet);
@@ -28,8 +28,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
         if (pal_spring_tet_quality(x) < PAL_SPRING_SLIVER) continue;
         memcpy(tet + 4 * (size_t)n++, tets->tet + 4 * (size_t)t, 4 * sizeof *tet);
     }
-    double h = build->body->h_m;
-    pal_err err = pal_spring_row_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row);
+    double h = build->body->edge_m;
+    pal_err err = pal_spring_set_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row);
     free(tet);
     *self = row;
     return err;
@@ -65,7 +65,7 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     pal_v8 g[3] = {e[1][1] * e[2][2] - e[1][2] * e[2][1], e[1][2] * e[2][0] - e[1][0] * e[2][2],
                    e[1][0] * e[2][1] - e[1][1] * e[2][0]};
     pal_v8 c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, turn[3];
-    c = kq * pal_pick8(c < 0, zero - c, c);
+    c = kq * pal_select8(c < 0, zero - c, c);
     /* edges 01 02 03 12 13 23 */
     for (int k = 0; k < 3; k++) length[k] = pal_length8(e[k]), turn[k] = e[2][k] - e[1][k];
     length[3] = pal_length8(f[0]), length[4] = pal_length8(f[1]), length[5] = pal_length8(turn);
@@ -75,18 +75,18 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     bound[3] += c * (length[0] + length[1] + length[3]);
 }
 
-static pal_spring_row *springs(void *self)
+static pal_spring_set *springs(void *self)
 {
     return self;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    const pal_spring_row *row = self;
+    const pal_spring_set *row = self;
     pal_body *body = step->body;
-    pal_slots_load(body->slots, body->d);
-    pal_spring_run(row, body->slots, kernel, 4);
-    pal_slots_add(body->slots, body->f);
+    pal_node_order_load(body->node_order, body->d);
+    pal_spring_run(row, body->node_order, kernel, 4);
+    pal_node_order_add(body->node_order, body->f);
     if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_VOLUME);
     return PAL_ERR_OK;
 }
@@ -98,15 +98,15 @@ static double energy(void *self, const pal_body *body)
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const pal_spring_row *row = self;
-    pal_spring_bound(row, body->slots, body->d, bound_kernel, 4, row->spring.k_J, true, bound_N_m);
+    const pal_spring_set *row = self;
+    pal_spring_bound(row, body->node_order, body->d, bound_kernel, 4, row->spring.k_J, true, bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    const pal_spring_row *row = self;
+    const pal_spring_set *row = self;
     if (row->spring.c_Js > 0)
-        pal_spring_bound(row, body->slots, body->d, bound_kernel, 4, row->spring.c_Js, false, bound_Ns_m);
+        pal_spring_bound(row, body->node_order, body->d, bound_kernel, 4, row->spring.c_Js, false, bound_Ns_m);
 }
 
 const pal_effect pal_effect_tet_volume = {.name = "tet_volume",
@@ -118,5 +118,5 @@ const pal_effect pal_effect_tet_volume = {.name = "tet_volume",
                                           .stiffness = stiffness,
                                           .damping = damping,
                                           .springs = springs,
-                                          .untangle = pal_spring_tangle_ask,
-                                          .material = pal_spring_row_material};
+                                          .recover = pal_spring_recover,
+                                          .material = pal_spring_set_material};

@@ -1,32 +1,31 @@
 /* A sphere presses tissue: penalty contact between each tool and the shown surface, in every sub-step.
  *
- * The surface that is touched is the one that is seen (skinned), not the staircase of voxels below it (sim/touch.h).
- * A proxy of the tool stays on the side it came from (sim/proxy.h). A contact point within the proxy's sphere, at depth
- * d, is pushed straight away from the proxy's centre with
- *     f = k (d - dt/2 v_away),   k = stiffness_Pa_m * area,
- * v_away being the tissue's own speed away from the proxy. The largest eigenvalue of contact stiffness over mass is
- * kept below alpha / dt^2, alpha 1.2, by a common factor on k (touch.h). With a and b the ratios of stiffness and
- * damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4; the solver's own limit leaves a <= 1 to
- * the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the tool's cap, and in its
- * first and last 10 steps by its ramp. The opposite force acts on the tool.
+ * The surface that is touched is the one that is seen (skinned), not the staircase of voxels below it
+ * (sim/contact_points.h). A proxy of the tool stays on the side it came from (sim/proxy.h). A contact point within the
+ * proxy's sphere, at depth d, is pushed straight away from the proxy's centre with f = k (d - dt/2 v_away),   k =
+ * stiffness_Pa_m * area, v_away being the tissue's own speed away from the proxy. The largest eigenvalue of contact
+ * stiffness over mass is kept below alpha / dt^2, alpha 1.2, by a common factor on k (contact_points.h). With a and b
+ * the ratios of stiffness and damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4; the solver's
+ * own limit leaves a <= 1 to the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the
+ * tool's cap, and in its first and last 10 steps by its ramp. The opposite force acts on the tool.
  *
  * With an implicit solver (pal_body.implicit) a sub-step is the whole step and nothing limits k but the number of its
  * iterations: k is 15 times as stiff as the tissue behind half a radius, spread over that area, with E of the tissue at
  * each point; the solver takes it implicitly, there is no damping term, and the forces are those of the end of the
- * sub-step (sim/press.h, which also says how caps are kept). Patches are then published after the solve, their k1 from
- * the solver's compliance where it has one, at most two of them a step.
+ * sub-step (sim/contact_implicit.h, which also says how caps are kept). Patches are then published after the solve,
+ * their k1 from the solver's compliance where it has one, at most two of them a step.
  *
- * A body that adapts (sim/shell.h) has a solver that holds loads over a sub-step (rk4), so that they lag by dt/2. With
- * f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the lag, and
- * a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact changes at
- * once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force does not rise
- * in that moment, and grows again in EASE_S.
+ * A body that adapts (sim/adaptive_surface.h) has a solver that holds loads over a sub-step (rk4), so that they lag by
+ * dt/2. With f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the
+ * lag, and a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact
+ * changes at once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force
+ * does not rise in that moment, and grows again in EASE_S.
  *
  * Where points carry the nodes (pal_body.embed) k is that of implicit solvers below, and central_cg is told in time
  * what the points near a tool want (pal_effect.wanted), so that its sub-steps allow it. Beyond that alpha is 0.3; the
  * bound is the sum of the points' own, which is above their eigenvalue.
  *
- * A tool that holds tissue (tool_grab) does not push it as well: its ball would work against its own grip.
+ * A tool that holds tissue (tool_grasp) does not push it as well: its ball would work against its own grip.
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
@@ -34,7 +33,7 @@
  * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
-#include "server/sim/contact/holder.h"
+#include "server/sim/contact/tool_contact.h"
 
 #include <math.h>
 #include <string.h>
@@ -65,16 +64,16 @@
 #define LEAST_EASE    0.01
 enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10, FELT_A_STEP = 2, NEAR_MAX = 256 };
 
-typedef pal_firm firm;
-typedef pal_holder holder;
+typedef pal_tool_contact_implicit firm;
+typedef pal_tool_contact holder;
 
 typedef struct tool_push {
-    pal_touch touch;
+    pal_contact_points touch;
     int n_tool, body_index;
     holder holder[PAL_TOOL_MAX];
     double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s;
     double young_Pa, poisson, damping_1_s, density_kg_m3;
-    pal_ties *ties;     /* implicit solvers only */
+    pal_contact_springs *contact_springs; /* implicit solvers only */
     float *point_Pa;    /* E at each shown vertex where a region gives it, else 0 [n_vertex]; NULL: nowhere */
     int n_felt, n_step; /* stiffnesses found in this step; steps                             */
 } tool_push;
@@ -95,7 +94,7 @@ static double stiffness_Pa_m(const tool_push *push, double radius_m)
 /* of the tissue at a contact point */
 static double young_at(const tool_push *push, int point)
 {
-    const pal_touch *touch = &push->touch;
+    const pal_contact_points *touch = &push->touch;
     if (!push->point_Pa) return push->young_Pa;
     if (point >= touch->n_vertex) point = touch->corner[3 * (size_t)(point - touch->n_vertex)];
     return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->young_Pa;
@@ -103,10 +102,10 @@ static double young_at(const tool_push *push, int point)
 
 /* implicit: STIFFER times 2 E b / (1 - nu^2) over the area of a contact half a radius wide, b its half-width or that of
  * an element */
-static double implicit_Pa_m(const tool_push *push, int point, double radius_m, double h_m)
+static double implicit_Pa_m(const tool_push *push, int point, double radius_m, double edge_m)
 {
     if (push->asked_Pa_m > 0) return push->asked_Pa_m;
-    double a = 0.5 * radius_m, b = fmax(a, 0.5 * h_m);
+    double a = 0.5 * radius_m, b = fmax(a, 0.5 * edge_m);
     return STIFFER * 2 * young_at(push, point) * b / ((1 - push->poisson * push->poisson) * M_PI * a * a);
 }
 
@@ -115,9 +114,9 @@ static double near_m(const tool_push *push, double radius_m)
     return push->asked_near_m > 0 ? push->asked_near_m : fmax(radius_m, 0.010);
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_diagnostic *diag)
 {
-    (void)body, (void)note;
+    (void)body, (void)diag;
     take_material(self, mat);
     return PAL_ERR_OK;
 }
@@ -126,71 +125,73 @@ static void reset(void *self, const pal_body *body)
 {
     tool_push *push = self;
     (void)body;
-    pal_touch_forget(&push->touch);
+    pal_contact_points_reset(&push->touch);
     push->n_step = 0;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].active = false;
         push->holder[t].share = 1;
-        pal_holder_end_hold(&push->holder[t]);
+        pal_tool_contact_end_blend(&push->holder[t]);
         firm *f = push->holder[t].firm;
-        if (f) pal_press_reset(&f->press);
-        if (f) f->felt = (pal_felt){0};
-        pal_patches_reset(&push->holder[t].patches, push->body_index * 1024);
+        if (f) pal_contact_implicit_reset(&f->press);
+        if (f) f->haptic_stiffness = (pal_haptic_stiffness){0};
+        pal_contact_patches_reset(&push->holder[t].patches, push->body_index * 1024);
     }
 }
 
-static pal_err read_keys(tool_push *push, pal_item *item, pal_note *note)
+static pal_err read_keys(tool_push *push, pal_config_entry *item, pal_diagnostic *diag)
 {
     push->clamp_S = 0.02, push->slip_S = 0.25, push->slip_s = 0.5;
-    PAL_TRY(pal_item_number(item, "stiffness_Pa_m", 0, 1e15, &push->asked_Pa_m, note));
-    PAL_TRY(pal_item_number(item, "friction", 0, 2, &push->friction, note));
-    PAL_TRY(pal_item_number(item, "clamp_S", 1e-4, 0.1, &push->clamp_S, note));
-    PAL_TRY(pal_item_number(item, "near_m", 0, 1, &push->asked_near_m, note));
-    PAL_TRY(pal_item_number(item, "slip_S", 0.05, 100, &push->slip_S, note));
-    PAL_TRY(pal_item_number(item, "slip_s", 0, 1e9, &push->slip_s, note));
-    return pal_item_done(item, note);
+    PAL_TRY(pal_entry_read_number(item, "stiffness_Pa_m", 0, 1e15, &push->asked_Pa_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "friction", 0, 2, &push->friction, diag));
+    PAL_TRY(pal_entry_read_number(item, "clamp_S", 1e-4, 0.1, &push->clamp_S, diag));
+    PAL_TRY(pal_entry_read_number(item, "near_m", 0, 1, &push->asked_near_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "slip_S", 0.05, 100, &push->slip_S, diag));
+    PAL_TRY(pal_entry_read_number(item, "slip_s", 0, 1e9, &push->slip_s, diag));
+    return pal_entry_check_unused(item, diag);
 }
 
 /* what an implicit solver's contact needs beside */
 static pal_err make_implicit(tool_push *push, pal_build *build)
 {
     pal_body *body = build->body;
-    push->ties = PAL_NEW(build->arena, pal_ties, 1);
-    if (!push->ties) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_ties_make(body, push->n_tool * (PAL_PRESS_MOST + 2), build->arena, push->ties));
+    push->contact_springs = PAL_NEW(build->arena, pal_contact_springs, 1);
+    if (!push->contact_springs) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_contact_springs_make(body, push->n_tool * (PAL_CONTACT_IMPLICIT_MAX + 2), build->arena,
+                                     push->contact_springs));
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].firm = PAL_NEW(build->arena, firm, 1);
         if (!push->holder[t].firm) return PAL_ERR_MEMORY;
-        PAL_TRY(pal_press_make(build->arena, &push->holder[t].firm->press));
+        PAL_TRY(pal_contact_implicit_make(build->arena, &push->holder[t].firm->press));
     }
     body->wants_compliance = true;
-    size_t scratch = pal_felt_scratch(body) + (size_t)push->touch.most_point * 4 * sizeof(double) + CONTACT_MAX + 256;
+    size_t scratch =
+        pal_haptic_stiffness_scratch(body) + (size_t)push->touch.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
     return PAL_ERR_OK;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_scene *scene = build->scene;
     tool_push *push = PAL_NEW(build->arena, tool_push, 1);
     if (!push) return PAL_ERR_MEMORY;
-    PAL_TRY(read_keys(push, item, build->note));
+    PAL_TRY(read_keys(push, item, build->diag));
     if (build->body->n_shown == 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: tool_push needs a body that shows something",
-                            item->path);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body that shows something",
+                                  item->path);
     take_material(push, &build->def->material);
     push->n_tool = scene->n_tool;
     push->body_index = (int)(build->def - scene->body);
-    double low[3], high[3], least_m = INFINITY;
+    double low[3], high[3], min_m = INFINITY;
     pal_surface_box(&scene->body[0].mesh->surface, low, high);
     for (int t = 0; t < scene->n_tool; t++) {
         double radius = scene->tool[t].radius_m;
-        least_m = fmin(least_m, radius > 0 ? radius : 0.04 * pal_dist3(low, high));
+        min_m = fmin(min_m, radius > 0 ? radius : 0.04 * pal_dist3(low, high));
     }
-    if (!(least_m > 0 && isfinite(least_m))) least_m = 0.04 * build->body->size_m;
+    if (!(min_m > 0 && isfinite(min_m))) min_m = 0.04 * build->body->length_scale_m;
     /* the proxy keeps half a radius away from every point: points half a radius apart leave no hole for it */
-    PAL_TRY(pal_touch_make(build->body, DEEPEST_RADII * least_m, SAMPLE_MAX, build->arena, &push->touch));
-    size_t n_point = (size_t)push->touch.most_point;
+    PAL_TRY(pal_contact_points_make(build->body, DEEPEST_RADII * min_m, SAMPLE_MAX, build->arena, &push->touch));
+    size_t n_point = (size_t)push->touch.max_point;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].list = PAL_NEW(build->arena, int32_t, n_point);
         push->holder[t].contact = PAL_NEW(build->arena, pal_contact, CONTACT_MAX);
@@ -199,8 +200,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     /* positions and allowed distances of one tool's points */
     size_t scratch = n_point * 4 * sizeof(double) + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
-    if (build->body->implicit || build->body->embed)
-        PAL_TRY(pal_touch_young(&push->touch, build->body, build->def, build->arena, &push->point_Pa));
+    if (build->body->implicit || build->body->interpolation)
+        PAL_TRY(pal_contact_points_young(&push->touch, build->body, build->def, build->arena, &push->point_Pa));
     if (build->body->implicit) PAL_TRY(make_implicit(push, build));
     reset(push, build->body);
     *self = push;
@@ -213,9 +214,9 @@ static void seat(tool_push *push, holder *h, const pal_body *body, const double 
     double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
     pal_copy3(h->proxy.x, at);
-    h->active = true, h->behind_s = 0;
+    h->active = true, h->time_behind_s = 0;
     if (h->firm) h->firm->back_m = 0, pal_copy3(h->firm->last_m, at);
-    if (!pal_touch_nearest(&push->touch, body, at, p, normal)) return;
+    if (!pal_contact_points_nearest(&push->touch, body, at, p, normal)) return;
     pal_sub3(out, at, p);
     if (pal_dot3(out, normal) > 0) {
         if (pal_norm3(out) >= DEEPEST_RADII * radius_m) return;
@@ -232,35 +233,35 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     double next[3], step_s = step->dt_s * step->n_sub;
     h->n_list = 0;
     h->nearest_m = INFINITY;
-    if ((!tool->present && tool->ramp <= 0) || tool->gripping) {
+    if ((!tool->present && tool->ramp <= 0) || tool->grasped_before) {
         h->active = false;
-        pal_holder_end_hold(h);
-        pal_patches_reset(&h->patches, push->body_index * 1024);
+        pal_tool_contact_end_blend(h);
+        pal_contact_patches_reset(&h->patches, push->body_index * 1024);
         return;
     }
     pal_sub3(next, tool->next.position_m, body->offset_m);
     double behind = h->active ? pal_dist3(h->proxy.x, next) : 0;
-    h->behind_s = behind > push->slip_S * body->size_m ? h->behind_s + step_s : 0;
+    h->time_behind_s = behind > push->slip_S * body->length_scale_m ? h->time_behind_s + step_s : 0;
     if (!h->active) {
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
         seat(push, h, body, last, tool->radius_m);
         h->ease = 1;
         /* it has neither touched nor slipped before */
-        h->renewed = false;
+        h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
-    } else if (h->behind_s > push->slip_s) {
+    } else if (h->time_behind_s > push->slip_s) {
         seat(push, h, body, next, tool->radius_m);
-        pal_holder_end_hold(h);
-        h->ease = 0, body->rescue.n_slipped++;
+        pal_tool_contact_end_blend(h);
+        h->ease = 0, body->safeguards.n_tool_reset++;
     }
-    if (!body->shell) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
+    if (!body->adaptive) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);
     pal_copy3(h->limits.a, h->proxy.x), pal_copy3(h->limits.b, next);
     h->limits.radius_m = tool->radius_m;
-    h->limits.deepest_m = DEEPEST_RADII * tool->radius_m;
+    h->limits.max_depth_m = DEEPEST_RADII * tool->radius_m;
     h->limits.slack_m = 0.5 * (reach - tool->radius_m);
-    h->n_list = pal_touch_collect(&push->touch, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
+    h->n_list = pal_contact_points_collect(&push->touch, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
 }
 
 /* contacts of the proxy where it now is, and with an implicit solver points that may come to touch in this sub-step; x
@@ -280,8 +281,8 @@ static void find_contacts(const tool_push *push, holder *h, const pal_body *body
         c->point = h->list[i];
         pal_copy3(c->x, x + 3 * i);
         if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
-        c->depth_m = fmin(radius - distance, h->limits.deepest_m);
-        if (body->implicit || body->embed) k_area = implicit_Pa_m(push, c->point, radius, body->h_m);
+        c->depth_m = fmin(radius - distance, h->limits.max_depth_m);
+        if (body->implicit || body->interpolation) k_area = implicit_Pa_m(push, c->point, radius, body->edge_m);
         c->k_N_m = k_area * push->touch.area_m2[c->point];
     }
 }
@@ -302,13 +303,14 @@ static void hold_back(holder *h, double here[3])
  * out anew in each step, would let a tool at its cap wander */
 static void find_back(const tool_push *push, holder *h, const pal_tool *tool)
 {
-    const pal_press *press = &h->firm->press;
+    const pal_contact_implicit *press = &h->firm->press;
     double k = 2 * push->young_Pa * tool->radius_m / (1 - push->poisson * push->poisson);
-    for (int i = 0; i < PAL_PATCH_MAX; i++)
-        if (h->firm->felt.entry[i].used && h->firm->felt.entry[i].contact) k = fmax(k, h->firm->felt.entry[i].k_N_m);
-    h->firm->back_m = h->firm->back_before_m;
+    for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++)
+        if (h->firm->haptic_stiffness.entry[i].used && h->firm->haptic_stiffness.entry[i].contact)
+            k = fmax(k, h->firm->haptic_stiffness.entry[i].k_N_m);
+    h->firm->back_m = h->firm->old_back_m;
     if (press->capped || h->firm->back_m > 0)
-        h->firm->back_m = fmax(0, h->firm->back_m + 0.5 * (press->raw_N - BELOW_CAP * press->allowed_N) / k);
+        h->firm->back_m = fmax(0, h->firm->back_m + 0.5 * (press->uncapped_N - BELOW_CAP * press->allowed_N) / k);
 }
 
 /* proxy and contacts of one tool in this sub-step */
@@ -319,27 +321,27 @@ static void approach(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     if (!h->active) return;
     double here[3];
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    pal_holder_hold(h, step, tool, here);
+    pal_tool_contact_blend(h, step, tool, here);
     pal_copy3(h->total, h->hold.now_N);
-    h->limits.rise_m = push->clamp_S * step->body->size_m / step->n_sub;
-    h->limits.stroke_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
+    h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m / step->n_sub;
+    h->limits.tool_move_length_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     if (step->body->implicit) hold_back(h, here);
     size_t used = pal_arena_used(step->scratch);
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
            *core = PAL_NEW(step->scratch, double, h->n_list);
     if (x && core) {
-        for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
+        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->touch, h->list[i], x + 3 * i);
         pal_proxy_move(&h->proxy, here, x, h->n_list, &h->limits, step->dt_s, core);
         find_contacts(push, h, step->body, x);
     }
-    pal_arena_return(step->scratch, used);
+    pal_arena_rewind(step->scratch, used);
 }
 
 /* force on one contact point: penalty with damping over a time */
 static void contact_force(const tool_push *push, pal_contact *c, double k, double damping_s)
 {
     double v[3];
-    pal_touch_velocity(&push->touch, c->point, v);
+    pal_contact_points_velocity(&push->touch, c->point, v);
     double f = k * (c->depth_m - damping_s * pal_dot3(v, c->away));
     pal_scale3(c->force, f > 0 ? f : 0, c->away);
 }
@@ -354,10 +356,10 @@ static void add_friction(tool_push *push, holder *h, const double sum[3], double
     for (int i = 0; i < h->n_contact; i++) total += pal_norm3(h->contact[i].force);
     for (int i = 0; i < h->n_contact; i++) {
         double v[3];
-        pal_touch_velocity(&push->touch, h->contact[i].point, v);
+        pal_contact_points_velocity(&push->touch, h->contact[i].point, v);
         pal_axpy3(drift, -pal_norm3(h->contact[i].force) / total, v);
     }
-    if (!pal_holder_side(h, along, stiffness, h->slip)) pal_axpy3(h->slip, dt_s, drift);
+    if (!pal_tool_contact_friction(h, along, stiffness, h->slip)) pal_axpy3(h->slip, dt_s, drift);
     pal_axpy3(h->slip, -pal_dot3(h->slip, along), along);
     double most = push->friction * size / stiffness, slip = pal_norm3(h->slip);
     if (slip > most) pal_scale3(h->slip, most / slip, h->slip);
@@ -373,13 +375,15 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
     int n_share = 1;
     for (int t = 0; t < n_tool; t++) {
         const holder *other = &push->holder[t];
-        if (t == tool || other->n_contact == 0 || pal_dist3(other->proxy.x, h->proxy.x) > 0.5 * step->body->size_m)
+        if (t == tool || other->n_contact == 0 ||
+            pal_dist3(other->proxy.x, h->proxy.x) > 0.5 * step->body->length_scale_m)
             continue;
-        n_share +=
-            pal_touch_share(&push->touch, step->body, h->contact, h->n_contact, other->contact, other->n_contact);
+        n_share += pal_contact_points_overlap(&push->touch, step->body, h->contact, h->n_contact, other->contact,
+                                              other->n_contact);
     }
-    double rate = SAFETY * n_share * pal_touch_stiffest(&push->touch, step->body, h->contact, h->n_contact);
-    double alpha = step->body->shell ? ALPHA_HELD : step->body->embed ? ALPHA_CARRIED : ALPHA;
+    double rate =
+        SAFETY * n_share * pal_contact_points_max_eigenvalue(&push->touch, step->body, h->contact, h->n_contact);
+    double alpha = step->body->adaptive ? ALPHA_HELD : step->body->interpolation ? ALPHA_CARRIED : ALPHA;
     double most = fmax(alpha / (step->dt_s * step->dt_s), SAFETY * n_share * h->told),
            share = rate > most ? most / rate : 1;
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
@@ -395,10 +399,10 @@ static void wanted(void *self, const pal_body *body, double *bound_N_m)
         h->told = 0;
         for (int i = 0; i < h->n_list && h->active && !body->implicit; i++) {
             int point = h->list[i];
-            pal_touch_point(&push->touch, point, x);
+            pal_contact_points_position(&push->touch, point, x);
             if (!(pal_dist3(x, h->proxy.x) < reach)) continue;
-            double k = implicit_Pa_m(push, point, radius, body->h_m) * push->touch.area_m2[point];
-            h->told += 0.5 * pal_touch_bound(&push->touch, body, point, 2 * k, bound_N_m);
+            double k = implicit_Pa_m(push, point, radius, body->edge_m) * push->touch.area_m2[point];
+            h->told += 0.5 * pal_contact_points_bound(&push->touch, body, point, 2 * k, bound_N_m);
         }
     }
 }
@@ -416,14 +420,14 @@ static void follow_side(holder *h, const double before[3])
 static double keep_force(holder *h, double sum[3])
 {
     double size = pal_norm3(sum), part = 1;
-    if (h->renewed && size > h->raw_N) {
-        part = fmax(h->raw_N / size, LEAST_EASE);
+    if (h->retriangulated && size > h->uncapped_N) {
+        part = fmax(h->uncapped_N / size, LEAST_EASE);
         h->ease *= part;
         pal_scale3(sum, part, sum);
         for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, part, h->contact[i].force);
     }
-    h->renewed = false;
-    h->raw_N = part * size;
+    h->retriangulated = false;
+    h->uncapped_N = part * size;
     return part;
 }
 
@@ -431,12 +435,12 @@ static double keep_force(holder *h, double sum[3])
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    if (body->shell) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
+    if (body->adaptive) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
     double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), sum[3] = {0}, stiffness = 0;
-    double damping_s = step->dt_s * (body->shell ? GAMMA_HELD : GAMMA);
+    double damping_s = step->dt_s * (body->adaptive ? GAMMA_HELD : GAMMA);
     if (h->n_contact == 0 || soft <= 0) {
         pal_set3(h->slip, 0, 0, 0);
-        h->raw_N = 0;
+        h->uncapped_N = 0;
         return;
     }
     for (int i = 0; i < h->n_contact; i++) {
@@ -444,18 +448,18 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
         pal_add3(sum, sum, h->contact[i].force);
         stiffness += soft * h->contact[i].k_N_m;
     }
-    if (body->shell) stiffness *= keep_force(h, sum);
+    if (body->adaptive) stiffness *= keep_force(h, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, h, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
-    pal_touch_force_begin(&push->touch);
+    pal_contact_points_force_begin(&push->touch);
     for (int i = 0; i < h->n_contact; i++) {
-        pal_touch_push(&push->touch, body, h->contact[i].point, h->contact[i].force);
+        pal_contact_points_add_force(&push->touch, body, h->contact[i].point, h->contact[i].force);
         pal_add3(sum, sum, h->contact[i].force);
     }
     pal_scale3(h->total, -1, sum);
-    double room = fmin(pal_tool_room(tool, h->total), pal_touch_gather(&push->touch, body));
-    pal_touch_apply(&push->touch, body, room);
+    double room = fmin(pal_tool_force_share(tool, h->total), pal_contact_points_assemble(&push->touch, body));
+    pal_contact_points_apply(&push->touch, body, room);
     pal_scale3(h->total, room, h->total);
     for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
     pal_add3(tool->force_N, tool->force_N, h->total);
@@ -471,7 +475,7 @@ static void find_stiffening(holder *h, const pal_tool *tool, const pal_body *bod
     double here[3], deepest = 0, radius = tool->radius_m;
     pal_sub3(here, tool->here_m, body->offset_m);
     for (int i = 0; i < h->n_contact; i++) deepest = fmax(deepest, h->contact[i].depth_m);
-    if (deepest > 0.9 * h->limits.deepest_m && pal_dist3(here, h->proxy.x) > 0.01 * radius)
+    if (deepest > 0.9 * h->limits.max_depth_m && pal_dist3(here, h->proxy.x) > 0.01 * radius)
         h->share = fmin(STIFFEST, h->share * STIFFEN);
     else if (deepest < SHALLOW_RADII * radius)
         h->share = fmax(1, h->share * SOFTEN);
@@ -482,35 +486,39 @@ static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step
 {
     find_stiffening(h, tool, step->body);
     double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), move[3], stiffness = 0;
-    pal_copy3(h->firm->side_before, h->proxy.normal);
-    h->firm->back_before_m = h->firm->back_m;
+    pal_copy3(h->firm->old_side, h->proxy.normal);
+    h->firm->old_back_m = h->firm->back_m;
     h->firm->published = false;
-    if (step->sub == step->n_sub - 1) h->firm->patches_before = h->patches;
-    h->n_contact = soft > 0 ? pal_press_thin(h->contact, h->n_contact) : 0;
+    if (step->sub == step->n_sub - 1) h->firm->old_patches = h->patches;
+    h->n_contact = soft > 0 ? pal_contact_implicit_thin(h->contact, h->n_contact) : 0;
     for (int i = 0; i < h->n_contact; i++) {
         h->contact[i].k_N_m *= soft;
         if (h->contact[i].depth_m > 0) stiffness += h->contact[i].k_N_m;
     }
-    (void)pal_holder_side(h, h->proxy.normal, stiffness, h->firm->press.next_slip_m);
+    (void)pal_tool_contact_friction(h, h->proxy.normal, stiffness, h->firm->press.next_slip_m);
     pal_scale3(move, step->dt_s, h->proxy.v);
-    pal_press_begin(&h->firm->press, push->ties, &push->touch, step->body, h->contact, h->n_contact, push->friction,
-                    move);
+    pal_contact_implicit_begin(&h->firm->press, push->contact_springs, &push->touch, step->body, h->contact,
+                               h->n_contact, push->friction, move);
     h->n_contact = h->firm->press.n_contact;
 }
 
 /* k1 of a blob from the solver's compliance: as it is known, found again when it has changed and the step's budget
  * allows; x [n_list][3] are the points */
-static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *step, const double *x, pal_blob *blob)
+static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *step, const double *x,
+                 pal_contact_group *contact_group)
 {
     double here[3], radius = tool->radius_m, least = INFINITY, sum = 0;
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    h->firm->felt.step = push->n_step;
-    if (!pal_felt_look(&h->firm->felt, blob, here, STILL_RADII * radius) || push->n_felt >= FELT_A_STEP) return;
-    if (blob->force_N > 0 && h->firm->press.constant) return;
+    h->firm->haptic_stiffness.step = push->n_step;
+    if (!pal_haptic_stiffness_find(&h->firm->haptic_stiffness, contact_group, here, STILL_RADII * radius) ||
+        push->n_felt >= FELT_A_STEP)
+        return;
+    if (contact_group->force_N > 0 && h->firm->press.constant) return;
     push->n_felt++;
-    if (blob->force_N > 0) {
-        pal_felt_contact(&h->firm->felt, blob, here, &h->firm->press, push->ties, &push->touch, step->body, h->contact,
-                         radius, step->scratch);
+    if (contact_group->force_N > 0) {
+        pal_haptic_stiffness_contact(&h->firm->haptic_stiffness, contact_group, here, &h->firm->press,
+                                     push->contact_springs, &push->touch, step->body, h->contact, radius,
+                                     step->scratch);
         return;
     }
     /* what the sphere would lie on, were it an eighth of a radius nearer */
@@ -521,49 +529,54 @@ static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *ste
         for (int i = 0; i < h->n_list && n < NEAR_MAX; i++) {
             double out[3], area = push->touch.area_m2[h->list[i]];
             pal_sub3(out, h->proxy.x, x + 3 * i);
-            double along = pal_dot3(out, blob->normal), distance = pal_norm3(out);
+            double along = pal_dot3(out, contact_group->normal), distance = pal_norm3(out);
             if (along < 0.5 * distance || area <= 0) continue;
             if (pass == 0) least = fmin(least, distance);
             if (pass == 0 || distance > least + NEAR_RADII * radius) continue;
             point[n] = h->list[i];
-            k += area * implicit_Pa_m(push, point[n], radius, step->body->h_m);
+            k += area * implicit_Pa_m(push, point[n], radius, step->body->edge_m);
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_felt_near(&h->firm->felt, blob, here, &push->touch, step->body, point, weight, n, k, step->scratch);
+    pal_haptic_stiffness_near(&h->firm->haptic_stiffness, contact_group, here, &push->touch, step->body, point, weight,
+                              n, k, step->scratch);
 }
 
 /* what a haptic bridge needs to know, in the last sub-step */
 static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     if (!h->active) return;
-    pal_blob blob[PAL_PATCH_MAX];
+    pal_contact_group contact_group[PAL_CONTACT_PATCH_MAX];
     int n = 0;
     size_t used = pal_arena_used(step->scratch);
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list);
     uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, h->n_contact);
     if (x && grouped) {
-        while (n < PAL_PATCH_MAX && pal_press_blob(h->contact, h->n_contact, grouped, &blob[n])) n++;
+        while (n < PAL_CONTACT_PATCH_MAX &&
+               pal_contact_group_next(h->contact, h->n_contact, grouped, &contact_group[n]))
+            n++;
         /* while the force of before is let go it is all of one patch */
-        if (h->hold.share > 0 && pal_unit3(blob[0].normal, h->total, 0)) {
-            blob[0].force_N = pal_norm3(h->total), blob[0].gap_m = 0;
+        if (h->hold.share > 0 && pal_unit3(contact_group[0].normal, h->total, 0)) {
+            contact_group[0].force_N = pal_norm3(h->total), contact_group[0].gap_m = 0;
             n = 1;
         }
-        for (int i = 0; i < h->n_list; i++) pal_touch_point(&push->touch, h->list[i], x + 3 * i);
+        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->touch, h->list[i], x + 3 * i);
         double near = near_m(push, tool->radius_m);
-        while (n < PAL_PATCH_MAX && pal_press_near(h->proxy.x, tool->radius_m, near, x, h->n_list, blob, n, &blob[n]))
+        while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_near(h->proxy.x, tool->radius_m, near, x, h->n_list,
+                                                                   contact_group, n, &contact_group[n]))
             n++;
         for (int b = 0; b < n && step->body->compliance && h->hold.share == 0; b++)
-            feel(push, h, tool, step, x, &blob[b]);
+            feel(push, h, tool, step, x, &contact_group[b]);
     }
-    pal_arena_return(step->scratch, used);
+    pal_arena_rewind(step->scratch, used);
     double radius = tool->radius_m;
-    pal_patch_rules rules = {.radius_m = radius, .k_least_N_m = 10, .k_most_N_m = 5000, .friction = push->friction};
+    pal_contact_patch_options rules = {
+        .radius_m = radius, .k_min_N_m = 10, .k_max_N_m = 5000, .friction = push->friction};
     rules.k_start_N_m = 2 * push->young_Pa * radius / (1 - push->poisson * push->poisson);
-    rules.k_start_N_m = fmin(fmax(rules.k_start_N_m, rules.k_least_N_m), rules.k_most_N_m);
+    rules.k_start_N_m = fmin(fmax(rules.k_start_N_m, rules.k_min_N_m), rules.k_max_N_m);
     /* drag of the tissue that moves along, about 4 radii cubed */
     rules.b_s = push->damping_1_s * 4 * push->density_kg_m3 * radius * radius * radius / rules.k_start_N_m;
-    pal_patches_update(&h->patches, &rules, blob, n, tool);
+    pal_contact_patches_update(&h->patches, &rules, contact_group, n, tool);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -573,16 +586,16 @@ static pal_err run(void *self, pal_step *step)
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     if (step->body->frozen) return PAL_ERR_OK;
     if (step->sub == 0) {
-        bool renewed = pal_touch_follow(&push->touch, step->body);
-        for (int t = 0; t < n_tool; t++) push->holder[t].renewed = renewed;
-        pal_touch_begin(&push->touch);
+        bool retriangulated = pal_contact_points_update_topology(&push->touch, step->body);
+        for (int t = 0; t < n_tool; t++) push->holder[t].retriangulated = retriangulated;
+        pal_contact_points_begin(&push->touch);
         for (int t = 0; t < n_tool; t++) begin_tool(push, &push->holder[t], &tools->tool[t], step);
     }
-    pal_touch_update(&push->touch, step->body, step->dt_s);
+    pal_contact_points_update(&push->touch, step->body, step->dt_s);
     for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
     if (step->body->implicit) {
         push->n_step += step->sub == 0, push->n_felt = 0;
-        pal_ties_begin(push->ties);
+        pal_contact_springs_begin(push->contact_springs);
         for (int t = 0; t < n_tool; t++) tie(push, &push->holder[t], &tools->tool[t], step);
         return PAL_ERR_OK;
     }
@@ -600,54 +613,59 @@ static pal_err run(void *self, pal_step *step)
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
     (void)body, (void)c;
-    pal_ties_multiply(((tool_push *)self)->ties, k, p, out);
+    pal_contact_springs_multiply(((tool_push *)self)->contact_springs, k, p, out);
 }
 
-static bool settle(void *self, pal_step *step, const double *moved)
+static bool settle(void *self, pal_step *step, const double *moved, bool last)
 {
     tool_push *push = self;
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     bool again = false;
-    pal_ties_motion(push->ties, moved);
+    pal_contact_springs_motion(push->contact_springs, moved);
     for (int t = 0; t < n_tool; t++) {
         holder *h = &push->holder[t];
         pal_tool *tool = &tools->tool[t];
         if (!h->active) continue;
-        again |= pal_press_settle(&h->firm->press, push->ties, step->body, tool, h->contact, push->friction);
+        if (!last) {
+            again |= pal_press_within(&h->firm->press, push->contact_springs, step->body, tool, h->contact);
+            continue;
+        }
+        again |= pal_contact_implicit_settle(&h->firm->press, push->contact_springs, step->body, tool, h->contact,
+                                             push->friction);
         pal_add3(h->total, h->firm->press.total_N, h->hold.now_N);
-        follow_side(h, h->firm->side_before);
+        follow_side(h, h->firm->old_side);
         find_back(push, h, tool);
     }
     /* each tool in turn is the first to have its patches' stiffness found */
-    for (int i = 0; i < n_tool && step->sub == step->n_sub - 1; i++) {
+    for (int i = 0; i < n_tool && last && step->sub == step->n_sub - 1; i++) {
         int t = (i + push->n_step) % n_tool;
         holder *h = &push->holder[t];
         pal_tool *tool = &tools->tool[t];
         if (h->firm->published) {
-            h->patches = h->firm->patches_before;
-            tool->n_patch = h->firm->n_patch_before;
+            h->patches = h->firm->old_patches;
+            tool->n_patch = h->firm->n_old_patch;
         }
-        h->firm->n_patch_before = tool->n_patch;
+        h->firm->n_old_patch = tool->n_patch;
         publish(push, h, tool, step);
         h->firm->published = true;
     }
     return again;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_hand *by)
+static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its touch gathers forces, which is work room */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
         double k_N_m = push->young_Pa * old->holder[t].limits.radius_m / (1 - push->poisson * push->poisson);
-        pal_holder_hand(&push->holder[t], body, &old->holder[t], by->from, &old->touch, by->place, k_N_m);
+        pal_tool_contact_transfer(&push->holder[t], body, &old->holder[t], by->from, &old->touch, by->place, k_N_m);
     }
 }
 
 static void destroy(void *self)
 {
     tool_push *push = self;
-    for (int t = 0; t < push->n_tool; t++) pal_holder_free(&push->holder[t]);
+    for (int t = 0; t < push->n_tool; t++) pal_tool_contact_free(&push->holder[t]);
 }
 
 /* what is pressed stays so, however far the tool goes beyond */

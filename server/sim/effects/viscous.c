@@ -9,12 +9,12 @@ typedef struct viscous {
     bool given;
 } viscous;
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     double rate = build->def->material.damping_1_s;
-    bool given = pal_item_has(item, "rate_1_s");
-    PAL_TRY(pal_item_number(item, "rate_1_s", 0, 1e9, &rate, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    bool given = pal_entry_has(item, "rate_1_s");
+    PAL_TRY(pal_entry_read_number(item, "rate_1_s", 0, 1e9, &rate, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     viscous *row = PAL_NEW(build->arena, viscous, 1);
     if (!row) return PAL_ERR_MEMORY;
     *row = (viscous){.rate_1_s = rate, .given = given};
@@ -48,10 +48,10 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
     }
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     viscous *row = self;
-    (void)body, (void)note;
+    (void)body, (void)diag;
     if (!row->given) row->rate_1_s = to->damping_1_s;
     return PAL_ERR_OK;
 }

@@ -1,5 +1,5 @@
 /* Voxel hexahedra: layout, material, untangling. */
-#include "server/sim/elements/elastic_hex_lanes.h"
+#include "server/sim/elements/elastic_hex_simd.h"
 
 /* least share of material (numerics.md, border voxels), and the corner determinant below which cubes are tangled */
 static const double least_share = 0.02, least_corner = 0.05;
@@ -12,10 +12,10 @@ static const double least_whole = 0.3, most_needed = 0.9, most_whole = 20;
 enum { SOON = 600 };
 static const double better = 0.05;
 /* of the split: turned over voxels have no volume to keep, and five tetrahedra each lock well below 0.5 */
-static const double most_poisson = 0.3;
+static const double max_poisson = 0.3;
 
 /* K for mu = 1 and for lambda = 1, times 16 / h, in pairs of corners */
-static void fill_reference(pal_hex_row *row)
+static void fill_reference(pal_elastic_hexes *row)
 {
     for (int part = 0; part < 2; part++)
         for (int d = 0; d < 8; d++)
@@ -30,72 +30,72 @@ static void fill_reference(pal_hex_row *row)
             }
 }
 
-void pal_hex_material(pal_hex_row *row, const pal_material *material)
+void pal_hex_material(pal_elastic_hexes *row, const pal_material *material)
 {
     for (int e = 0; e < row->n_hex; e++) {
-        int lane = row->strips.place[e];
-        double mu, lambda, scale = row->share[lane] * row->h_m / 16;
-        pal_elastic_parts_lame(&row->parts, material, e, &mu, &lambda);
+        int lane = row->simd_blocks.place[e];
+        double mu, lambda, scale = row->share[lane] * row->edge_m / 16;
+        pal_elastic_regions_lame(&row->parts, material, e, &mu, &lambda);
         row->mu[lane] = scale * mu;
         row->lambda[lane] = scale * lambda;
         /* the dilatation or a shear of modes, whose squares are 8 times those of corners */
         row->bound[lane] = 8 * scale * fmax(2 * mu, 2 * mu + 3 * lambda);
     }
     if (row->split) pal_elastic_tets_material(row->split, material);
-    pal_kept_forget(&row->kept);
+    pal_force_cache_invalidate(&row->kept);
 }
 
-void pal_hex_reset(pal_hex_row *row)
+void pal_hex_reset(pal_elastic_hexes *row)
 {
     for (int b = 0; b < row->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) {
             for (int i = 0; i < 4; i++) row->q[(4 * b + i) * PAL_LANES + l] = i == 0;
             for (int i = 0; i < 9; i++) row->turn[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
-    row->tangled = false;
+    row->has_inversion = false;
     row->n_whole = SOON, row->needed = row->tried = least_whole;
-    pal_kept_forget(&row->kept);
-    row->n_tangled = row->n_switch = 0;
+    pal_force_cache_invalidate(&row->kept);
+    row->n_inversion = row->n_switch = 0;
     row->n_slow = 0;
-    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_straight = 0;
+    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_single_rotation = 0;
 }
 
 /* the five-tetrahedra split: every five tetrahedra fill the cube of the same number */
-static pal_err check_split(const pal_hexes *hexes, const pal_tets *tets, const char *path, pal_note *note)
+static pal_err check_split(const pal_hexes *hexes, const pal_tets *tets, const char *path, pal_diagnostic *diag)
 {
     if (!tets || tets->n_tet != 5 * hexes->n_hex)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s: %d tetrahedra are no split of %d voxels", path,
-                            tets ? tets->n_tet : 0, hexes->n_hex);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d tetrahedra are no split of %d voxels", path,
+                                  tets ? tets->n_tet : 0, hexes->n_hex);
     for (int i = 0; i < 4 * tets->n_tet; i++) {
         const int32_t *node = hexes->node + 8 * (i / 20);
         int c = 0;
         while (c < 8 && node[c] != tets->tet[i]) c++;
         if (c == 8)
-            return pal_note_set(note, PAL_ERR_REFUSED, "%s: tetrahedron %d is not part of voxel %d", path, i / 4,
-                                i / 20);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: tetrahedron %d is not part of voxel %d", path, i / 4,
+                                      i / 20);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err make_split(pal_hex_row *row, pal_build *build, const char *path)
+static pal_err make_split(pal_elastic_hexes *row, pal_build *build, const char *path)
 {
     const pal_tets *tets = build->body->tets;
-    PAL_TRY(check_split(row->hexes, tets, path, build->note));
+    PAL_TRY(check_split(row->hexes, tets, path, build->diag));
     row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
     row->split_fill = PAL_NEW(build->arena, float, tets->n_tet);
     if (!row->split || !row->split_fill) return PAL_ERR_MEMORY;
-    for (int t = 0; t < tets->n_tet; t++) row->split_fill[t] = (float)row->share[row->strips.place[t / 5]];
-    const pal_elastic_tets_wish wish = {.law = PAL_LAW_COROTATIONAL,
-                                        .untangle = true,
-                                        .most_poisson = most_poisson,
-                                        .n_corner = 4,
-                                        .n_tet = tets->n_tet,
-                                        .tet = tets->tet,
-                                        .fill = row->split_fill};
+    for (int t = 0; t < tets->n_tet; t++) row->split_fill[t] = (float)row->share[row->simd_blocks.place[t / 5]];
+    const pal_elastic_tets_options wish = {.law = PAL_LAW_COROTATIONAL,
+                                           .recover = true,
+                                           .max_poisson = max_poisson,
+                                           .n_corner = 4,
+                                           .n_tet = tets->n_tet,
+                                           .tet = tets->tet,
+                                           .fill = row->split_fill};
     return pal_elastic_tets_make(&wish, build, row->split);
 }
 
-static pal_err take_memory(pal_hex_row *row, pal_arena *arena)
+static pal_err take_memory(pal_elastic_hexes *row, pal_arena *arena)
 {
     size_t n = (size_t)row->n_block * PAL_LANES;
     row->hex = PAL_NEW(arena, int32_t, n);
@@ -116,36 +116,38 @@ static pal_err take_memory(pal_hex_row *row, pal_arena *arena)
     return row->tangent ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_hex_make(const pal_hex_wish *wish, pal_build *build, const char *path, pal_hex_row *out)
+pal_err pal_hex_make(const pal_hex_options *wish, pal_build *build, const char *path, pal_elastic_hexes *out)
 {
     pal_body *body = build->body;
     if (!body->hexes || body->hexes->n_hex < 1 || !body->tets)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"hex_elastic\" needs a body of voxels", path);
-    *out = (pal_hex_row){.law = wish->law,
-                         .element = wish->element,
-                         .fill = wish->fill,
-                         .untangle = wish->untangle,
-                         .implicit = body->implicit,
-                         .hexes = body->hexes,
-                         .n_hex = body->hexes->n_hex,
-                         .h_m = body->tets->h_m};
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"hex_elastic\" needs a body of voxels", path);
+    *out = (pal_elastic_hexes){.law = wish->law,
+                               .element = wish->element,
+                               .fill = wish->fill,
+                               .recover = wish->recover,
+                               .implicit = body->implicit,
+                               .hexes = body->hexes,
+                               .n_hex = body->hexes->n_hex,
+                               .edge_m = body->tets->edge_m};
     out->beta[0] = wish->element == PAL_HEX_BBAR ? -2.0 / 3 : 0;
     out->beta[1] = wish->element == PAL_HEX_BBAR ? 0 : 1;
-    if (!body->slots) PAL_TRY(pal_slots_make(body->x_rest, body->n_node, body->tets->h_m, build->arena, &body->slots));
-    PAL_TRY(pal_strips_keep(body->slots, out->hexes->node, out->n_hex, 8, build->arena, &out->strips));
-    out->n_block = out->strips.n_lane / PAL_LANES;
-    PAL_TRY(pal_elastic_parts_make(build, out->hexes->node, out->n_hex, 8, 8, &out->parts));
+    if (!body->node_order)
+        PAL_TRY(pal_node_order_make(body->x_rest, body->n_node, body->tets->edge_m, build->arena, &body->node_order));
+    PAL_TRY(pal_simd_blocks_make_ordered(body->node_order, out->hexes->node, out->n_hex, 8, build->arena,
+                                         &out->simd_blocks));
+    out->n_block = out->simd_blocks.n_lane / PAL_LANES;
+    PAL_TRY(pal_elastic_regions_make(build, out->hexes->node, out->n_hex, 8, 8, &out->parts));
     PAL_TRY(take_memory(out, build->arena));
-    if (out->implicit) PAL_TRY(pal_kept_make(body->n_node, build->arena, &out->kept));
-    for (int i = 0; i < out->strips.n_lane; i++) out->hex[i] = -1;
+    if (out->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &out->kept));
+    for (int i = 0; i < out->simd_blocks.n_lane; i++) out->hex[i] = -1;
     for (int e = 0; e < out->n_hex; e++) {
-        int lane = out->strips.place[e];
+        int lane = out->simd_blocks.place[e];
         bool filled = !out->fill || !out->hexes->fill;
         out->hex[lane] = e;
         out->share[lane] = filled ? 1 : fmax(least_share, fmin(1, (double)out->hexes->fill[e]));
     }
     fill_reference(out);
-    if (wish->untangle && wish->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));
+    if (wish->recover && wish->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));
     pal_hex_material(out, &build->def->material);
     pal_hex_reset(out);
     return PAL_ERR_OK;
@@ -173,14 +175,14 @@ PAL_WIDE_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, p
 }
 
 /* over all voxels, h^3 */
-static void corner_range(const pal_hex_row *row, const pal_body *body, double *low, double *high)
+static void corner_range(const pal_elastic_hexes *row, const pal_body *body, double *low, double *high)
 {
-    const double volume = row->h_m * row->h_m * row->h_m;
+    const double volume = row->edge_m * row->edge_m * row->edge_m;
     pal_wide least = wide_of(INFINITY), most = wide_of(-INFINITY);
-    pal_slots_load(body->slots, body->d);
+    pal_node_order_load(body->node_order, body->d);
     for (int b = 0; b < row->n_block; b++) {
         hex_view v;
-        hex_open(row, body->slots, b, &v);
+        hex_open(row, body->node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide small, large;
             range_of_corners(&v, l, &small, &large);
@@ -193,44 +195,44 @@ static void corner_range(const pal_hex_row *row, const pal_body *body, double *l
     for (int l = 0; l < PAL_WIDE; l++) *low = fmin(*low, least[l] / volume), *high = fmax(*high, most[l] / volume);
 }
 
-double pal_hex_least_corner(const pal_hex_row *row, const pal_body *body)
+double pal_hex_min_corner(const pal_elastic_hexes *row, const pal_body *body)
 {
     double low, high;
     corner_range(row, body, &low, &high);
     return low;
 }
 
-bool pal_hex_untangle(pal_hex_row *row, const pal_body *body)
+bool pal_hex_recover(pal_elastic_hexes *row, const pal_body *body)
 {
     if (!row->split) return false;
     double low, high;
     corner_range(row, body, &low, &high);
-    const bool before = row->tangled;
+    const bool before = row->has_inversion;
     if (before) {
-        row->tangled = low < row->needed || high > most_whole;
-        if (!row->tangled) row->n_whole = 0, row->tried = low;
+        row->has_inversion = low < row->needed || high > most_whole;
+        if (!row->has_inversion) row->n_whole = 0, row->tried = low;
     } else {
-        row->tangled = low < least_corner || high > most_corner;
+        row->has_inversion = low < least_corner || high > most_corner;
         if (row->n_whole < SOON) row->n_whole++;
     }
-    if (row->tangled && !before) {
+    if (row->has_inversion && !before) {
         row->needed = row->n_whole < SOON ? fmin(fmax(row->needed, row->tried) + better, most_needed) : least_whole;
         pal_elastic_tets_reset(row->split);
     }
-    row->n_tangled += row->tangled;
-    row->n_switch += row->tangled != before;
-    return row->tangled != before;
+    row->n_inversion += row->has_inversion;
+    row->n_switch += row->has_inversion != before;
+    return row->has_inversion != before;
 }
 
 /* where each pair of corners stands in the pattern */
-static void find_entries(pal_hex_row *row, const pal_blocks *to)
+static void find_entries(pal_elastic_hexes *row, const pal_block_matrix *to)
 {
     row->entry_of = to, row->entry_row = to->row;
     for (int e = 0; e < row->n_hex; e++)
         for (int c = 0; c < 8; c++)
             for (int d = c; d < 8; d++) {
                 int i = row->hexes->node[8 * e + c], j = row->hexes->node[8 * e + d];
-                int at = i >= j ? pal_blocks_find(to, i, j) : ~pal_blocks_find(to, j, i);
+                int at = i >= j ? pal_block_matrix_find(to, i, j) : ~pal_block_matrix_find(to, j, i);
                 row->entry[36 * e + pal_hex_pair(c, d)] = at;
             }
 }
@@ -246,7 +248,7 @@ static void add_entries(const int32_t *entry, const double *part, double *value)
     }
 }
 
-void pal_hex_assemble(pal_hex_row *row, double k, pal_blocks *to)
+void pal_hex_assemble(pal_elastic_hexes *row, double k, pal_block_matrix *to)
 {
     double part[36 * 9 * PAL_LANES];
     if (!row->entry) return;
@@ -263,10 +265,10 @@ void pal_hex_assemble(pal_hex_row *row, double k, pal_blocks *to)
     }
 }
 
-void pal_hex_rotate(const pal_hex_row *row, double *turn)
+void pal_hex_rotate(const pal_elastic_hexes *row, double *turn)
 {
     for (int e = 0; e < row->n_hex; e++) {
-        int lane = row->strips.place[e];
+        int lane = row->simd_blocks.place[e];
         const double *at = row->turn + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
         double r[9];
         for (int i = 0; i < 9; i++) r[i] = row->mu[lane] * at[i * PAL_LANES];

@@ -15,24 +15,24 @@
  * some millimetres from the other: where they were tried in vain they are tried again only when they are less crushed.
  *
  * Memory: the world's arena. Thread: [load] to make, then [sim]. */
-#ifndef PAL_SIM_ELASTIC_HEX_H
-#define PAL_SIM_ELASTIC_HEX_H
-#include "server/sim/core/kept.h"
+#ifndef PAL_SIM_ELEMENTS_ELASTIC_HEX_H
+#define PAL_SIM_ELEMENTS_ELASTIC_HEX_H
+#include "server/sim/core/force_cache.h"
 #include "server/sim/elements/elastic_tet.h"
 
 typedef enum pal_hex_element { PAL_HEX_BBAR, PAL_HEX_FULL } pal_hex_element;
 
-typedef struct pal_hex_row {
+typedef struct pal_elastic_hexes {
     pal_elastic_law law;
     pal_hex_element element;
-    bool fill, untangle;
+    bool fill, recover;
     bool implicit; /* the solver linearises: tangles are looked for there, else whenever forces are taken */
     const pal_hexes *hexes;
     int n_hex, n_block;
-    double h_m;
-    double beta[2]; /* beta = beta[0] mu + beta[1] lambda (elastic_hex_lanes.h) */
-    pal_strips strips;
-    pal_elastic_parts parts;
+    double edge_m;
+    double beta[2]; /* beta = beta[0] mu + beta[1] lambda (elastic_hex_simd.h) */
+    pal_simd_blocks simd_blocks;
+    pal_elastic_regions parts;
     double (*reference)[2][9]; /* 3x3 blocks of K for mu = 1 and for lambda = 1, corner pairs c <= d, h / 16 [36] */
 
     int32_t *hex;        /* element of each lane, -1: none                   [n_block][8]    */
@@ -45,32 +45,33 @@ typedef struct pal_hex_row {
     int n_slow;          /* rotations that vectors could not settle, last force or linearise */
     int32_t *entry;      /* implicit: blocks of the pattern last assembled into [n_hex][36], ~ where transposed */
     const int32_t *entry_row;
-    const pal_blocks *entry_of;
+    const pal_block_matrix *entry_of;
 
-    pal_kept kept; /* implicit: of the cubes, not of the split */
+    pal_force_cache kept; /* implicit: of the cubes, not of the split */
 
-    bool tangled;
-    int n_whole;                  /* looks since it went back to cubes, up to SOON                                */
-    double tried, needed;         /* least corner when it did; that it takes to go back                           */
-    uint64_t n_tangled, n_switch; /* looks that found the body tangled; changes of cubes, split, straight; since run */
-    pal_elastic_tets *split;      /* NULL: untangle is false or the law is linear */
-    float *split_fill;            /* [n_tet]                                       */
-} pal_hex_row;
+    bool has_inversion;
+    int n_whole;          /* looks since it went back to cubes, up to SOON                                */
+    double tried, needed; /* least corner when it did; that it takes to go back                           */
+    uint64_t n_inversion,
+        n_switch;            /* looks that found the body tangled; changes of cubes, split, straight; since run */
+    pal_elastic_tets *split; /* NULL: untangle is false or the law is linear */
+    float *split_fill;       /* [n_tet]                                       */
+} pal_elastic_hexes;
 
 /* what pal_elastic_hex_make shall make */
-typedef struct pal_hex_wish {
+typedef struct pal_hex_options {
     pal_elastic_law law;
     pal_hex_element element;
-    bool fill, untangle;
-} pal_hex_wish;
+    bool fill, recover;
+} pal_hex_options;
 
 /* REFUSED: the body has no cubes, or its tetrahedra are not their split; makes body->slots when there are none */
-pal_err pal_hex_make(const pal_hex_wish *wish, pal_build *build, const char *path, pal_hex_row *out);
-void pal_hex_material(pal_hex_row *row, const pal_material *material);
-void pal_hex_reset(pal_hex_row *row);
+pal_err pal_hex_make(const pal_hex_options *wish, pal_build *build, const char *path, pal_elastic_hexes *out);
+void pal_hex_material(pal_elastic_hexes *row, const pal_material *material);
+void pal_hex_reset(pal_elastic_hexes *row);
 /* looks at all corners and chooses between cubes and split; true: it changed */
-bool pal_hex_untangle(pal_hex_row *row, const pal_body *body);
-double pal_hex_least_corner(const pal_hex_row *row, const pal_body *body); /* least corner determinant, h^3 */
+bool pal_hex_recover(pal_elastic_hexes *row, const pal_body *body);
+double pal_hex_min_corner(const pal_elastic_hexes *row, const pal_body *body); /* least corner determinant, h^3 */
 /* block pairs of corners: index of c <= d in `reference` and `entry` */
 static inline int pal_hex_pair(int c, int d)
 {
@@ -78,24 +79,24 @@ static inline int pal_hex_pair(int c, int d)
 }
 
 /* effect.h assemble, rotate, measure, stress */
-void pal_hex_assemble(pal_hex_row *row, double k, pal_blocks *to);
-void pal_hex_rotate(const pal_hex_row *row, double *turn);
-void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, double *sum, double *volume_m3);
-void pal_hex_stress(pal_hex_row *row, const pal_body *body, pal_stress_take *take, void *user);
+void pal_hex_assemble(pal_elastic_hexes *row, double k, pal_block_matrix *to);
+void pal_hex_rotate(const pal_elastic_hexes *row, double *turn);
+void pal_hex_measure(pal_elastic_hexes *row, const pal_body *body, pal_field field, double *sum, double *volume_m3);
+void pal_hex_stress(pal_elastic_hexes *row, const pal_body *body, pal_stress_take *take, void *user);
 
 /* the laws: body->slots->x holds positions (or p), forces (or products) are added to body->slots->f */
-void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots);
+void pal_hex_corot_force(pal_elastic_hexes *row, pal_node_order *node_order);
 /* with forces: added as by ..force too */
-double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots, bool forces);
-void pal_hex_corot_linearise(pal_hex_row *row, pal_slots *slots);
-void pal_hex_corot_multiply(const pal_hex_row *row, pal_slots *slots, double k);
+double pal_hex_corot_energy(pal_elastic_hexes *row, pal_node_order *node_order, bool forces);
+void pal_hex_corot_linearise(pal_elastic_hexes *row, pal_node_order *node_order);
+void pal_hex_corot_multiply(const pal_elastic_hexes *row, pal_node_order *node_order, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */
-void pal_hex_corot_blocks(const pal_hex_row *row, int block, double k, double *to);
+void pal_hex_corot_blocks(const pal_elastic_hexes *row, int block, double k, double *to);
 
-void pal_hex_neo_force(pal_hex_row *row, pal_slots *slots);
-double pal_hex_neo_energy(pal_hex_row *row, pal_slots *slots, bool forces);
-void pal_hex_neo_linearise(pal_hex_row *row, pal_slots *slots);
-void pal_hex_neo_multiply(const pal_hex_row *row, pal_slots *slots, double k);
-void pal_hex_neo_blocks(const pal_hex_row *row, int block, double k, double *to);
-void pal_hex_neo_bound(pal_hex_row *row, const pal_body *body, double *bound_N_m);
+void pal_hex_neo_force(pal_elastic_hexes *row, pal_node_order *node_order);
+double pal_hex_neo_energy(pal_elastic_hexes *row, pal_node_order *node_order, bool forces);
+void pal_hex_neo_linearise(pal_elastic_hexes *row, pal_node_order *node_order);
+void pal_hex_neo_multiply(const pal_elastic_hexes *row, pal_node_order *node_order, double k);
+void pal_hex_neo_blocks(const pal_elastic_hexes *row, int block, double k, double *to);
+void pal_hex_neo_bound(pal_elastic_hexes *row, const pal_body *body, double *bound_N_m);
 #endif

@@ -6,10 +6,10 @@
  * is missing is added (turn_force): with dE = t.w for a turn w of R, t = -sum x_m cross g_m over the bending modes,
  * and (tr S I - S) w = axial(R' dF - dF' R), S = sym(R'F), it is a skew pair of forces on the modes x, y, z. The forces
  * are the gradient of E then and no body turns itself. The tangent leaves it out. */
-#include "server/sim/elements/elastic_hex_lanes.h"
+#include "server/sim/elements/elastic_hex_simd.h"
 
 /* coefficients of 8 lanes from l on */
-PAL_WIDE_INLINE void load_stiff(const pal_hex_row *row, int block, int l, double k, pal_wide stiff[3])
+PAL_WIDE_INLINE void load_stiff(const pal_elastic_hexes *row, int block, int l, double k, pal_wide stiff[3])
 {
     stiff[0] = k * wide_load(row->mu + PAL_LANES * block + l);
     stiff[1] = k * wide_load(row->lambda + PAL_LANES * block + l);
@@ -47,13 +47,13 @@ PAL_WIDE_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
 enum { FORCE = 1, ENERGY = 2 };
 
 /* forces are added, the energy is returned */
-PAL_WIDE_INLINE double all_blocks(pal_hex_row *row, pal_slots *slots, bool turned, int what)
+PAL_WIDE_INLINE double all_blocks(pal_elastic_hexes *row, pal_node_order *node_order, bool turned, int what)
 {
     pal_wide sum = {0};
     row->n_slow = 0;
     for (int b = 0; b < row->n_block; b++) {
         hex_view v;
-        hex_open(row, slots, b, &v);
+        hex_open(row, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], x[3][8], r[9], stiff[3], e = {0};
             hex_modes(&v, l, u);
@@ -62,11 +62,12 @@ PAL_WIDE_INLINE double all_blocks(pal_hex_row *row, pal_slots *slots, bool turne
                 hex_unrotate(r, u);
             }
             memcpy(x, u, sizeof x);
-            for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * row->h_m;
+            for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * row->edge_m;
             load_stiff(row, b, l, -1, stiff);
             hex_stress(stiff[0], stiff[1], stiff[2], u);
             for (int i = 0; i < 3 && (what & ENERGY); i++) {
-                for (int m = 1; m < 8; m++) e += m == 1 << i ? (x[i][m] - 4 * row->h_m) * u[i][m] : x[i][m] * u[i][m];
+                for (int m = 1; m < 8; m++)
+                    e += m == 1 << i ? (x[i][m] - 4 * row->edge_m) * u[i][m] : x[i][m] * u[i][m];
             }
             /* what lanes without element read need not be finite */
             if (what & ENERGY) sum += wide_pick(stiff[0] < 0, e, wide_of(0));
@@ -77,35 +78,35 @@ PAL_WIDE_INLINE double all_blocks(pal_hex_row *row, pal_slots *slots, bool turne
             }
             hex_add(&v, l, u);
         }
-        if (what & FORCE) hex_close(row, slots, b, &v);
+        if (what & FORCE) hex_close(row, node_order, b, &v);
     }
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
     return -0.5 * all;
 }
 
-void pal_hex_corot_force(pal_hex_row *row, pal_slots *slots)
+void pal_hex_corot_force(pal_elastic_hexes *row, pal_node_order *node_order)
 {
     if (row->law == PAL_LAW_LINEAR)
-        all_blocks(row, slots, false, FORCE);
+        all_blocks(row, node_order, false, FORCE);
     else
-        all_blocks(row, slots, true, FORCE);
+        all_blocks(row, node_order, true, FORCE);
 }
 
-double pal_hex_corot_energy(pal_hex_row *row, pal_slots *slots, bool forces)
+double pal_hex_corot_energy(pal_elastic_hexes *row, pal_node_order *node_order, bool forces)
 {
     if (row->law == PAL_LAW_LINEAR)
-        return forces ? all_blocks(row, slots, false, FORCE | ENERGY) : all_blocks(row, slots, false, ENERGY);
-    return forces ? all_blocks(row, slots, true, FORCE | ENERGY) : all_blocks(row, slots, true, ENERGY);
+        return forces ? all_blocks(row, node_order, false, FORCE | ENERGY) : all_blocks(row, node_order, false, ENERGY);
+    return forces ? all_blocks(row, node_order, true, FORCE | ENERGY) : all_blocks(row, node_order, true, ENERGY);
 }
 
-void pal_hex_corot_linearise(pal_hex_row *row, pal_slots *slots)
+void pal_hex_corot_linearise(pal_elastic_hexes *row, pal_node_order *node_order)
 {
     row->n_slow = 0;
     if (row->law == PAL_LAW_LINEAR) return;
     for (int b = 0; b < row->n_block; b++) {
         hex_view v;
-        hex_open(row, slots, b, &v);
+        hex_open(row, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9];
             hex_modes(&v, l, u);
@@ -115,11 +116,11 @@ void pal_hex_corot_linearise(pal_hex_row *row, pal_slots *slots)
     }
 }
 
-PAL_WIDE_INLINE void multiply_all(const pal_hex_row *row, pal_slots *slots, double k, bool turned)
+PAL_WIDE_INLINE void multiply_all(const pal_elastic_hexes *row, pal_node_order *node_order, double k, bool turned)
 {
     for (int b = 0; b < row->n_block; b++) {
         hex_view v;
-        hex_open(row, slots, b, &v);
+        hex_open(row, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9], stiff[3];
             hex_modes(&v, l, u);
@@ -130,19 +131,19 @@ PAL_WIDE_INLINE void multiply_all(const pal_hex_row *row, pal_slots *slots, doub
             if (turned) hex_rotate(r, u);
             hex_add(&v, l, u);
         }
-        hex_close(row, slots, b, &v);
+        hex_close(row, node_order, b, &v);
     }
 }
 
-void pal_hex_corot_multiply(const pal_hex_row *row, pal_slots *slots, double k)
+void pal_hex_corot_multiply(const pal_elastic_hexes *row, pal_node_order *node_order, double k)
 {
     if (row->law == PAL_LAW_LINEAR)
-        multiply_all(row, slots, k, false);
+        multiply_all(row, node_order, k, false);
     else
-        multiply_all(row, slots, k, true);
+        multiply_all(row, node_order, k, true);
 }
 
-void pal_hex_corot_blocks(const pal_hex_row *row, int block, double k, double *to)
+void pal_hex_corot_blocks(const pal_elastic_hexes *row, int block, double k, double *to)
 {
     for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
         pal_wide stiff[3], r[9];

@@ -2,7 +2,7 @@
  * to each corner, which stands for an eighth of the cube. And the stress there, for estimates. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/elements/elastic_hex.h"
 
 #include <string.h>
@@ -57,11 +57,11 @@ static void neo_points(cube *q)
     }
 }
 
-static void take_cube(const pal_hex_row *row, const pal_body *body, int e, const double grad[8][8][3], cube *at)
+static void take_cube(const pal_elastic_hexes *row, const pal_body *body, int e, const double grad[8][8][3], cube *at)
 {
-    const double h = row->h_m;
+    const double h = row->edge_m;
     const int32_t *node = row->hexes->node + 8 * e;
-    int lane = row->strips.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
+    int lane = row->simd_blocks.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
     double share = row->share[lane], centre[9] = {0}, q[4];
     *at = (cube){.bbar = row->element == PAL_HEX_BBAR,
                  .volume_m3 = share * h * h * h,
@@ -73,7 +73,7 @@ static void take_cube(const pal_hex_row *row, const pal_body *body, int e, const
             centre[i] += at->f[p][i] / 8;
         }
     for (int i = 0; i < 4; i++) q[i] = row->law == PAL_LAW_LINEAR ? i == 0 : row->q[(4 * block + i) * PAL_LANES + l];
-    if (row->law == PAL_LAW_COROTATIONAL) pal_polar_turn(centre, q, 50);
+    if (row->law == PAL_LAW_COROTATIONAL) pal_polar_rotation(centre, q, 50);
     pal_quat_matrix(q, at->r);
     if (row->law == PAL_LAW_NEO_HOOKEAN)
         neo_points(at);
@@ -81,7 +81,7 @@ static void take_cube(const pal_hex_row *row, const pal_body *body, int e, const
         corot_points(at);
 }
 
-static double von_mises(const pal_hex_row *row, const cube *at, int p)
+static double von_mises(const pal_elastic_hexes *row, const cube *at, int p)
 {
     if (row->law != PAL_LAW_NEO_HOOKEAN) return pal_von_mises(at->stress[p]);
     double det = fmax(fabs(pal_det3(at->f[p])), 1e-3), cauchy[9];
@@ -89,7 +89,7 @@ static double von_mises(const pal_hex_row *row, const cube *at, int p)
     return pal_von_mises(cauchy);
 }
 
-void pal_hex_measure(pal_hex_row *row, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+void pal_hex_measure(pal_elastic_hexes *row, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     double grad[8][8][3];
     if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
@@ -118,7 +118,7 @@ static void turn_stress(const double r[9], const double s[9], double out[9])
     for (int i = 0; i < 9; i++) out[i] = pal_dot3(half + 3 * (i / 3), r + 3 * (i % 3));
 }
 
-void pal_hex_stress(pal_hex_row *row, const pal_body *body, pal_stress_take *take, void *user)
+void pal_hex_stress(pal_elastic_hexes *row, const pal_body *body, pal_stress_take *take, void *user)
 {
     double grad[8][8][3], shape[8][8];
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], shape[p], grad[p]);

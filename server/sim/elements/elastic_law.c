@@ -8,18 +8,18 @@
 
 #include <string.h>
 
-pal_err pal_elastic_law_read(pal_item *item, pal_elastic_law *out, pal_note *note)
+pal_err pal_elastic_law_read(pal_config_entry *item, pal_elastic_law *out, pal_diagnostic *diag)
 {
     static const char *const names[] = {"corotational", "linear", "neo_hookean"};
     const char *text = names[0];
-    PAL_TRY(pal_item_text(item, "law", &text, note));
+    PAL_TRY(pal_entry_read_text(item, "law", &text, diag));
     for (int i = 0; i < 3; i++)
         if (!strcmp(text, names[i])) {
             *out = (pal_elastic_law)i;
             return PAL_ERR_OK;
         }
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s.law: \"%s\" is not corotational, linear or neo_hookean", item->path,
-                        text);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.law: \"%s\" is not corotational, linear or neo_hookean",
+                              item->path, text);
 }
 
 void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa)
@@ -132,7 +132,7 @@ void pal_neo_hessian(double mu, double k1, double pressure, const double f[9], d
                 s * perm[m][3] * perm[n][3] * f[3 * perm[m][2] + perm[n][2]];
 }
 
-void pal_neo_modes_take(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out)
+void pal_neo_modes_compute(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out)
 {
     double s[3];
     pal_svd3(f, out->u, s, out->v);
@@ -188,10 +188,10 @@ void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81])
     }
 }
 
-pal_err pal_elastic_parts_make(const pal_build *build, const int32_t *element, int n_element, int n_corner, int n_mean,
-                               pal_elastic_parts *out)
+pal_err pal_elastic_regions_make(const pal_build *build, const int32_t *element, int n_element, int n_corner,
+                                 int n_mean, pal_elastic_regions *out)
 {
-    *out = (pal_elastic_parts){0};
+    *out = (pal_elastic_regions){0};
     if (build->def->n_region == 0) return PAL_ERR_OK;
     out->young_Pa = PAL_NEW(build->arena, double, n_element);
     out->poisson = PAL_NEW(build->arena, double, n_element);
@@ -202,15 +202,15 @@ pal_err pal_elastic_parts_make(const pal_build *build, const int32_t *element, i
             pal_axpy3(x, 1.0 / n_mean, build->body->x_rest + 3 * element[n_corner * e + c]);
         pal_material at, base = build->def->material;
         base.young_Pa = base.poisson = NAN;
-        pal_material_over(build->def, &base, x, &at);
+        pal_material_overlay(build->def, &base, x, &at);
         out->young_Pa[e] = at.young_Pa;
         out->poisson[e] = at.poisson;
     }
     return PAL_ERR_OK;
 }
 
-void pal_elastic_parts_lame(const pal_elastic_parts *parts, const pal_material *material, int e, double *mu_Pa,
-                            double *lambda_Pa)
+void pal_elastic_regions_lame(const pal_elastic_regions *parts, const pal_material *material, int e, double *mu_Pa,
+                              double *lambda_Pa)
 {
     double young_Pa = material->young_Pa, poisson = material->poisson;
     if (parts->young_Pa && !isnan(parts->young_Pa[e])) young_Pa = parts->young_Pa[e];

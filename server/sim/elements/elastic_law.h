@@ -5,8 +5,8 @@
  *     W(F) = mu/2 (F:F - 3) - mu (J - 1) + k1/2 (J - 1)^2,  J = det F,
  * whose linearisation has the Lame constants mu and lambda = k1 - mu. A mean dilatation term of the caller (hex B-bar)
  * comes in as a pressure: P += pressure dJ/dF, H += pressure d2J/dF2. Thread: any. */
-#ifndef PAL_SIM_ELASTIC_LAW_H
-#define PAL_SIM_ELASTIC_LAW_H
+#ifndef PAL_SIM_ELEMENTS_ELASTIC_LAW_H
+#define PAL_SIM_ELEMENTS_ELASTIC_LAW_H
 #include "server/sim/core/effect.h"
 
 /* what rows of elements measure */
@@ -18,7 +18,7 @@ enum {
 typedef enum pal_elastic_law { PAL_LAW_COROTATIONAL, PAL_LAW_LINEAR, PAL_LAW_NEO_HOOKEAN } pal_elastic_law;
 
 /* key "law": corotational (default), linear or neo_hookean; REFUSED names another. [load] */
-pal_err pal_elastic_law_read(pal_item *item, pal_elastic_law *out, pal_note *note);
+pal_err pal_elastic_law_read(pal_config_entry *item, pal_elastic_law *out, pal_diagnostic *diag);
 void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa);
 
 /* dJ/dF: det F F^-T, for singular F too */
@@ -48,19 +48,19 @@ typedef struct pal_neo_modes {
     double cross[3];
     bool projected; /* an eigenvalue was negative                                 */
 } pal_neo_modes;
-void pal_neo_modes_take(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out);
+void pal_neo_modes_compute(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out);
 void pal_neo_modes_apply(const pal_neo_modes *m, const double df[9], double dp[9]);
 void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81]);
 
 /* E and nu of each element where the body's regions give them (NaN: the body's own), so that a live edit of the body's
  * material keeps them */
-typedef struct pal_elastic_parts {
+typedef struct pal_elastic_regions {
     double *young_Pa, *poisson; /* NULL: no regions [n_element] */
-} pal_elastic_parts;
+} pal_elastic_regions;
 /* regions are asked at the mean of each element's first `n_mean` corners; arena memory. [load] */
-pal_err pal_elastic_parts_make(const pal_build *build, const int32_t *element, int n_element, int n_corner, int n_mean,
-                               pal_elastic_parts *out);
+pal_err pal_elastic_regions_make(const pal_build *build, const int32_t *element, int n_element, int n_corner,
+                                 int n_mean, pal_elastic_regions *out);
 /* Lame constants of element e in a body of this material; Poisson above 0.4999 is taken as 0.4999 */
-void pal_elastic_parts_lame(const pal_elastic_parts *parts, const pal_material *material, int e, double *mu_Pa,
-                            double *lambda_Pa);
+void pal_elastic_regions_lame(const pal_elastic_regions *parts, const pal_material *material, int e, double *mu_Pa,
+                              double *lambda_Pa);
 #endif

@@ -4,7 +4,7 @@
 
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 
 #include <string.h>
 
@@ -43,11 +43,12 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
     memcpy(t->corner, t->wish.tet, n_index * sizeof *t->corner);
     if (n_corner == 4) {
         pal_body *body = build->body;
-        if (!body->slots) PAL_TRY(pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots));
-        t->slots = body->slots;
-        PAL_TRY(pal_strips_make(t->slots, t->corner, n_tet, 4, build->arena, &t->strips));
-        t->place = t->strips.place;
-        t->n_block = t->strips.n_strip + t->strips.n_loose;
+        if (!body->node_order)
+            PAL_TRY(pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order));
+        t->node_order = body->node_order;
+        PAL_TRY(pal_simd_blocks_make(t->node_order, t->corner, n_tet, 4, build->arena, &t->simd_blocks));
+        t->place = t->simd_blocks.place;
+        t->n_block = t->simd_blocks.n_strip + t->simd_blocks.n_unsupported;
     } else {
         t->place = PAL_NEW(build->arena, int32_t, n_tet);
         if (!t->place) return PAL_ERR_MEMORY;
@@ -62,7 +63,7 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
 }
 
 /* inverse of the edges at rest and volume; 0 where there is next to none */
-static void take_rest(pal_elastic_tets *t, double h_m)
+static void take_rest(pal_elastic_tets *t, double edge_m)
 {
     for (int e = 0; e < t->wish.n_tet; e++) {
         const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
@@ -70,16 +71,16 @@ static void take_rest(pal_elastic_tets *t, double h_m)
         for (int c = 0; c < 3; c++) pal_sub3(a[c], t->x_rest + 3 * node[c + 1], t->x_rest + 3 * node[0]);
         for (int c = 0; c < 3; c++) pal_cross3(inverse[c], a[(c + 1) % 3], a[(c + 2) % 3]);
         double det = pal_dot3(a[0], inverse[0]);
-        if (!(fabs(det) > 6 * least_volume_h3 * h_m * h_m * h_m)) continue;
+        if (!(fabs(det) > 6 * least_volume_h3 * edge_m * edge_m * edge_m)) continue;
         for (int i = 0; i < 9; i++) *lane_at(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
         *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->wish.fill ? (double)t->wish.fill[e] : 1);
     }
 }
 
-pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *build, pal_elastic_tets *out)
+pal_err pal_elastic_tets_make(const pal_elastic_tets_options *wish, pal_build *build, pal_elastic_tets *out)
 {
     const pal_body *body = build->body;
-    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .held = body->held};
+    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->fixed};
     out->n_point = wish->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));
@@ -94,13 +95,13 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_wish *wish, pal_build *buil
     out->inverted = PAL_NEW(build->arena, int32_t, n_lane);
     out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(wish->n_corner) * (size_t)wish->n_tet);
     out->flag = PAL_NEW(build->arena, uint8_t, wish->n_tet);
-    if (wish->untangle) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
-    if (wish->untangle) out->seen = PAL_NEW(build->arena, double, 3 * body->n_node);
+    if (wish->recover) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
+    if (wish->recover) out->seen = PAL_NEW(build->arena, double, 3 * body->n_node);
     if (!out->inverse || !out->volume_m3 || !out->stiff || !out->turn || !out->tangent || !out->bound ||
-        !out->inverted || !out->entry || !out->flag || (wish->untangle && (!out->around || !out->seen)))
+        !out->inverted || !out->entry || !out->flag || (wish->recover && (!out->around || !out->seen)))
         return PAL_ERR_MEMORY;
-    PAL_TRY(pal_elastic_parts_make(build, wish->tet, wish->n_tet, wish->n_corner, 4, &out->parts));
-    take_rest(out, body->h_m);
+    PAL_TRY(pal_elastic_regions_make(build, wish->tet, wish->n_tet, wish->n_corner, 4, &out->parts));
+    take_rest(out, body->edge_m);
     pal_elastic_tets_reset(out);
     pal_elastic_tets_material(out, &build->def->material);
     return PAL_ERR_OK;
@@ -152,11 +153,11 @@ static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
 
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material)
 {
-    const double nu = t->wish.most_poisson;
+    const double nu = t->wish.max_poisson;
     memset(t->bound, 0, sizeof(double) * (size_t)t->n_node);
     for (int e = 0; e < t->wish.n_tet; e++) {
         double mu, lambda, volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
-        pal_elastic_parts_lame(&t->parts, material, e, &mu, &lambda);
+        pal_elastic_regions_lame(&t->parts, material, e, &mu, &lambda);
         if (nu > 0) lambda = fmin(lambda, 2 * mu * nu / (1 - 2 * nu));
         *lane_at(t->stiff, 2, t->place[e], 0) = volume * mu;
         *lane_at(t->stiff, 2, t->place[e], 1) = volume * lambda;
@@ -198,7 +199,7 @@ void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_
 }
 
 /* where the pairs of corners of every element stand in the pattern, once per pattern */
-static void find_entries(pal_elastic_tets *t, const pal_blocks *to)
+static void find_entries(pal_elastic_tets *t, const pal_block_matrix *to)
 {
     int n = t->wish.n_corner;
     for (int e = 0; e < t->wish.n_tet; e++) {
@@ -206,14 +207,14 @@ static void find_entries(pal_elastic_tets *t, const pal_blocks *to)
         int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
         for (int a = 0; a < n; a++)
             for (int b = 0; b <= a; b++, entry++)
-                *entry =
-                    pal_blocks_find(to, node[a] > node[b] ? node[a] : node[b], node[a] > node[b] ? node[b] : node[a]);
+                *entry = pal_block_matrix_find(to, node[a] > node[b] ? node[a] : node[b],
+                                               node[a] > node[b] ? node[b] : node[a]);
     }
     t->entry_row = to->row;
     t->entry_of = to;
 }
 
-static void assemble_gradients(const pal_elastic_tets *t, int e, double k, pal_blocks *to)
+static void assemble_gradients(const pal_elastic_tets *t, int e, double k, pal_block_matrix *to)
 {
     int n = t->wish.n_corner;
     const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
@@ -261,7 +262,7 @@ static void modes_block(const double *stretch, const double *same, const double 
         }
 }
 
-static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_blocks *to)
+static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block_matrix *to)
 {
     int n = t->wish.n_corner, width = PAL_TET_MODES * t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
@@ -288,7 +289,7 @@ static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block
     }
 }
 
-void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_blocks *to)
+void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *to)
 {
     if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
     if (t->straight) k *= t->soft;

@@ -1,14 +1,14 @@
 /* Blocks of 8 tetrahedra for the kernels of elastic_tet.h: coordinates in, forces out, gradients in local coordinates.
  * Only for files compiled with the room's options. Thread: [sim]. */
-#ifndef PAL_SIM_ELASTIC_TET_BLOCK_H
-#define PAL_SIM_ELASTIC_TET_BLOCK_H
-#include "server/num/shape.h"
-#include "server/sim/core/elastic_lanes.h"
+#ifndef PAL_SIM_ELEMENTS_ELASTIC_TET_BLOCK_H
+#define PAL_SIM_ELEMENTS_ELASTIC_TET_BLOCK_H
+#include "server/num/shape_functions.h"
+#include "server/sim/core/simd_wide.h"
 #include "server/sim/elements/elastic_tet.h"
 
 #include <string.h>
 
-enum { PAL_TET_TURNS = 8 }; /* that vectors try */
+enum { PAL_TET_ROTATION_STEPS = 8 }; /* that vectors try */
 
 /* 8 elements: where their corners' coordinates stand, and where their forces go */
 typedef struct pal_tet_block {
@@ -18,17 +18,17 @@ typedef struct pal_tet_block {
 } pal_tet_block;
 
 /* tet4: from slots, strips in place, loose ones gathered */
-PAL_INLINE void pal_tet_open_strip(const pal_elastic_tets *t, int b, pal_tet_block *to)
+PAL_INLINE void pal_tet_load_block(const pal_elastic_tets *t, int b, pal_tet_block *to)
 {
-    const pal_slots *s = t->slots;
-    bool strip = b < t->strips.n_strip;
-    const int32_t *node = t->strips.node + (size_t)(b - t->strips.n_strip) * 4 * PAL_LANES;
+    const pal_node_order *s = t->node_order;
+    bool strip = b < t->simd_blocks.n_strip;
+    const int32_t *node = t->simd_blocks.node + (size_t)(b - t->simd_blocks.n_strip) * 4 * PAL_LANES;
     for (int c = 0; c < 4; c++)
         for (int d = 0; d < 3; d++) {
             const double *x = s->x + (size_t)d * (size_t)s->n_slot;
             if (strip) {
-                to->x[c][d] = x + t->strips.base[4 * b + c];
-                to->f[c][d] = s->f + (size_t)d * (size_t)s->n_slot + t->strips.base[4 * b + c];
+                to->x[c][d] = x + t->simd_blocks.base[4 * b + c];
+                to->f[c][d] = s->f + (size_t)d * (size_t)s->n_slot + t->simd_blocks.base[4 * b + c];
                 continue;
             }
             for (int l = 0; l < PAL_LANES; l++) to->x_loose[c][d][l] = x[node[c * PAL_LANES + l]];
@@ -37,19 +37,19 @@ PAL_INLINE void pal_tet_open_strip(const pal_elastic_tets *t, int b, pal_tet_blo
             to->f[c][d] = to->f_loose[c][d];
         }
 }
-PAL_INLINE void pal_tet_close_strip(const pal_elastic_tets *t, int b, const pal_tet_block *from)
+PAL_INLINE void pal_tet_store_block(const pal_elastic_tets *t, int b, const pal_tet_block *from)
 {
-    if (b < t->strips.n_strip) return;
-    const int32_t *node = t->strips.node + (size_t)(b - t->strips.n_strip) * 4 * PAL_LANES;
+    if (b < t->simd_blocks.n_strip) return;
+    const int32_t *node = t->simd_blocks.node + (size_t)(b - t->simd_blocks.n_strip) * 4 * PAL_LANES;
     for (int c = 0; c < 4; c++)
         for (int l = 0; l < PAL_LANES; l++)
             for (int d = 0; d < 3; d++)
-                t->slots->f[(size_t)d * (size_t)t->slots->n_slot + (size_t)node[c * PAL_LANES + l]] +=
+                t->node_order->f[(size_t)d * (size_t)t->node_order->n_slot + (size_t)node[c * PAL_LANES + l]] +=
                     from->f_loose[c][d][l];
 }
 
 /* tet10: from nodes [n_node][3]; lanes without an element repeat the first one's nodes */
-PAL_INLINE void pal_tet_open_ten(const pal_elastic_tets *t, int b, const double *x, pal_tet_block *to)
+PAL_INLINE void pal_tet10_load_block(const pal_elastic_tets *t, int b, const double *x, pal_tet_block *to)
 {
     for (int l = 0; l < PAL_LANES; l++) {
         int e = t->owner[PAL_LANES * b + l];
@@ -61,7 +61,7 @@ PAL_INLINE void pal_tet_open_ten(const pal_elastic_tets *t, int b, const double 
     for (int c = 0; c < PAL_TET10_CORNERS; c++)
         for (int d = 0; d < 3; d++) to->x[c][d] = to->x_loose[c][d], to->f[c][d] = to->f_loose[c][d];
 }
-PAL_INLINE void pal_tet_close_ten(const pal_elastic_tets *t, int b, const pal_tet_block *from, double *f)
+PAL_INLINE void pal_tet10_store_block(const pal_elastic_tets *t, int b, const pal_tet_block *from, double *f)
 {
     for (int l = 0; l < PAL_LANES; l++) {
         int e = t->owner[PAL_LANES * b + l];
@@ -114,12 +114,12 @@ PAL_INLINE void pal_tet_load9(const double *at, int n, pal_wide *r)
 }
 
 /* number k of `width` of the element at `place` */
-static inline double pal_lane_of(const double *array, int width, int place, int k)
+static inline double pal_lane_get(const double *array, int width, int place, int k)
 {
     return array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
                  (size_t)(place % PAL_LANES)];
 }
-static inline void pal_lane_put(double *array, int width, int place, int k, double value)
+static inline void pal_lane_set(double *array, int width, int place, int k, double value)
 {
     array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
           (size_t)(place % PAL_LANES)] = value;
@@ -129,10 +129,10 @@ static inline void pal_lane_put(double *array, int width, int place, int k, doub
 void pal_elastic_tets_modes(pal_elastic_tets *t, const double *d);
 /* one element of a corotational law with the rotation it holds: returns its energy; force (NULL: none) [n_node][3] and
  * torque about the origin are added to */
-double pal_tet_add_one(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque);
+double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque);
 /* f -= forces without sum that have this torque: what borrowed rotations turn, the body as a whole turns back */
-void pal_tet_give_back(const pal_elastic_tets *t, const double *d, const double torque[3], double *f);
+void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f);
 /* the whole of a body that is straightened */
-double pal_tet_straight(const pal_elastic_tets *t, const double *d, double *f);
-void pal_tet_straight_turn(pal_elastic_tets *t, const double *d);
+double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f);
+void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d);
 #endif

@@ -6,7 +6,7 @@
  * and u of F = u diag(s) v'. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/elements/elastic_tet_block.h"
 
 #include <string.h>
@@ -23,7 +23,7 @@ PAL_INLINE void stress(pal_wide mu, pal_wide lambda, const pal_wide a[9], pal_wi
     s[5] = s[7] = mu * (a[5] + a[7]);
 }
 
-/* lanes that vectors left to pal_polar_turn */
+/* lanes that vectors left to pal_polar_rotation */
 static __attribute__((noinline)) void settle_slowly(const pal_wide f[9], unsigned left, double *q)
 {
     for (int l = 0; l < PAL_WIDE; l++) {
@@ -31,7 +31,7 @@ static __attribute__((noinline)) void settle_slowly(const pal_wide f[9], unsigne
         double g[9], p[4];
         for (int i = 0; i < 9; i++) g[i] = f[i][l];
         for (int i = 0; i < 4; i++) p[i] = q[i * PAL_LANES + l];
-        pal_polar_turn(g, p, SLOW_TURNS);
+        pal_polar_rotation(g, p, SLOW_TURNS);
         for (int i = 0; i < 4; i++) q[i * PAL_LANES + l] = p[i];
     }
 }
@@ -41,7 +41,7 @@ PAL_INLINE int take_turn(double *turn, pal_wide_mask live, const pal_wide f[9], 
 {
     pal_wide q[4];
     pal_tet_load9(turn, 4, q);
-    unsigned left = pal_wide_polar(f, live, PAL_TET_TURNS, q, r, m);
+    unsigned left = pal_wide_polar(f, live, PAL_TET_ROTATION_STEPS, q, r, m);
     for (int i = 0; i < 4; i++) pal_wide_store(turn + (size_t)i * PAL_LANES, q[i]);
     if (!left) return 0;
     settle_slowly(f, left, turn);
@@ -74,7 +74,7 @@ PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_
     if (pal_wide_all(~inverted)) return live;
     for (int l = 0; l < PAL_WIDE; l++)
         if (inverted[l]) t->inverted[t->n_inverted++] = t->owner[first_lane + l];
-    return t->wish.untangle && t->wish.law == PAL_LAW_COROTATIONAL ? live & ~inverted : live;
+    return t->wish.recover && t->wish.law == PAL_LAW_COROTATIONAL ? live & ~inverted : live;
 }
 
 enum { FORCE = 1, ENERGY = 2 };
@@ -92,7 +92,7 @@ PAL_INLINE void turn_stress(const pal_wide r[9], const pal_wide m[9], const pal_
     pal_wide det = axx * cxx + axy * cxy + axz * cxz, sum = axx + ayy + azz;
     /* left out where the rotation is hardly known */
     pal_wide_mask good = (axx > 0) & (czz > 0) & (det > 1e-3 * sum * sum * sum);
-    pal_wide one = pal_wide_pick(good, 1 + zero, zero) / pal_wide_pick(good, det, 1 + zero);
+    pal_wide one = pal_wide_select(good, 1 + zero, zero) / pal_wide_select(good, det, 1 + zero);
     pal_wide x = one * (cxx * t[0] + cxy * t[1] + cxz * t[2]), y = one * (cxy * t[0] + cyy * t[1] + cyz * t[2]),
              z = one * (cxz * t[0] + cyz * t[1] + czz * t[2]);
     pal_wide p[9];
@@ -157,7 +157,7 @@ PAL_INLINE pal_wide corotational_half(pal_elastic_tets *t, int n_corner, bool li
     else
         t->n_slow += take_turn(t->turn + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
     double share = n_corner == 4 ? 1 : 0.25;
-    mu = share * pal_wide_pick(asked, mu, zero), lambda = share * pal_wide_pick(asked, lambda, zero);
+    mu = share * pal_wide_select(asked, mu, zero), lambda = share * pal_wide_select(asked, lambda, zero);
     return rotated_stress(t, n_corner, linear, what, lane, inverse, mu, lambda, r, m, inner, at);
 }
 
@@ -209,9 +209,9 @@ PAL_INLINE double all_blocks(pal_elastic_tets *t, int n_corner, pal_elastic_law 
     pal_tet_block at;
     for (int b = 0; b < t->n_block; b++) {
         if (n_corner == 4)
-            pal_tet_open_strip(t, b, &at);
+            pal_tet_load_block(t, b, &at);
         else
-            pal_tet_open_ten(t, b, x, &at);
+            pal_tet10_load_block(t, b, x, &at);
         for (int lane = 0; lane < PAL_LANES; lane += PAL_WIDE) {
             pal_wide part = law == PAL_LAW_NEO_HOOKEAN
                                 ? neo_half(t, n_corner, what, b, lane, &at)
@@ -220,9 +220,9 @@ PAL_INLINE double all_blocks(pal_elastic_tets *t, int n_corner, pal_elastic_law 
         }
         if (!(what & FORCE)) continue;
         if (n_corner == 4)
-            pal_tet_close_strip(t, b, &at);
+            pal_tet_store_block(t, b, &at);
         else
-            pal_tet_close_ten(t, b, &at, force);
+            pal_tet10_store_block(t, b, &at, force);
     }
     return sum;
 }
@@ -263,9 +263,9 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
     for (int b = 0; b < t->n_block; b++) {
         int n_corner = t->wish.n_corner;
         if (n_corner == 4)
-            pal_tet_open_strip(t, b, &at);
+            pal_tet_load_block(t, b, &at);
         else
-            pal_tet_open_ten(t, b, x, &at);
+            pal_tet10_load_block(t, b, x, &at);
         for (int lane = 0; lane < PAL_LANES; lane += PAL_WIDE) {
             pal_wide f[9], inner[4][9], r[9], m[9], inverse[9];
             pal_wide_mask live = pal_wide_load(t->stiff + (size_t)b * 2 * PAL_LANES + lane) > 0;
@@ -281,7 +281,7 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
 void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9])
 {
     double q[4];
-    for (int i = 0; i < 4; i++) q[i] = pal_lane_of(t->turn, 4, t->place[e], i);
+    for (int i = 0; i < 4; i++) q[i] = pal_lane_get(t->turn, 4, t->place[e], i);
     pal_quat_matrix(q, r);
 }
 
@@ -296,17 +296,17 @@ void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, cons
         for (int m = 0; m < 3; m++) {
             f[3 * r + m] = 0;
             for (int c = 0; c < 3; c++)
-                f[3 * r + m] += h[3 * r + c] * pal_lane_of(t->inverse, 9, t->place[e], 3 * c + m);
+                f[3 * r + m] += h[3 * r + c] * pal_lane_get(t->inverse, 9, t->place[e], 3 * c + m);
         }
 }
 
 /* force, its torque about the origin, and energy of a corotational element with the rotation it holds */
-double pal_tet_add_one(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
+double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
 {
     double r[9], f[9], p[9], sum = 0;
     pal_elastic_tets_rotation(t, e, r);
-    double share = (t->straight ? t->soft : 1) / t->n_point, mu = share * pal_lane_of(t->stiff, 2, t->place[e], 0),
-           lambda = share * pal_lane_of(t->stiff, 2, t->place[e], 1);
+    double share = (t->straight ? t->soft : 1) / t->n_point, mu = share * pal_lane_get(t->stiff, 2, t->place[e], 0),
+           lambda = share * pal_lane_get(t->stiff, 2, t->place[e], 1);
     const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
     for (int g = 0; g < t->n_point; g++) {
         pal_elastic_tets_gradient(t, e, g, d, f);
@@ -321,14 +321,14 @@ double pal_tet_add_one(const pal_elastic_tets *t, int e, const double *d, double
                 for (int m = 0; m < 3; m++)
                     for (int k = 0; k < 3; k++)
                         force[3 * node[a] + k] -=
-                            p[3 * k + m] * pal_lane_of(t->inverse, 9, t->place[e], 3 * c + m) * t->shape[g][a][c];
+                            p[3 * k + m] * pal_lane_get(t->inverse, 9, t->place[e], 3 * c + m) * t->shape[g][a][c];
     }
     return sum;
 }
 
 /* f -= forces without sum, a x r on the node at r from the mean, that have this torque: what the borrowed rotations
  * turn, the body as a whole turns back */
-void pal_tet_give_back(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
+void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
 {
     double mean[3] = {0}, s[9] = {0}, r[3], w[3], v[9], a[3] = {0};
     for (int i = 0; i < t->n_node; i++) pal_axpy3(mean, 1.0 / t->n_node, d + 3 * i);
@@ -351,12 +351,12 @@ void pal_tet_give_back(const pal_elastic_tets *t, const double *d, const double 
 }
 
 /* the untangling rule: rotations around nodes from the elements that are not inverted, then those of the others */
-static void untangle(pal_elastic_tets *t)
+static void recover(pal_elastic_tets *t)
 {
     memset(t->around, 0, 9 * sizeof(double) * (size_t)t->n_node);
     for (int i = 0; i < t->n_inverted; i++) t->flag[t->inverted[i]] = 1;
     for (int e = 0; e < t->wish.n_tet; e++) {
-        double r[9], volume = pal_lane_of(t->volume_m3, 1, t->place[e], 0);
+        double r[9], volume = pal_lane_get(t->volume_m3, 1, t->place[e], 0);
         if (t->flag[e] || volume <= 0) continue;
         pal_elastic_tets_rotation(t, e, r);
         for (int c = 0; c < 4; c++)
@@ -375,28 +375,28 @@ static void untangle(pal_elastic_tets *t)
         }
         for (int i = 0; i < 9; i++) most = fmax(most, fabs(sum[i]));
         if (!(most > 1e-9)) continue;
-        for (int i = 0; i < 4; i++) q[i] = pal_lane_of(t->turn, 4, t->place[e], i);
-        pal_polar_turn(sum, q, SLOW_TURNS);
-        for (int i = 0; i < 4; i++) pal_lane_put(t->turn, 4, t->place[e], i, q[i]);
+        for (int i = 0; i < 4; i++) q[i] = pal_lane_get(t->turn, 4, t->place[e], i);
+        pal_polar_rotation(sum, q, SLOW_TURNS);
+        for (int i = 0; i < 4; i++) pal_lane_set(t->turn, 4, t->place[e], i, q[i]);
     }
 }
 
-static bool tangled(const pal_elastic_tets *t)
+static bool has_inversion(const pal_elastic_tets *t)
 {
-    return t->n_inverted > 0 && t->wish.untangle && t->wish.law == PAL_LAW_COROTATIONAL;
+    return t->n_inverted > 0 && t->wish.recover && t->wish.law == PAL_LAW_COROTATIONAL;
 }
 
 static double take(pal_elastic_tets *t, int what, const double *d, double *f)
 {
-    bool slots = t->wish.n_corner == 4;
-    if (t->straight) return pal_tet_straight(t, d, f);
-    if (slots) pal_slots_load(t->slots, d);
+    bool node_order = t->wish.n_corner == 4;
+    if (t->straight) return pal_tet_single_rotation_force(t, d, f);
+    if (node_order) pal_node_order_load(t->node_order, d);
     double sum = run_blocks(t, what, d, f), torque[3] = {0};
-    if (slots && f) pal_slots_add(t->slots, f);
-    if (!tangled(t)) return sum;
-    untangle(t);
-    for (int i = 0; i < t->n_inverted; i++) sum += pal_tet_add_one(t, t->inverted[i], d, f, torque);
-    if (f) pal_tet_give_back(t, d, torque, f);
+    if (node_order && f) pal_node_order_add(t->node_order, f);
+    if (!has_inversion(t)) return sum;
+    recover(t);
+    for (int i = 0; i < t->n_inverted; i++) sum += pal_tet_add_element(t, t->inverted[i], d, f, torque);
+    if (f) pal_tet_balance_torque(t, d, torque, f);
     return sum;
 }
 
@@ -427,12 +427,12 @@ static void take_gradients(pal_elastic_tets *t)
 
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d)
 {
-    if (t->wish.n_corner == 4) pal_slots_load(t->slots, d);
+    if (t->wish.n_corner == 4) pal_node_order_load(t->node_order, d);
     if (t->straight)
-        pal_tet_straight_turn(t, d);
+        pal_tet_fit_single_rotation(t, d);
     else
         turn_blocks(t, d);
-    if (tangled(t) && !t->straight) untangle(t);
+    if (has_inversion(t) && !t->straight) recover(t);
     if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
         pal_elastic_tets_modes(t, d);
     else
@@ -490,9 +490,9 @@ PAL_INLINE void multiply_blocks(const pal_elastic_tets *t, int n_corner, bool ne
     pal_tet_block at;
     for (int b = 0; b < t->n_block; b++) {
         if (n_corner == 4)
-            pal_tet_open_strip(t, b, &at);
+            pal_tet_load_block(t, b, &at);
         else
-            pal_tet_open_ten(t, b, p, &at);
+            pal_tet10_load_block(t, b, p, &at);
         for (int lane = 0; lane < PAL_LANES; lane += PAL_WIDE) {
             if (neo)
                 multiply_neo_half(t, n_corner, k, b, lane, &at);
@@ -500,9 +500,9 @@ PAL_INLINE void multiply_blocks(const pal_elastic_tets *t, int n_corner, bool ne
                 multiply_half(t, n_corner, k, b, lane, &at);
         }
         if (n_corner == 4)
-            pal_tet_close_strip(t, b, &at);
+            pal_tet_store_block(t, b, &at);
         else
-            pal_tet_close_ten(t, b, &at, out);
+            pal_tet10_store_block(t, b, &at, out);
     }
 }
 
@@ -511,12 +511,12 @@ void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double
     bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
     if (t->straight) k *= t->soft;
     if (t->wish.n_corner == 4) {
-        pal_slots_load(t->slots, p);
+        pal_node_order_load(t->node_order, p);
         if (neo)
             multiply_blocks(t, 4, true, k, p, out);
         else
             multiply_blocks(t, 4, false, k, p, out);
-        pal_slots_add(t->slots, out);
+        pal_node_order_add(t->node_order, out);
     } else if (neo)
         multiply_blocks(t, 10, true, k, p, out);
     else

@@ -1,11 +1,11 @@
 /* Elastic tetrahedra: the neo-Hookean tangent, 8 elements at a time. F = R S with the warm-started rotation, S = v
- * diag(s) v' by Jacobi's method, u = R v; the rest is pal_neo_modes_take, which takes the
+ * diag(s) v' by Jacobi's method, u = R v; the rest is pal_neo_modes_compute, which takes the
  * elements whose rotation vectors could not settle. */
 #include "server/sim/elements/elastic_tet_block.h"
 
 enum { SWEEPS = 5 };
 
-/* 1 / sqrt(q), q > 0 (lanes.h) */
+/* 1 / sqrt(q), q > 0 (simd.h) */
 PAL_INLINE pal_wide inverse_root(pal_wide q)
 {
     pal_wide half = 0.5 * q, r = (pal_wide)(0x5fe6eb50c7b537a9 - ((pal_wide_mask)q >> 1));
@@ -21,10 +21,10 @@ PAL_INLINE void jacobi_turn(pal_wide least, pal_wide *dp, pal_wide *dq, pal_wide
 {
     const pal_wide zero = {0};
     pal_wide_mask flat = ~(*apq * *apq > least);
-    *apq = pal_wide_pick(flat, zero, *apq);
-    pal_wide d = *dq - *dp, h = 2 * *apq, square = pal_wide_pick(flat, 1 + zero, d * d + h * h);
+    *apq = pal_wide_select(flat, zero, *apq);
+    pal_wide d = *dq - *dp, h = 2 * *apq, square = pal_wide_select(flat, 1 + zero, d * d + h * h);
     pal_wide root = square * inverse_root(square);
-    pal_wide t = h / (d + pal_wide_pick(d < 0, -root, root));
+    pal_wide t = h / (d + pal_wide_select(d < 0, -root, root));
     pal_wide c = inverse_root(1 + t * t), s = c * t;
     *dp -= t * *apq, *dq += t * *apq, *apq = zero;
     pal_wide x = *apr, y = *aqr;
@@ -55,7 +55,7 @@ PAL_INLINE void jacobi(const pal_wide a[6], pal_wide w[3], pal_wide v[9])
 PAL_INLINE pal_wide at_least_0(pal_wide a)
 {
     const pal_wide zero = {0};
-    return pal_wide_pick(a > 0, a, zero);
+    return pal_wide_select(a > 0, a, zero);
 }
 
 /* the Hessian in the frame of the stretches w, projected: stretch 6, same 3, cross 3 */
@@ -81,7 +81,7 @@ PAL_INLINE void project(pal_wide mu, pal_wide k1, const pal_wide w[3], pal_wide 
         static const int row[6] = {0, 1, 2, 1, 2, 0}, column[6] = {0, 1, 2, 2, 0, 1};
         pal_wide sum = {0};
         for (int m = 0; m < 3; m++) sum += at_least_0(e[m]) * v[3 * m + row[i]] * v[3 * m + column[i]];
-        out[i] = pal_wide_pick(whole, a[i], sum);
+        out[i] = pal_wide_select(whole, a[i], sum);
     }
 }
 
@@ -89,22 +89,22 @@ PAL_INLINE void project(pal_wide mu, pal_wide k1, const pal_wide w[3], pal_wide 
 static __attribute__((noinline)) void take_one(pal_elastic_tets *t, int e, int point, const double *d)
 {
     int place = t->place[e], width = PAL_TET_MODES * t->n_point, first = PAL_TET_MODES * point;
-    double mu = pal_lane_of(t->stiff, 2, place, 0) / t->n_point,
-           lambda = pal_lane_of(t->stiff, 2, place, 1) / t->n_point;
+    double mu = pal_lane_get(t->stiff, 2, place, 0) / t->n_point,
+           lambda = pal_lane_get(t->stiff, 2, place, 1) / t->n_point;
     double f[9];
     pal_neo_modes m;
     pal_elastic_tets_gradient(t, e, point, d, f);
-    pal_neo_modes_take(mu, lambda + mu, 0, f, &m);
+    pal_neo_modes_compute(mu, lambda + mu, 0, f, &m);
     for (int i = 0; i < 9; i++) {
         double dv = 0;
-        for (int k = 0; k < 3; k++) dv += pal_lane_of(t->inverse, 9, place, 3 * (i / 3) + k) * m.v[3 * k + i % 3];
-        pal_lane_put(t->tangent, width, place, first + i, m.u[i]);
-        pal_lane_put(t->tangent, width, place, first + 9 + i, dv);
+        for (int k = 0; k < 3; k++) dv += pal_lane_get(t->inverse, 9, place, 3 * (i / 3) + k) * m.v[3 * k + i % 3];
+        pal_lane_set(t->tangent, width, place, first + i, m.u[i]);
+        pal_lane_set(t->tangent, width, place, first + 9 + i, dv);
     }
-    for (int i = 0; i < 6; i++) pal_lane_put(t->tangent, width, place, first + 18 + i, m.stretch[i]);
+    for (int i = 0; i < 6; i++) pal_lane_set(t->tangent, width, place, first + 18 + i, m.stretch[i]);
     for (int i = 0; i < 3; i++) {
-        pal_lane_put(t->tangent, width, place, first + 24 + i, m.same[i]);
-        pal_lane_put(t->tangent, width, place, first + 27 + i, m.cross[i]);
+        pal_lane_set(t->tangent, width, place, first + 24 + i, m.same[i]);
+        pal_lane_set(t->tangent, width, place, first + 27 + i, m.cross[i]);
     }
 }
 
@@ -121,7 +121,7 @@ PAL_INLINE unsigned modes_half(pal_elastic_tets *t, int n_corner, int point, int
     if (n_point > 1) mu *= 0.25, lambda *= 0.25;
     pal_tet_local_gradient(t, n_corner, point, at, lane, h);
     pal_wide_mul(f, h, inverse);
-    unsigned left = pal_wide_polar(f, live, PAL_TET_TURNS, q, r, m);
+    unsigned left = pal_wide_polar(f, live, PAL_TET_ROTATION_STEPS, q, r, m);
     const pal_wide s[6] = {m[0], m[4], m[8], 0.5 * (m[5] + m[7]), 0.5 * (m[2] + m[6]), 0.5 * (m[1] + m[3])};
     jacobi(s, w, v);
     project(mu, mu + lambda, w, out);
@@ -141,9 +141,9 @@ PAL_INLINE void all_modes(pal_elastic_tets *t, int n_corner, const double *d)
     pal_tet_block at;
     for (int b = 0; b < t->n_block; b++) {
         if (n_corner == 4)
-            pal_tet_open_strip(t, b, &at);
+            pal_tet_load_block(t, b, &at);
         else
-            pal_tet_open_ten(t, b, d, &at);
+            pal_tet10_load_block(t, b, d, &at);
         for (int lane = 0; lane < PAL_LANES; lane += PAL_WIDE)
             for (int point = 0; point < (n_corner == 4 ? 1 : 4); point++) {
                 unsigned left = modes_half(t, n_corner, point, b, lane, &at);

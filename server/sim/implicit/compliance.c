@@ -17,25 +17,25 @@ static size_t bytes3(const pal_body *body)
 
 static void multiply(void *user, const double *p, double *out)
 {
-    pal_answer *answer = user;
-    pal_system_curve(answer->system, answer->x, answer->low, p, out);
+    pal_compliance_solver *answer = user;
+    pal_system_true_stiffness(answer->system, answer->x, answer->low, p, out);
 }
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_warp_solve(&((pal_answer *)user)->warp, r, z);
+    pal_warp_solve(&((pal_compliance_solver *)user)->warp, r, z);
 }
 
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */
-static pal_known_answer *find_known(pal_answer *answer, double size2, double *share)
+static pal_compliance_entry *find_known(pal_compliance_solver *answer, double size2, double *share)
 {
-    pal_known_answer *best = NULL, *oldest = &answer->known[0];
+    pal_compliance_entry *best = NULL, *oldest = &answer->known[0];
     double nearest = alike * alike;
-    for (int k = 0; k < PAL_ANSWERS; k++) {
-        pal_known_answer *known = &answer->known[k];
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) {
+        pal_compliance_entry *known = &answer->known[k];
         if (known->used < oldest->used) oldest = known;
         if (known->size2 == 0) continue;
-        double dot = pal_sum_products(answer->cg.n, known->force, answer->cg.r);
+        double dot = pal_dot_product(answer->cg.n, known->force, answer->cg.r);
         double cosine2 = dot > 0 ? dot / known->size2 * (dot / size2) : 0;
         if (!(cosine2 > nearest)) continue;
         nearest = cosine2;
@@ -47,26 +47,26 @@ static pal_known_answer *find_known(pal_answer *answer, double size2, double *sh
 }
 
 /* force and move are of points; body->f and g are overwritten */
-static bool solve_points(pal_answer *answer, const pal_body *body, double *move_m)
+static bool solve_points(pal_compliance_solver *answer, const pal_body *body, double *move_m)
 {
     int n = answer->cg.n;
     double *r = answer->cg.r, share;
     for (int i = 0; i < n; i++)
-        if (body->held[i / 3]) r[i] = 0;
+        if (body->fixed[i / 3]) r[i] = 0;
     memset(move_m, 0, bytes3(body));
-    double size2 = pal_sum_products(n, r, r);
+    double size2 = pal_dot_product(n, r, r);
     if (!(size2 > 0)) return size2 == 0;
     memcpy(answer->x, body->x, bytes3(body));
-    pal_known_answer *known = find_known(answer, size2, &share);
+    pal_compliance_entry *known = find_known(answer, size2, &share);
     memcpy(known->force, r, bytes3(body));
     known->size2 = size2;
     known->used = ++answer->n_call;
     if (share != 0) {
         for (int i = 0; i < n; i++) move_m[i] = share * known->move[i];
         multiply(answer, move_m, answer->cg.q);
-        for (int i = 0; i < n; i++) r[i] = body->held[i / 3] ? 0 : r[i] - answer->cg.q[i];
+        for (int i = 0; i < n; i++) r[i] = body->fixed[i / 3] ? 0 : r[i] - answer->cg.q[i];
     }
-    (void)pal_conjugate_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MOST);
+    (void)pal_conjugate_gradient_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MOST);
     memcpy(known->move, move_m, bytes3(body));
     if (!isfinite(answer->cg.residual)) known->size2 = 0;
     return isfinite(answer->cg.residual);
@@ -74,28 +74,28 @@ static bool solve_points(pal_answer *answer, const pal_body *body, double *move_
 
 static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)
 {
-    pal_answer *answer = self;
+    pal_compliance_solver *answer = self;
     pal_body *own = answer->system->body;
     size_t node_bytes = 3 * sizeof(double) * (size_t)body->n_node;
     memcpy(answer->f, own->f, node_bytes);
-    if (body->embed) {
+    if (body->interpolation) {
         memset(answer->cg.r, 0, bytes3(body));
-        pal_point_rows_pull(body->embed, force_N, answer->cg.r);
+        pal_interpolation_apply_transpose(body->interpolation, force_N, answer->cg.r);
     } else {
         memcpy(answer->cg.r, force_N, node_bytes);
     }
-    bool done = solve_points(answer, body, body->embed ? answer->move : move_m);
-    if (body->embed) pal_point_rows_place(body->embed, answer->move, move_m);
+    bool done = solve_points(answer, body, body->interpolation ? answer->move : move_m);
+    if (body->interpolation) pal_interpolation_apply(body->interpolation, answer->move, move_m);
     memcpy(own->f, answer->f, node_bytes);
     return done;
 }
 
-void pal_answer_forget(pal_answer *answer)
+void pal_compliance_solver_reset(pal_compliance_solver *answer)
 {
-    for (int k = 0; k < PAL_ANSWERS; k++) answer->known[k].size2 = 0;
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) answer->known[k].size2 = 0;
 }
 
-static pal_err make_arrays(pal_answer *answer, pal_arena *arena)
+static pal_err make_arrays(pal_compliance_solver *answer, pal_arena *arena)
 {
     const pal_body *body = answer->system->body;
     size_t n3 = 3 * (size_t)body->n_dof;
@@ -106,7 +106,7 @@ static pal_err make_arrays(pal_answer *answer, pal_arena *arena)
         if (!*array[i]) return PAL_ERR_MEMORY;
     }
     if (!(answer->f = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
-    for (int k = 0; k < PAL_ANSWERS; k++) {
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) {
         answer->known[k].force = PAL_NEW(arena, double, n3);
         answer->known[k].move = PAL_NEW(arena, double, n3);
         if (!answer->known[k].force || !answer->known[k].move) return PAL_ERR_MEMORY;
@@ -118,29 +118,29 @@ static pal_err make_arrays(pal_answer *answer, pal_arena *arena)
     return PAL_ERR_OK;
 }
 
-pal_err pal_answer_factor(pal_answer *answer, pal_system *system, pal_blocks *blocks)
+pal_err pal_compliance_solver_factor(pal_compliance_solver *answer, pal_system *system, pal_block_matrix *blocks)
 {
     double mass = system->mass, stiff = system->stiff, damp = system->damp;
-    pal_answer_forget(answer);
+    pal_compliance_solver_reset(answer);
     system->mass = 0, system->stiff = 1, system->damp = 0;
     pal_system_assemble(system, blocks);
     system->mass = mass, system->stiff = stiff, system->damp = damp;
     return pal_warp_factor(&answer->warp, blocks);
 }
 
-pal_err pal_answer_make(pal_system *system, const pal_turns *turns, pal_blocks *blocks, pal_arena *arena,
-                        pal_answer *out)
+pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *turns, pal_block_matrix *blocks,
+                                   pal_arena *arena, pal_compliance_solver *out)
 {
     pal_body *body = system->body;
-    pal_supports supports;
+    pal_support_report supports;
     memset(out, 0, sizeof *out);
     if (!body->wants_compliance || system->n_free == 0) return PAL_ERR_OK;
-    PAL_TRY(pal_system_supports(system, &supports));
-    if (supports.n_loose > 0) return PAL_ERR_OK;
+    PAL_TRY(pal_system_find_supports(system, &supports));
+    if (supports.n_unsupported > 0) return PAL_ERR_OK;
     out->system = system;
     PAL_TRY(make_arrays(out, arena));
     PAL_TRY(pal_warp_make(blocks, body, turns, true, arena, &out->warp));
-    pal_err err = pal_answer_factor(out, system, blocks);
+    pal_err err = pal_compliance_solver_factor(out, system, blocks);
     if (err == PAL_ERR_MEMORY) return err;
     /* not positive definite: there is no answer to give */
     if (err) return PAL_ERR_OK;
@@ -149,7 +149,7 @@ pal_err pal_answer_make(pal_system *system, const pal_turns *turns, pal_blocks *
     return PAL_ERR_OK;
 }
 
-void pal_answer_destroy(pal_answer *answer)
+void pal_compliance_solver_destroy(pal_compliance_solver *answer)
 {
     pal_warp_destroy(&answer->warp);
 }

@@ -2,9 +2,9 @@
 #include "server/sim/implicit/system.h"
 
 #include "server/base/vec3.h"
-#include "server/num/conjugate.h"
-#include "server/num/roots.h"
-#include "server/sim/subdivision/solid_mass.h"
+#include "server/num/conjugate_gradient.h"
+#include "server/num/union_find.h"
+#include "server/sim/subdivision/subdivision_mass.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -13,18 +13,19 @@ pal_err pal_system_make(const pal_build *build, pal_system *out)
 {
     pal_body *body = build->body;
     *out = (pal_system){.body = body, .has_energy = true, .mass = 1};
-    out->force = PAL_NEW(build->arena, pal_row, build->n_made);
+    out->force = PAL_NEW(build->arena, pal_component, build->n_made);
     if (!out->force) return PAL_ERR_MEMORY;
     for (int i = 0; i < build->n_made; i++) {
-        const pal_row *row = &build->made[i];
+        const pal_component *row = &build->made[i];
         if (row->effect->stage != PAL_STAGE_FORCE) continue;
-        out->force[out->n_force++] = (pal_row){.effect = row->effect, .self = row->self};
+        out->force[out->n_force++] = (pal_component){.effect = row->effect, .self = row->self};
         if (!row->effect->drag && !row->effect->energy) out->has_energy = false;
-        if (row->effect->tangent && row->effect->tangent->rotate) out->has_turn = true;
+        if (row->effect->tangent && row->effect->tangent->rotate) out->has_rotation = true;
     }
-    for (int i = 0; i < body->n_dof; i++) out->n_free += !body->held[i];
-    if (!body->embed) return PAL_ERR_OK;
-    return pal_embedded_make(body, out->force, out->n_force, build->arena, build->note, &out->embedded);
+    for (int i = 0; i < body->n_dof; i++) out->n_free += !body->fixed[i];
+    if (!body->interpolation) return PAL_ERR_OK;
+    return pal_interpolated_system_make(body, out->force, out->n_force, build->arena, build->diag,
+                                        &out->interpolated_system);
 }
 
 /* the cliques of all rows, heap [system->n_force] */
@@ -33,7 +34,7 @@ static pal_cliques *list_cliques(const pal_system *system, int *n_list)
     pal_cliques *list = calloc((size_t)system->n_force + 1, sizeof *list);
     *n_list = 0;
     for (int i = 0; i < system->n_force && list; i++) {
-        const pal_row *row = &system->force[i];
+        const pal_component *row = &system->force[i];
         if (row->effect->tangent && row->effect->tangent->couple &&
             row->effect->tangent->couple(row->self, &list[*n_list]))
             ++*n_list;
@@ -41,17 +42,17 @@ static pal_cliques *list_cliques(const pal_system *system, int *n_list)
     return list;
 }
 
-pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_blocks *out)
+pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_block_matrix *out)
 {
     int n_list;
-    if (system->embedded) {
-        *out = system->embedded->rest;
+    if (system->interpolated_system) {
+        *out = system->interpolated_system->rest;
         out->value = PAL_NEW(arena, double, 9 * (size_t)out->start[out->n]);
         return out->value ? PAL_ERR_OK : PAL_ERR_MEMORY;
     }
     pal_cliques *list = list_cliques(system, &n_list);
     if (!list) return PAL_ERR_MEMORY;
-    pal_err err = pal_blocks_make(system->body->n_node, list, n_list, arena, out);
+    pal_err err = pal_block_matrix_make(system->body->n_node, list, n_list, arena, out);
     free(list);
     return err;
 }
@@ -59,18 +60,18 @@ pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_block
 void pal_system_linearise(const pal_system *system)
 {
     for (int i = 0; i < system->n_force; i++) {
-        const pal_row *row = &system->force[i];
+        const pal_component *row = &system->force[i];
         if (row->effect->tangent) row->effect->tangent->linearise(row->self, system->body);
     }
 }
 
-void pal_system_touch(pal_system *system, const pal_step *step)
+void pal_system_linearise_contact(pal_system *system, const pal_step *step)
 {
     system->contact = step->contact;
     system->n_contact = step->n_contact;
     system->has_contact = false;
     for (int i = 0; i < step->n_contact; i++) {
-        const pal_row *row = &step->contact[i];
+        const pal_component *row = &step->contact[i];
         if (!row->effect->tangent) continue;
         if (row->effect->tangent->linearise) row->effect->tangent->linearise(row->self, system->body);
         system->has_contact |= row->effect->tangent->multiply != NULL;
@@ -88,55 +89,56 @@ void pal_system_linearise_rest(const pal_system *system)
 
 bool pal_system_probe(const pal_system *system, int most)
 {
-    pal_embedded *e = system->embedded;
+    pal_interpolated_system *e = system->interpolated_system;
     if (!e || e->next == e->n_move) return true;
     pal_system_linearise_rest(system);
-    return pal_embedded_probe(e, system, most);
+    return pal_interpolated_system_probe(e, system, most);
 }
 
-void pal_system_place(const pal_system *system)
+void pal_system_interpolate(const pal_system *system)
 {
-    if (system->embedded) pal_point_rows_place(system->body->embed, system->body->x, system->body->d);
+    if (system->interpolated_system)
+        pal_interpolation_apply(system->body->interpolation, system->body->x, system->body->d);
 }
 
 void pal_system_rotate(const pal_system *system, double *turn)
 {
     const pal_body *body = system->body;
-    double *to = system->embedded ? system->embedded->turn : turn;
+    double *to = system->interpolated_system ? system->interpolated_system->turn : turn;
     memset(to, 0, 9 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < system->n_force; i++) {
-        const pal_row *row = &system->force[i];
+        const pal_component *row = &system->force[i];
         if (row->effect->tangent && row->effect->tangent->rotate) row->effect->tangent->rotate(row->self, body, to);
     }
-    if (!system->embedded) return;
+    if (!system->interpolated_system) return;
     memset(turn, 0, 9 * sizeof(double) * (size_t)body->n_dof);
-    pal_embedded_pull9(body->embed, to, turn);
+    pal_interpolated_system_restrict9(body->interpolation, to, turn);
 }
 
 /* ---- products ---- */
 
-static void multiply_rows(const pal_system *system, const pal_row *row, int n_row, double k, double c, const double *p,
-                          double *out)
+static void multiply_rows(const pal_system *system, const pal_component *row, int n_row, double k, double c,
+                          const double *p, double *out)
 {
     const pal_body *body = system->body;
-    pal_embedded *e = system->embedded;
+    pal_interpolated_system *e = system->interpolated_system;
     if (e) {
-        pal_point_rows_place(body->embed, p, e->p);
+        pal_interpolation_apply(body->interpolation, p, e->p);
         memset(e->q, 0, 3 * sizeof(double) * (size_t)body->n_node);
     }
     for (int i = 0; i < n_row; i++) {
         const pal_tangent *tangent = row[i].effect->tangent;
         if (tangent && tangent->multiply) tangent->multiply(row[i].self, body, k, c, e ? e->p : p, e ? e->q : out);
     }
-    if (e) pal_point_rows_pull(body->embed, e->q, out);
+    if (e) pal_interpolation_apply_transpose(body->interpolation, e->q, out);
 }
 
-void pal_system_stiffness(const pal_system *system, double k, double c, const double *p, double *out)
+void pal_system_multiply_stiffness(const pal_system *system, double k, double c, const double *p, double *out)
 {
     multiply_rows(system, system->force, system->n_force, k, c, p, out);
 }
 
-void pal_system_contact(const pal_system *system, double k, double c, const double *p, double *out)
+void pal_system_multiply_contact(const pal_system *system, double k, double c, const double *p, double *out)
 {
     if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, c, p, out);
 }
@@ -151,7 +153,7 @@ static void between(const pal_mass_operator *m, int i, double mass, double damp,
     }
 }
 
-void pal_system_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
+void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
 {
     const pal_body *body = system->body;
     for (int i = 0; i < body->n_dof; i++) {
@@ -164,7 +166,7 @@ void pal_system_inertia(const pal_system *system, double mass, double damp, cons
     }
 }
 
-double pal_system_square(const pal_system *system, double mass, double damp, const double *p)
+double pal_system_inertia_norm2(const pal_system *system, double mass, double damp, const double *p)
 {
     const pal_body *body = system->body;
     double sum = 0, part[3];
@@ -179,19 +181,19 @@ double pal_system_square(const pal_system *system, double mass, double damp, con
 void pal_system_multiply(const pal_system *system, const double *p, double *out)
 {
     const pal_body *body = system->body;
-    pal_system_inertia(system, system->mass, system->damp, p, out);
-    pal_system_stiffness(system, system->stiff, system->damp, p, out);
-    pal_system_contact(system, system->stiff, system->damp, p, out);
+    pal_system_multiply_inertia(system, system->mass, system->damp, p, out);
+    pal_system_multiply_stiffness(system, system->stiff, system->damp, p, out);
+    pal_system_multiply_contact(system, system->stiff, system->damp, p, out);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->held[i]) pal_set3(out + 3 * i, 0, 0, 0);
+        if (body->fixed[i]) pal_set3(out + 3 * i, 0, 0, 0);
 }
 
 double pal_system_work(const pal_system *system, const double *p)
 {
     const pal_body *body = system->body;
-    pal_embedded *e = system->embedded;
-    if (e) pal_point_rows_place(body->embed, p, e->p);
-    return pal_sum_products(3 * body->n_node, body->load, e ? e->p : p);
+    pal_interpolated_system *e = system->interpolated_system;
+    if (e) pal_interpolation_apply(body->interpolation, p, e->p);
+    return pal_dot_product(3 * body->n_node, body->load, e ? e->p : p);
 }
 
 /* forces of the internal rows at body->x, in body->f and g */
@@ -199,22 +201,22 @@ static void find_inner_forces(const pal_system *system)
 {
     pal_body *body = system->body;
     pal_step step = {.body = body, .force = system->force, .n_force = system->n_force};
-    pal_system_place(system);
+    pal_system_interpolate(system);
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < system->n_force; i++)
         if (system->force[i].effect->internal) (void)system->force[i].effect->run(system->force[i].self, &step);
-    if (!body->embed) return;
+    if (!body->interpolation) return;
     memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    pal_point_rows_pull(body->embed, body->f, body->g);
+    pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
 }
 
-void pal_system_curve(const pal_system *system, const double *x, double *low, const double *p, double *out)
+void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out)
 {
     pal_body *body = system->body;
     const int n = 3 * body->n_dof;
     double longest = 0;
     for (int i = 0; i < n; i++) longest = fmax(longest, fabs(p[i]));
-    double part = longest > 0 ? 1e-5 * body->h_m / longest : 0;
+    double part = longest > 0 ? 1e-5 * body->edge_m / longest : 0;
     for (int side = -1; side <= 1; side += 2) {
         for (int i = 0; i < n; i++) body->x[i] = x[i] + side * part * p[i];
         find_inner_forces(system);
@@ -222,22 +224,22 @@ void pal_system_curve(const pal_system *system, const double *x, double *low, co
     }
     for (int i = 0; i < n; i++) {
         body->x[i] = x[i];
-        out[i] = body->held[i / 3] || part == 0 ? 0 : (low[i] - body->g[i]) / (2 * part);
+        out[i] = body->fixed[i / 3] || part == 0 ? 0 : (low[i] - body->g[i]) / (2 * part);
     }
-    pal_system_place(system);
+    pal_system_interpolate(system);
 }
 
 /* rest and damping of an embedded body, and its masses */
-static void assemble_embedded(const pal_system *system, pal_blocks *to)
+static void assemble_embedded(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
-    const pal_embedded *e = system->embedded;
+    const pal_interpolated_system *e = system->interpolated_system;
     for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++)
         to->value[i] = system->stiff * e->rest.value[i] + (e->damping ? system->damp * e->damping[i] : 0);
     const pal_mass_operator *m = body->mass_operator;
     for (int i = 0; i < body->n_dof; i++) {
         for (int32_t k = m ? m->start[i] : 0; m && k < m->start[i + 1]; k++) {
-            int at = m->point[k] >= i ? pal_blocks_find(to, m->point[k], i) : -1;
+            int at = m->point[k] >= i ? pal_block_matrix_find(to, m->point[k], i) : -1;
             double w = system->mass * m->mass_kg[k] + (m->damping_kg_s ? system->damp * m->damping_kg_s[k] : 0);
             for (int c = 0; c < 3 && at >= 0; c++) to->value[9 * (size_t)at + 4 * (size_t)c] += w;
         }
@@ -248,19 +250,19 @@ static void assemble_embedded(const pal_system *system, pal_blocks *to)
     }
 }
 
-void pal_system_assemble(const pal_system *system, pal_blocks *to)
+void pal_system_assemble(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
-    if (system->embedded) {
+    if (system->interpolated_system) {
         assemble_embedded(system, to);
         return;
     }
-    pal_blocks_zero(to);
+    pal_block_matrix_zero(to);
     for (int i = 0; i < body->n_node; i++)
         for (int c = 0; c < 3; c++)
             to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] = system->mass * body->mass_kg[i];
     for (int i = 0; i < system->n_force; i++) {
-        const pal_row *row = &system->force[i];
+        const pal_component *row = &system->force[i];
         if (row->effect->tangent && row->effect->tangent->assemble)
             row->effect->tangent->assemble(row->self, body, system->stiff, system->damp, to);
     }
@@ -270,7 +272,7 @@ double pal_system_energy(const pal_system *system)
 {
     double sum = 0;
     for (int i = 0; i < system->n_force; i++) {
-        const pal_row *row = &system->force[i];
+        const pal_component *row = &system->force[i];
         if (row->effect->energy) sum += row->effect->energy(row->self, system->body);
     }
     return sum;
@@ -291,7 +293,7 @@ static void join_parts(const pal_cliques *list, int n_list, int32_t *parent)
     for (int l = 0; l < n_list; l++)
         for (int e = 0; e < list[l].n_item; e++) {
             const int32_t *node = list[l].node + (size_t)list[l].n_corner * (size_t)e;
-            for (int c = 1; c < list[l].n_corner; c++) pal_roots_join(parent, node[0], node[c]);
+            for (int c = 1; c < list[l].n_corner; c++) pal_union_find_join(parent, node[0], node[c]);
         }
 }
 
@@ -318,30 +320,30 @@ static void take_off(const pal_body *body, span *s, int32_t node)
     s->off_m = fmax(s->off_m, pal_norm3(across) / s->far_m);
 }
 
-static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supports *out)
+static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_support_report *out)
 {
     int n = body->n_dof;
-    *out = (pal_supports){.loose_node = -1};
+    *out = (pal_support_report){.unsupported_node = -1};
     for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
     for (int i = 0; i < n; i++)
-        if (body->held[i]) take_far(body, &s[pal_root(parent, i)], i);
+        if (body->fixed[i]) take_far(body, &s[pal_union_find_root(parent, i)], i);
     for (int i = 0; i < n; i++)
-        if (body->held[i]) take_off(body, &s[pal_root(parent, i)], i);
+        if (body->fixed[i]) take_off(body, &s[pal_union_find_root(parent, i)], i);
     for (int i = 0; i < n; i++) {
         if (parent[i] != i) continue;
         out->n_part++;
         /* a part of one node is held as soon as that node is */
-        if (s[i].off_m > 1e-9 * body->size_m || (body->held[i] && s[i].far < 0)) continue;
-        out->n_loose++;
-        if (out->loose_node < 0) out->loose_node = i;
+        if (s[i].off_m > 1e-9 * body->length_scale_m || (body->fixed[i] && s[i].far < 0)) continue;
+        out->n_unsupported++;
+        if (out->unsupported_node < 0) out->unsupported_node = i;
     }
 }
 
-pal_err pal_system_supports(const pal_system *system, pal_supports *out)
+pal_err pal_system_find_supports(const pal_system *system, pal_support_report *out)
 {
     int n_list = 0, n = system->body->n_dof;
     pal_cliques *list = list_cliques(system, &n_list);
-    const pal_blocks *a = system->embedded ? &system->embedded->rest : NULL;
+    const pal_block_matrix *a = system->interpolated_system ? &system->interpolated_system->rest : NULL;
     int32_t *parent = malloc(sizeof *parent * (size_t)n);
     span *s = malloc(sizeof *s * (size_t)n);
     bool all = list && parent && s;
@@ -350,7 +352,7 @@ pal_err pal_system_supports(const pal_system *system, pal_supports *out)
         if (!a) join_parts(list, n_list, parent);
         for (int32_t j = 0; a && j < n; j++)
             for (int32_t k = a->start[j]; k < a->start[j + 1]; k++)
-                parent[pal_root(parent, a->row[k])] = pal_root(parent, j);
+                parent[pal_union_find_root(parent, a->row[k])] = pal_union_find_root(parent, j);
         count_parts(system->body, parent, s, out);
     }
     free(list), free(parent), free(s);

@@ -10,32 +10,32 @@
 enum { TURNS_MOST = 4, PAUSE_STEPS = 20 };
 static const double slow_flops = 1e9; /* operations a second that every machine does on its spare thread */
 
-pal_err pal_turns_make(const pal_system *system, pal_arena *arena, pal_turns *out)
+pal_err pal_node_rotations_make(const pal_system *system, pal_arena *arena, pal_node_rotations *out)
 {
     int n = system->body->n_dof;
-    *out = (pal_turns){.n_dof = n, .any = system->has_turn};
+    *out = (pal_node_rotations){.n_dof = n, .any = system->has_rotation};
     out->quat = PAL_NEW(arena, double, 4 * (size_t)n);
-    out->sum = PAL_NEW(arena, double, system->has_turn ? 9 * (size_t)n : 0);
+    out->sum = PAL_NEW(arena, double, system->has_rotation ? 9 * (size_t)n : 0);
     if (!out->quat || !out->sum) return PAL_ERR_MEMORY;
-    pal_turns_reset(out);
+    pal_node_rotations_reset(out);
     return PAL_ERR_OK;
 }
 
-void pal_turns_reset(pal_turns *turns)
+void pal_node_rotations_reset(pal_node_rotations *turns)
 {
     memset(turns->quat, 0, 4 * sizeof(double) * (size_t)turns->n_dof);
     for (int i = 0; i < turns->n_dof; i++) turns->quat[4 * i] = 1;
 }
 
-void pal_turns_take(pal_turns *turns, const pal_system *system)
+void pal_node_rotations_update(pal_node_rotations *turns, const pal_system *system)
 {
     if (!turns->any) return;
     pal_system_rotate(system, turns->sum);
-    for (int i = 0; i < turns->n_dof; i++) pal_polar_turn(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MOST);
+    for (int i = 0; i < turns->n_dof; i++) pal_polar_rotation(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MOST);
 }
 
-pal_err pal_warp_make(const pal_blocks *pattern, const pal_body *body, const pal_turns *turns, bool single,
-                      pal_arena *arena, pal_warp *out)
+pal_err pal_warp_make(const pal_block_matrix *pattern, const pal_body *body, const pal_node_rotations *turns,
+                      bool single, pal_arena *arena, pal_warp *out)
 {
     size_t n = (size_t)body->n_dof;
     *out = (pal_warp){.n_dof = body->n_dof, .single = single, .quat = turns->quat};
@@ -45,7 +45,7 @@ pal_err pal_warp_make(const pal_blocks *pattern, const pal_body *body, const pal
     out->work = PAL_NEW(arena, double, 3 * n);
     if (!out->base || !out->next || !out->w || !out->work) return PAL_ERR_MEMORY;
     double before = pal_clock_s();
-    pal_err err = pal_cholesky_create(pattern, body->held, &out->factor);
+    pal_err err = pal_cholesky_create(pattern, body->fixed, &out->factor);
     out->analyse_s = pal_clock_s() - before;
     return err;
 }
@@ -61,7 +61,7 @@ static void copy_turns(const pal_warp *warp, double *to)
     memcpy(to, warp->quat, 4 * sizeof(double) * (size_t)warp->n_dof);
 }
 
-pal_err pal_warp_factor(pal_warp *warp, const pal_blocks *a)
+pal_err pal_warp_factor(pal_warp *warp, const pal_block_matrix *a)
 {
     if (pal_cholesky_refreshing(warp->factor)) (void)pal_cholesky_adopt(warp->factor, true);
     warp->wait = warp->pause = 0;
@@ -81,12 +81,12 @@ static void set_rest(double *quat, int n_dof)
     for (int i = 0; i < 4 * n_dof; i++) quat[i] = i % 4 == 0;
 }
 
-void pal_warp_rest(pal_warp *warp)
+void pal_warp_set_rest(pal_warp *warp)
 {
     set_rest(warp->base, warp->n_dof);
 }
 
-bool pal_warp_refresh(pal_warp *warp, const pal_blocks *a, bool at_rest, double step_s)
+bool pal_warp_refresh(pal_warp *warp, const pal_block_matrix *a, bool at_rest, double step_s)
 {
     if (warp->wait > 0 || warp->pause > 0 || pal_cholesky_refresh(warp->factor, a)) return false;
     copy_turns(warp, warp->next);
@@ -96,7 +96,7 @@ bool pal_warp_refresh(pal_warp *warp, const pal_blocks *a, bool at_rest, double 
     return true;
 }
 
-void pal_warp_tick(pal_warp *warp)
+void pal_warp_step(pal_warp *warp)
 {
     if (warp->pause > 0) warp->pause--;
     if (warp->wait == 0 || --warp->wait > 0) return;
@@ -107,7 +107,7 @@ void pal_warp_tick(pal_warp *warp)
     warp->refreshed = true;
 }
 
-void pal_warp_turn(pal_warp *warp, const pal_turns *turns)
+void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *turns)
 {
     warp->turned = turns->any;
     for (int i = 0; i < warp->n_dof && turns->any; i++) {

@@ -1,5 +1,5 @@
 /* Model adaptive_springs: a triangle surface as mass points on springs whose level of detail follows what happens
- * (paper C; shell.h has the masses, the stiffness laws and the active part).
+ * (paper C; adaptive_surface.h has the masses, the stiffness laws and the active part).
  *
  * Keys: levels (2; 1 to 10), start_level (0, below levels), thickness_m (0.003), mass_kg (absent: density * thickness *
  * area of the coarse triangles, the density of regions at their middles), k_spring_N_m (of a spring of level 0; absent:
@@ -15,63 +15,65 @@
  * sqrt(3) in its plane (per length, Poisson ratio 1/3), so that a sheet of that thickness stretches as its material. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
 typedef struct keys {
-    pal_shell_options shell;
+    pal_adaptive_options adaptive;
     double thickness_m, k_spring_N_m, c_spring_Ns_m, k_shape_N_m, c_shape_Ns_m; /* below 0: not given */
     const char *frame;                                                          /* NULL: not given */
     bool refine;
 } keys;
 
 /* one of two words; *second tells which */
-static pal_err read_choice(pal_item *item, const char *key, const char *a, const char *b, bool *second, pal_note *note)
+static pal_err read_choice(pal_config_entry *item, const char *key, const char *a, const char *b, bool *second,
+                           pal_diagnostic *diag)
 {
     const char *text = a;
-    PAL_TRY(pal_item_text(item, key, &text, note));
+    PAL_TRY(pal_entry_read_text(item, key, &text, diag));
     *second = !strcmp(text, b);
     if (*second || !strcmp(text, a)) return PAL_ERR_OK;
-    return pal_note_set(note, PAL_ERR_REFUSED, "%s.%s: \"%s\", wanted \"%s\" or \"%s\"", item->path, key, text, a, b);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: \"%s\", wanted \"%s\" or \"%s\"", item->path, key, text, a,
+                              b);
 }
 
-static pal_err read_keys(pal_item *item, keys *out, pal_note *note)
+static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag)
 {
     bool paper, nodes, butterfly, world;
     double memory_MB = 512;
-    *out = (keys){.shell = {.n_level = 2},
+    *out = (keys){.adaptive = {.n_level = 2},
                   .thickness_m = 0.003,
                   .k_spring_N_m = -1,
                   .c_spring_Ns_m = -1,
                   .k_shape_N_m = -1,
                   .c_shape_Ns_m = -1,
                   .refine = true};
-    pal_shell_options *shell = &out->shell;
-    PAL_TRY(pal_item_count(item, "levels", 1, PAL_LEVELS_MOST, &shell->n_level, note));
-    PAL_TRY(pal_item_count(item, "start_level", 0, PAL_LEVELS_MOST, &shell->start_level, note));
-    if (shell->start_level >= shell->n_level)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s.start_level: %d, wanted 0 to %d as levels is %d", item->path,
-                            shell->start_level, shell->n_level - 1, shell->n_level);
-    PAL_TRY(pal_item_number(item, "thickness_m", 1e-9, 1e9, &out->thickness_m, note));
-    PAL_TRY(pal_item_number(item, "mass_kg", 1e-30, 1e30, &shell->mass_kg, note));
-    PAL_TRY(pal_item_number(item, "k_spring_N_m", 1e-30, 1e60, &out->k_spring_N_m, note));
-    PAL_TRY(pal_item_number(item, "c_spring_Ns_m", 0, 1e60, &out->c_spring_Ns_m, note));
-    PAL_TRY(read_choice(item, "law", "membrane", "paper", &paper, note));
-    PAL_TRY(read_choice(item, "mass", "faces", "nodes", &nodes, note));
-    PAL_TRY(read_choice(item, "place", "linear", "butterfly", &butterfly, note));
-    PAL_TRY(pal_item_number(item, "k_shape_N_m", 0, 1e60, &out->k_shape_N_m, note));
-    PAL_TRY(pal_item_number(item, "c_shape_Ns_m", 0, 1e60, &out->c_shape_Ns_m, note));
-    PAL_TRY(read_choice(item, "frame", "body", "world", &world, note));
-    bool given = pal_item_has(item, "frame");
-    PAL_TRY(pal_item_bool(item, "refine", &out->refine, note));
-    PAL_TRY(pal_item_number(item, "memory_MB", 1, 1e6, &memory_MB, note));
-    shell->law = paper ? PAL_SHELL_PAPER : PAL_SHELL_MEMBRANE;
-    shell->mass = nodes ? PAL_SHELL_BY_NODES : PAL_SHELL_BY_FACES;
-    shell->place = butterfly ? PAL_SHELL_BUTTERFLY : PAL_SHELL_LINEAR;
-    shell->budget_byte = (size_t)(memory_MB * 1048576);
+    pal_adaptive_options *adaptive = &out->adaptive;
+    PAL_TRY(pal_entry_read_count(item, "levels", 1, PAL_LEVELS_MAX, &adaptive->n_level, diag));
+    PAL_TRY(pal_entry_read_count(item, "start_level", 0, PAL_LEVELS_MAX, &adaptive->start_level, diag));
+    if (adaptive->start_level >= adaptive->n_level)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.start_level: %d, wanted 0 to %d as levels is %d",
+                                  item->path, adaptive->start_level, adaptive->n_level - 1, adaptive->n_level);
+    PAL_TRY(pal_entry_read_number(item, "thickness_m", 1e-9, 1e9, &out->thickness_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "mass_kg", 1e-30, 1e30, &adaptive->mass_kg, diag));
+    PAL_TRY(pal_entry_read_number(item, "k_spring_N_m", 1e-30, 1e60, &out->k_spring_N_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "c_spring_Ns_m", 0, 1e60, &out->c_spring_Ns_m, diag));
+    PAL_TRY(read_choice(item, "law", "membrane", "paper", &paper, diag));
+    PAL_TRY(read_choice(item, "mass", "faces", "nodes", &nodes, diag));
+    PAL_TRY(read_choice(item, "place", "linear", "butterfly", &butterfly, diag));
+    PAL_TRY(pal_entry_read_number(item, "k_shape_N_m", 0, 1e60, &out->k_shape_N_m, diag));
+    PAL_TRY(pal_entry_read_number(item, "c_shape_Ns_m", 0, 1e60, &out->c_shape_Ns_m, diag));
+    PAL_TRY(read_choice(item, "frame", "body", "world", &world, diag));
+    bool given = pal_entry_has(item, "frame");
+    PAL_TRY(pal_entry_read_bool(item, "refine", &out->refine, diag));
+    PAL_TRY(pal_entry_read_number(item, "memory_MB", 1, 1e6, &memory_MB, diag));
+    adaptive->law = paper ? PAL_ADAPTIVE_PAPER : PAL_ADAPTIVE_MEMBRANE;
+    adaptive->mass = nodes ? PAL_MASS_BY_NODES : PAL_MASS_BY_FACES;
+    adaptive->place = butterfly ? PAL_MIDPOINT_BUTTERFLY : PAL_MIDPOINT_LINEAR;
+    adaptive->budget_byte = (size_t)(memory_MB * 1048576);
     out->frame = !given ? NULL : world ? "world" : "body";
-    return pal_item_done(item, note);
+    return pal_entry_check_unused(item, diag);
 }
 
 static double surface_mass(const pal_body_def *def, double thickness_m)
@@ -94,17 +96,18 @@ static double surface_mass(const pal_body_def *def, double thickness_m)
 }
 
 /* corners are checked here because the mass is taken before the levels are made */
-static pal_err check_surface(const pal_body_def *def, const char *path, pal_note *note)
+static pal_err check_surface(const pal_body_def *def, const char *path, pal_diagnostic *diag)
 {
     const pal_surface *surface = &def->mesh->surface;
     if (surface->n_tri < 1)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "body \"%s\" %s: a mesh with %d surface triangles; \"adaptive_springs\" is made of them",
-                            def->name, path, surface->n_tri);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "body \"%s\" %s: a mesh with %d surface triangles; \"adaptive_springs\" is made of them", def->name, path,
+            surface->n_tri);
     for (int i = 0; i < 3 * surface->n_tri; i++)
         if (surface->tri[i] < 0 || surface->tri[i] >= surface->n_vertex)
-            return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\" %s: triangle %d has corner %d of %d vertices",
-                                def->name, path, i / 3, surface->tri[i], surface->n_vertex);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" %s: triangle %d has corner %d of %d vertices",
+                                      def->name, path, i / 3, surface->tri[i], surface->n_vertex);
     return PAL_ERR_OK;
 }
 
@@ -112,60 +115,60 @@ static pal_err check_surface(const pal_body_def *def, const char *path, pal_note
 static pal_err make_shell(const keys *k, const char *path, pal_build *build)
 {
     const pal_surface *surface = &build->def->mesh->surface;
-    pal_shell *shell;
-    pal_note why = {{0}};
+    pal_adaptive_surface *adaptive;
+    pal_diagnostic reason = {{0}};
     pal_surface_topology topology = {.manifold = true, .oriented = true};
-    pal_err err = pal_shell_make(surface, &k->shell, build->body, build->arena, &why, &shell);
+    pal_err err = pal_adaptive_make(surface, &k->adaptive, build->body, build->arena, &reason, &adaptive);
     if (!err || err == PAL_ERR_MEMORY) return err;
     if (err == PAL_ERR_REFUSED) PAL_TRY(pal_surface_check(surface, &topology));
     bool split = topology.manifold && topology.oriented;
-    return pal_note_set(build->note, err, "body \"%s\" %s: %s%s", build->body->name, path, why.text,
-                        split ? "" : " (model tet_springs takes any surface: it fills voxels)");
+    return pal_diagnostic_set(build->diag, err, "body \"%s\" %s: %s%s", build->body->name, path, reason.text,
+                              split ? "" : " (model tet_springs takes any surface: it fills voxels)");
 }
 
-static void put(pal_item *row, const char *key, double number)
+static void put(pal_config_entry *row, const char *key, double number)
 {
-    if (number >= 0) pal_item_put_number(row, key, number, NULL);
+    if (number >= 0) pal_entry_put_number(row, key, number, NULL);
 }
 
-static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list_rows(const keys *k, const pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     const pal_body_def *def = build->def;
     /* the rows derive what the scene does not give, so that it follows a live material edit */
-    pal_item *row = out->row;
-    pal_item_init(row, item->path, "edge_spring");
+    pal_config_entry *row = out->row;
+    pal_entry_init(row, item->path, "edge_spring");
     put(row, "k_N_m", k->k_spring_N_m);
     put(row++, "c_Ns_m", k->c_spring_Ns_m);
     if (k->k_shape_N_m != 0) {
-        pal_item_init(row, item->path, "shape_spring");
+        pal_entry_init(row, item->path, "shape_spring");
         put(row, "k_N_m", k->k_shape_N_m);
         put(row, "c_Ns_m", k->c_shape_Ns_m);
-        if (k->frame) PAL_TRY(pal_item_put_text(row, "frame", k->frame, build->note));
+        if (k->frame) PAL_TRY(pal_entry_put_text(row, "frame", k->frame, build->diag));
         row++;
     }
-    if (def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
-    if (k->refine && k->shell.n_level > 1) pal_item_init(row++, item->path, "refine");
-    if (!def->solver.name[0]) pal_item_init(row++, item->path, "rk4");
+    if (def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
+    if (k->refine && k->adaptive.n_level > 1) pal_entry_init(row++, item->path, "refine");
+    if (!def->solver.name[0]) pal_entry_init(row++, item->path, "rk4");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     const pal_body_def *def = build->def;
     keys k;
     out->n_row = 0;
-    PAL_TRY(read_keys(item, &k, build->note));
-    PAL_TRY(check_surface(def, item->path, build->note));
-    if (k.shell.mass_kg == 0) k.shell.mass_kg = surface_mass(def, k.thickness_m);
+    PAL_TRY(read_keys(item, &k, build->diag));
+    PAL_TRY(check_surface(def, item->path, build->diag));
+    if (k.adaptive.mass_kg == 0) k.adaptive.mass_kg = surface_mass(def, k.thickness_m);
     PAL_TRY(make_shell(&k, item->path, build));
     return list_rows(&k, item, build, out);
 }
 
-static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     keys k;
-    PAL_TRY(read_keys(item, &k, build->note));
+    PAL_TRY(read_keys(item, &k, build->diag));
     return list_rows(&k, item, build, out);
 }
 

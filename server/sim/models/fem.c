@@ -11,7 +11,7 @@
  * corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the mesh's own nodes, so
  * that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
 #include "server/base/vec3.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"
 
 #include <stdlib.h>
@@ -23,47 +23,48 @@ typedef struct fem_choice {
     int n_corner;
 } fem_choice;
 
-static const float least_fill = 0.02f;
+static const float min_fill = 0.02f;
 
-static pal_err read_keys(pal_item *item, const pal_build *build, fem_choice *to)
+static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_choice *to)
 {
     static const char *const names[] = {"hex8_bbar", "hex8", "tet4", "tet10"};
     static const int corners[] = {8, 8, 4, 10};
     const pal_prepared *mesh = build->def->mesh;
     *to = (fem_choice){.element = mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4", .fill = true};
-    PAL_TRY(pal_item_text(item, "element", &to->element, build->note));
-    PAL_TRY(pal_item_text(item, "law", &to->law, build->note));
-    PAL_TRY(pal_item_bool(item, "fill", &to->fill, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_read_text(item, "element", &to->element, build->diag));
+    PAL_TRY(pal_entry_read_text(item, "law", &to->law, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "fill", &to->fill, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     for (int i = 0; i < 4; i++)
         if (!strcmp(to->element, names[i])) to->n_corner = corners[i];
     if (to->n_corner == 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "body \"%s\" %s.element: \"%s\" is none of hex8_bbar, hex8, tet4, tet10", build->body->name,
-                            item->path, to->element);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "body \"%s\" %s.element: \"%s\" is none of hex8_bbar, hex8, tet4, tet10",
+                                  build->body->name, item->path, to->element);
     to->hex = to->n_corner == 8;
     if (to->hex && mesh->hexes.n_hex == 0)
-        return pal_note_set(
-            build->note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            build->diag, PAL_ERR_REFUSED,
             "body \"%s\" %s.element: \"%s\" needs a mesh of voxels and this one has no hexahedra; prepare "
             "it from its surface with `palpate prepare --model fem`, or take tet4",
             build->body->name, item->path, to->element);
     return PAL_ERR_OK;
 }
 
-static pal_err list_rows(const pal_item *item, const pal_build *build, const fem_choice *choice, pal_recipe *out)
+static pal_err list_rows(const pal_config_entry *item, const pal_build *build, const fem_choice *choice,
+                         pal_recipe *out)
 {
     out->n_row = 0;
-    pal_item *row = &out->row[out->n_row++];
-    pal_item_init(row, item->path, choice->hex ? "hex_elastic" : "tet_elastic");
-    PAL_TRY(pal_item_put_text(row, "element", choice->element, build->note));
-    if (choice->law) PAL_TRY(pal_item_put_text(row, "law", choice->law, build->note));
-    PAL_TRY(pal_item_put_bool(row, "fill", choice->fill, build->note));
+    pal_config_entry *row = &out->row[out->n_row++];
+    pal_entry_init(row, item->path, choice->hex ? "hex_elastic" : "tet_elastic");
+    PAL_TRY(pal_entry_put_text(row, "element", choice->element, build->diag));
+    if (choice->law) PAL_TRY(pal_entry_put_text(row, "law", choice->law, build->diag));
+    PAL_TRY(pal_entry_put_bool(row, "fill", choice->fill, build->diag));
     bool own_law =
         choice->law && !strcmp(choice->law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
-    if (own_law) PAL_TRY(pal_item_put_bool(row, "untangle", false, build->note));
-    if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
-    if (!build->def->solver.name[0]) pal_item_init(&out->row[out->n_row++], item->path, "implicit_euler");
+    if (own_law) PAL_TRY(pal_entry_put_bool(row, "recover", false, build->diag));
+    if (build->def->material.damping_1_s > 0) pal_entry_init(&out->row[out->n_row++], item->path, "viscous");
+    if (!build->def->solver.name[0]) pal_entry_init(&out->row[out->n_row++], item->path, "implicit_euler");
     return PAL_ERR_OK;
 }
 
@@ -148,7 +149,7 @@ static pal_err make_fill(const pal_build *build, const fem_choice *choice)
     if (!fill) return PAL_ERR_MEMORY;
     for (int e = 0; e < body->n_element; e++) {
         float share = mesh->hexes.fill[choice->hex ? e : e / 5];
-        fill[e] = share > least_fill ? share : least_fill;
+        fill[e] = share > min_fill ? share : min_fill;
     }
     body->fill = fill;
     return PAL_ERR_OK;
@@ -179,19 +180,19 @@ static pal_err lump_mass(const pal_build *build)
     }
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
-            return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name, i,
-                                body->mass_kg[i]);
+            return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name,
+                                      i, body->mass_kg[i]);
     return PAL_ERR_OK;
 }
 
-static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     fem_choice choice;
     PAL_TRY(read_keys(item, build, &choice));
     return list_rows(item, build, &choice, out);
 }
 
-static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
     pal_body *body = build->body;
@@ -205,9 +206,9 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     body->hexes = mesh->hexes.n_hex > 0 ? &mesh->hexes : NULL;
     body->surface = &mesh->surface;
     body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
-    body->h_m = mesh->tets.h_m;
-    double lattice_m = choice.n_corner == 10 ? 0.5 * body->h_m : body->h_m;
-    return pal_slots_make(body->x_rest, body->n_node, lattice_m, build->arena, &body->slots);
+    body->edge_m = mesh->tets.edge_m;
+    double lattice_m = choice.n_corner == 10 ? 0.5 * body->edge_m : body->edge_m;
+    return pal_node_order_make(body->x_rest, body->n_node, lattice_m, build->arena, &body->node_order);
 }
 
 const pal_model pal_model_fem = {.name = "fem", .build = build, .list = list};

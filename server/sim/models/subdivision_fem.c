@@ -1,11 +1,11 @@
 /* Model subdivision_fem: control cells, subdivided into cubic, hexahedral and pyramidal finite elements whose nodes are
- * carried by the control points (paper A; solid.h has the elements and the material at their Gauss points).
+ * carried by the control points (paper A; subdivision_solid.h has the elements and the material at their Gauss points).
  *
  * The solver moves the control points p; nodes stand at d = A p (A eq. 1). Supports hold control points: those inside a
  * box or of the lowest part of the control cells, and what they hold is no unknown (A 3.3). What is shown and touched
  * is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
  *
- * Elements that are turned over become patches until they are not (cell_tangle.h). Above nu 0.3, of what there is at
+ * Elements that are turned over become patches until they are not (cell_recovery.h). Above nu 0.3, of what there is at
  * load, whole control cells keep a part of the volume instead of each element (cell_volume.c).
  *
  * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of the
@@ -13,8 +13,8 @@
  * Rows: cell_elastic, viscous where the material has damping, solver central_cg. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/solid.h"
-#include "server/sim/subdivision/solid_mass.h"
+#include "server/sim/subdivision/subdivision_mass.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -26,42 +26,42 @@ typedef struct keys {
     double memory_MB;
 } keys;
 
-static pal_err read_keys(pal_item *item, keys *out, pal_note *note)
+static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag)
 {
     static const char *const rule[] = {"maccracken_joy", "averaging"}, *const operator[] = {"polar", "edges"};
     const char *asked = rule[0];
     *out = (keys){.subdivision = {.n_level = 2}, .memory_MB = 512};
-    PAL_TRY(pal_item_count(item, "levels", 0, PAL_SUBDIVISION_MOST, &out->subdivision.n_level, note));
-    PAL_TRY(pal_item_text(item, "rule", &asked, note));
-    PAL_TRY(pal_item_text(item, "operator", &out->operator, note));
-    PAL_TRY(pal_item_number(item, "memory_MB", 1, 1e6, &out->memory_MB, note));
-    PAL_TRY(pal_item_done(item, note));
+    PAL_TRY(pal_entry_read_count(item, "levels", 0, PAL_SUBDIVISION_MAX, &out->subdivision.n_level, diag));
+    PAL_TRY(pal_entry_read_text(item, "rule", &asked, diag));
+    PAL_TRY(pal_entry_read_text(item, "operator", &out->operator, diag));
+    PAL_TRY(pal_entry_read_number(item, "memory_MB", 1, 1e6, &out->memory_MB, diag));
+    PAL_TRY(pal_entry_check_unused(item, diag));
     if (strcmp(asked, rule[0]) != 0 && strcmp(asked, rule[1]) != 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s.rule: \"%s\", wanted \"%s\" or \"%s\"", item->path, asked,
-                            rule[0], rule[1]);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.rule: \"%s\", wanted \"%s\" or \"%s\"", item->path, asked,
+                                  rule[0], rule[1]);
     if (out->operator&& strcmp(out->operator, operator[0]) != 0 && strcmp(out->operator, operator[1]) != 0)
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s.operator: \"%s\", wanted \"%s\" or \"%s\"", item->path,
-                            out->operator, operator[0], operator[1]);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.operator: \"%s\", wanted \"%s\" or \"%s\"", item->path,
+                                  out->operator, operator[0], operator[1]);
     out->subdivision.rule = strcmp(asked, rule[0]) ? PAL_SUBDIVISION_AVERAGING : PAL_SUBDIVISION_MACCRACKEN_JOY;
     out->subdivision.budget_byte = (size_t)(out->memory_MB * 1048576);
     return PAL_ERR_OK;
 }
 
 /* the solid with the scene's entry in its refusal */
-static pal_err make_solid(const keys *k, const pal_item *item, pal_build *build)
+static pal_err make_solid(const keys *k, const pal_config_entry *item, pal_build *build)
 {
-    pal_note why = {{0}};
+    pal_diagnostic reason = {{0}};
     const pal_body_def *def = build->def;
-    pal_err err = pal_solid_make(def, &k->subdivision, &build->body->solid, &why);
+    pal_err err = pal_subdivision_solid_make(def, &k->subdivision, &build->body->solid, &reason);
     if (err && err != PAL_ERR_MEMORY)
-        return pal_note_set(build->note, err, "body \"%s\" %s: %s", def->name, item->path, why.text);
+        return pal_diagnostic_set(build->diag, err, "body \"%s\" %s: %s", def->name, item->path, reason.text);
     PAL_TRY(err);
     double used_MB = (double)build->body->solid->n_byte / 1048576;
     if (used_MB > k->memory_MB)
-        return pal_note_set(build->note, PAL_ERR_BUDGET,
-                            "body \"%s\" %s: %d elements take %.0f MB, memory_MB allows %g: take fewer levels",
-                            def->name, item->path, pal_cell_elements_count(&build->body->solid->elements), used_MB,
-                            k->memory_MB);
+        return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET,
+                                  "body \"%s\" %s: %d elements take %.0f MB, memory_MB allows %g: take fewer levels",
+                                  def->name, item->path, pal_cell_elements_count(&build->body->solid->elements),
+                                  used_MB, k->memory_MB);
     return PAL_ERR_OK;
 }
 
@@ -154,65 +154,65 @@ static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundar
 }
 
 /* virtual nodes stand inside cells and are never shown */
-static pal_err show_boundary(const pal_item *item, pal_build *build)
+static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
 {
     boundary b = {.node = NULL};
     const pal_cells *cells = &build->body->solid->subdivision.cells;
     pal_err err =
         build->def->cut ? find_cut(cells, build->def, &b) : pal_cells_boundary(cells, &b.surface, &b.node, &b.face);
     if (!err && b.surface.n_tri == 0)
-        err = pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\" %s: the cut leaves nothing of it",
-                           build->def->name, item->path);
+        err = pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\" %s: the cut leaves nothing of it",
+                                 build->def->name, item->path);
     if (!err) err = keep_boundary(&b, build);
     pal_surface_free(&b.surface);
     free(b.node), free(b.face);
     return err;
 }
 
-/* points as given, nodes carried by them; masses follow once what is held is known (solid_body.h) */
-static pal_err make_body(const pal_item *item, pal_build *build)
+/* points as given, nodes carried by them; masses follow once what is held is known (subdivision_body.h) */
+static pal_err make_body(const pal_config_entry *item, pal_build *build)
 {
     pal_body *body = build->body;
-    const pal_solid *solid = body->solid;
+    const pal_subdivision_solid *solid = body->solid;
     PAL_TRY(pal_body_allocate_embedded(body, build->arena, &solid->rows));
-    body->node_ease_1_kg = PAL_NEW(build->arena, double, body->n_node);
+    body->node_inverse_mass_1_kg = PAL_NEW(build->arena, double, body->n_node);
     body->mass_operator = PAL_NEW(build->arena, pal_mass_operator, 1);
-    if (!body->node_ease_1_kg || !body->mass_operator) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_solid_mass_make(solid, build->arena, body->mass_operator));
+    if (!body->node_inverse_mass_1_kg || !body->mass_operator) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_subdivision_mass_make(solid, build->arena, body->mass_operator));
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     memcpy(body->x_rest, build->def->cells->x, n_byte);
     memcpy(body->x, body->x_rest, n_byte);
     memcpy(body->node_rest, solid->node_rest, 3 * sizeof(double) * (size_t)body->n_node);
-    pal_body_place(body);
-    body->h_m = cbrt(pal_solid_volume_m3(solid) / solid->subdivision.cells.n_cell);
+    pal_body_update_nodes(body);
+    body->edge_m = cbrt(pal_subdivision_solid_volume_m3(solid) / solid->subdivision.cells.n_cell);
     return show_boundary(item, build);
 }
 
-static pal_err list_rows(const keys *k, const pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list_rows(const keys *k, const pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
-    pal_item *row = out->row;
-    pal_item_init(row, item->path, "cell_elastic");
-    if (k->operator) PAL_TRY(pal_item_put_text(row, "operator", k->operator, build->note));
+    pal_config_entry *row = out->row;
+    pal_entry_init(row, item->path, "cell_elastic");
+    if (k->operator) PAL_TRY(pal_entry_put_text(row, "operator", k->operator, build->diag));
     row++;
-    if (build->def->material.damping_1_s > 0) pal_item_init(row++, item->path, "viscous");
-    if (!build->def->solver.name[0]) pal_item_init(row++, item->path, "central_cg");
+    if (build->def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
+    if (!build->def->solver.name[0]) pal_entry_init(row++, item->path, "central_cg");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     keys k;
-    PAL_TRY(read_keys(item, &k, build->note));
+    PAL_TRY(read_keys(item, &k, build->diag));
     PAL_TRY(make_solid(&k, item, build));
     PAL_TRY(make_body(item, build));
     return list_rows(&k, item, build, out);
 }
 
-static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     keys k;
-    PAL_TRY(read_keys(item, &k, build->note));
+    PAL_TRY(read_keys(item, &k, build->diag));
     return list_rows(&k, item, build, out);
 }
 

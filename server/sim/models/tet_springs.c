@@ -6,7 +6,7 @@
  * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
  * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
  * shares, weights by volume and masses count only what is inside, as model fem has it), untangle (true: what is turned
- * over comes back, spring_tangle.h; false: it may rest so).
+ * over comes back, spring_recovery.h; false: it may rest so).
  *
  * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own
  * (spring_law.h); constants that are given stand for all of them.
@@ -17,12 +17,12 @@
  * material's damping rate is given. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_tangle.h"
+#include "server/sim/springs/spring_recovery.h"
 
 #include <math.h>
 #include <string.h>
 
-static const float least_fill = 0.02F;
+static const float min_fill = 0.02F;
 
 /* quarter of each tetrahedron's mass to its corners, of the material at its centre; fill [n_tet] may be NULL */
 static void lump_mass(const pal_body_def *def, const pal_tets *tets, const float *fill, double *mass_kg)
@@ -45,50 +45,50 @@ static const char *const effect_name[3] = {"edge_distance", "face_area", "tet_vo
                          *const c_key[3] = {"c_distance_Js", "c_area_Js", "c_volume_Js"};
 
 /* no area springs: the others bear their share */
-static pal_err is_without_area(pal_item *item, const pal_spring_grid *grid, bool *out, pal_note *note)
+static pal_err is_without_area(pal_config_entry *item, const pal_spring_grid *grid, bool *out, pal_diagnostic *diag)
 {
     bool on_grid = grid->k_J[PAL_SPRING_DISTANCE] || grid->k_J[PAL_SPRING_AREA] || grid->k_J[PAL_SPRING_VOLUME];
     double k_J = on_grid ? 0 : -1;
-    PAL_TRY(pal_item_number(item, k_key[PAL_SPRING_AREA], 0, 1e60, &k_J, note));
+    PAL_TRY(pal_entry_read_number(item, k_key[PAL_SPRING_AREA], 0, 1e60, &k_J, diag));
     *out = k_J == 0 && !grid->k_J[PAL_SPRING_AREA];
     return PAL_ERR_OK;
 }
 
-static pal_err add_spring(pal_item *item, pal_spring_kind kind, const pal_spring_grid *grid, pal_recipe *out,
-                          pal_note *note)
+static pal_err add_spring(pal_config_entry *item, pal_spring_kind kind, const pal_spring_grid *grid, pal_recipe *out,
+                          pal_diagnostic *diag)
 {
     double k_J = -1, c_Js = 0;
     bool without_area = false;
     const char *weights = NULL;
-    PAL_TRY(pal_item_number(item, k_key[kind], 0, 1e60, &k_J, note));
-    PAL_TRY(pal_item_number(item, c_key[kind], 0, 1e60, &c_Js, note));
-    PAL_TRY(pal_item_text(item, "weights", &weights, note));
-    PAL_TRY(is_without_area(item, grid, &without_area, note));
-    if (grid->k_J[kind] && pal_item_has(item, k_key[kind]))
-        return pal_note_set(note, PAL_ERR_REFUSED, "%s.%s: stands beside a grid that gives the same", item->path,
-                            k_key[kind]);
+    PAL_TRY(pal_entry_read_number(item, k_key[kind], 0, 1e60, &k_J, diag));
+    PAL_TRY(pal_entry_read_number(item, c_key[kind], 0, 1e60, &c_Js, diag));
+    PAL_TRY(pal_entry_read_text(item, "weights", &weights, diag));
+    PAL_TRY(is_without_area(item, grid, &without_area, diag));
+    if (grid->k_J[kind] && pal_entry_has(item, k_key[kind]))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: stands beside a grid that gives the same", item->path,
+                                  k_key[kind]);
     if (k_J == 0 || (kind == PAL_SPRING_AREA && without_area)) return PAL_ERR_OK;
-    pal_item *row = &out->row[out->n_row++];
-    pal_item_init(row, item->path, effect_name[kind]);
-    if (without_area) PAL_TRY(pal_item_put_bool(row, "without_area", true, note));
-    if (k_J > 0) PAL_TRY(pal_item_put_number(row, "k_J", k_J, note));
-    if (c_Js > 0) PAL_TRY(pal_item_put_number(row, "c_Js", c_Js, note));
-    if (weights) PAL_TRY(pal_item_put_text(row, "weights", weights, note));
+    pal_config_entry *row = &out->row[out->n_row++];
+    pal_entry_init(row, item->path, effect_name[kind]);
+    if (without_area) PAL_TRY(pal_entry_put_bool(row, "without_area", true, diag));
+    if (k_J > 0) PAL_TRY(pal_entry_put_number(row, "k_J", k_J, diag));
+    if (c_Js > 0) PAL_TRY(pal_entry_put_number(row, "c_Js", c_Js, diag));
+    if (weights) PAL_TRY(pal_entry_put_text(row, "weights", weights, diag));
     return PAL_ERR_OK;
 }
 
 /* weights by volume count a cut voxel by its filled share; constants that are equal for all know nothing of shares */
-static pal_err take_fill(pal_item *item, pal_build *build)
+static pal_err take_fill(pal_config_entry *item, pal_build *build)
 {
     const pal_prepared *mesh = build->def->mesh;
     const pal_spring_grid *grid = &build->def->spring_grid;
     const char *weights = NULL;
     bool fill = true, given = false;
-    PAL_TRY(pal_item_bool(item, "fill", &fill, build->note));
-    PAL_TRY(pal_item_text(item, "weights", &weights, build->note));
+    PAL_TRY(pal_entry_read_bool(item, "fill", &fill, build->diag));
+    PAL_TRY(pal_entry_read_text(item, "weights", &weights, build->diag));
     for (int k = 0; k < 3; k++) {
         double k_J = 0;
-        PAL_TRY(pal_item_number(item, k_key[k], 0, 1e60, &k_J, build->note));
+        PAL_TRY(pal_entry_read_number(item, k_key[k], 0, 1e60, &k_J, build->diag));
         given |= k_J > 0 || grid->k_J[k];
     }
     bool by_volume = weights ? !strcmp(weights, "volume") : !given;
@@ -96,38 +96,38 @@ static pal_err take_fill(pal_item *item, pal_build *build)
     float *share = PAL_NEW(build->arena, float, mesh->tets.n_tet);
     if (!share) return PAL_ERR_MEMORY;
     /* a voxel that is only touched keeps a floor, so that no node is without mass */
-    for (int t = 0; t < mesh->tets.n_tet; t++) share[t] = fmaxf(mesh->hexes.fill[t / 5], least_fill);
+    for (int t = 0; t < mesh->tets.n_tet; t++) share[t] = fmaxf(mesh->hexes.fill[t / 5], min_fill);
     build->body->fill = share;
     return PAL_ERR_OK;
 }
 
-static pal_err list(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     out->n_row = 0;
     for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
-        PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->note));
-    if (build->def->material.damping_1_s > 0) pal_item_init(&out->row[out->n_row++], item->path, "viscous");
-    if (!build->def->solver.name[0]) pal_item_init(&out->row[out->n_row++], item->path, "verlet");
+        PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->diag));
+    if (build->def->material.damping_1_s > 0) pal_entry_init(&out->row[out->n_row++], item->path, "viscous");
+    if (!build->def->solver.name[0]) pal_entry_init(&out->row[out->n_row++], item->path, "verlet");
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
 {
     const pal_prepared *mesh = build->def->mesh;
     pal_body *body = build->body;
-    PAL_TRY(pal_spring_grid_check(build->def, build->note));
+    PAL_TRY(pal_spring_grid_check(build->def, build->diag));
     PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
     /* patches are softer than springs: what hangs by its weight would be drawn out; and explicit solvers look */
     const char *solver = build->def->solver.name;
     bool can = !solver[0] || !strcmp(solver, "verlet") || !strcmp(solver, "rk4");
     for (int i = 0; i < build->def->n_effect; i++) can = can && strcmp(build->def->effect[i].name, "gravity") != 0;
-    bool untangle = can;
-    PAL_TRY(pal_item_bool(item, "untangle", &untangle, build->note));
-    if (untangle && !can)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s.untangle: goes with solver verlet or rk4 and without gravity only", item->path);
-    PAL_TRY(pal_item_done(item, build->note));
+    bool recover = can;
+    PAL_TRY(pal_entry_read_bool(item, "recover", &recover, build->diag));
+    if (recover && !can)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s.untangle: goes with solver verlet or rk4 and without gravity only", item->path);
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
     memcpy(body->x_rest, mesh->tets.x, 3 * sizeof(double) * (size_t)body->n_node);
@@ -135,14 +135,14 @@ static pal_err build(pal_item *item, pal_build *build, pal_recipe *out)
     lump_mass(build->def, &mesh->tets, body->fill, body->mass_kg);
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
-            return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name, i,
-                                body->mass_kg[i]);
+            return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name,
+                                      i, body->mass_kg[i]);
     body->tets = &mesh->tets;
     body->surface = &mesh->surface;
     body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
-    body->h_m = mesh->tets.h_m;
-    if (untangle) PAL_TRY(pal_spring_tangle_make(body->n_node, build->arena, &body->tangle));
-    return pal_slots_make(body->x_rest, body->n_node, body->h_m, build->arena, &body->slots);
+    body->edge_m = mesh->tets.edge_m;
+    if (recover) PAL_TRY(pal_spring_recovery_make(body->n_node, build->arena, &body->recovery));
+    return pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order);
 }
 
 const pal_model pal_model_tet_springs = {.name = "tet_springs", .build = build, .list = list};

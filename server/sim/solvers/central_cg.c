@@ -8,9 +8,10 @@
  * dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and whenever the
  * body was put somewhere else v is that at p and dt- = 0, which is the start p- = p - dt v + dt^2 a / 2.
  *
- * D~ is the rows' drag (hook `drag`) and the body's brake (brake.h) times M~, and where the samples' gamma/mu varies
- * their matrix as well. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would turn the motion round
- * within a sub-step lets it creep. Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-), and end when |r|
+ * D~ is the rows' drag (hook `drag`) and the body's brake (stiffening_damper.h) times M~, and where the samples'
+ * gamma/mu varies their matrix as well. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would turn
+ * the motion round within a sub-step lets it creep. Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-),
+ * and end when |r|
  * <= tolerance |k (f~ - D~ v)| (key, 1e-4): in one iteration with the default preconditioner, a Cholesky factor of M~
  * (num/envelope.h), and in 40 to 100 with key preconditioner "diagonal", which the paper has. Its own 2 to 4 leave 1e-4
  * of the whole right side of eq. 20.
@@ -28,20 +29,20 @@
  */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/num/conjugate.h"
+#include "server/num/conjugate_gradient.h"
 #include "server/num/envelope.h"
 #include "server/num/lanczos.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/solid_mass.h"
+#include "server/sim/subdivision/subdivision_mass.h"
 
 #include <string.h>
 
 typedef struct central {
-    const pal_solid *solid;
+    const pal_subdivision_solid *solid;
     const pal_mass_operator *mass;
     double safety, tolerance;
     double dt_s; /* of the sub-step before; 0: none, v is that at p */
-    pal_conjugate cg;
+    pal_conjugate_gradient cg;
     double a, b;           /* its matrix is a M~ + b D~ on the free points, D~ that of the samples where it varies */
     pal_envelope envelope; /* n 0: too large, or not asked for                                             */
     bool factored;
@@ -57,7 +58,7 @@ typedef struct central {
     double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
     double cell_m;                /* edge of a control cell, about */
     double way_m;                 /* no point has moved farther against the others since it was taken */
-    bool tangled;                 /* elements run on something else since they are turned over      */
+    bool has_inversion;           /* elements run on something else since they are turned over      */
     int n_unseen;                 /* sub-steps since turned over elements were looked for */
     int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
@@ -70,7 +71,7 @@ typedef struct central {
     double *bound;                /* of CONTACT rows                                           [n_node]    */
 } central;
 
-static const double most_way = 0.2, most_move_S = 0.2;
+static const double most_way = 0.2, max_move_S = 0.2;
 /* of wild, and what is left of it after a sub-step without clamps */
 static const double most_wild = 8, calm = 0.98;
 /* of omega^2 while elements are turned over: what throws a corner about is the fastest motion, which near its limit is
@@ -117,28 +118,28 @@ static pal_err allocate(central *row, const pal_body *body, pal_arena *arena)
     return PAL_ERR_OK;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     double safety = 0.9, tolerance = 1e-4;
     const char *preconditioner = "factor";
     const pal_body *body = build->body;
-    PAL_TRY(pal_item_number(item, "safety", 0.01, 0.98, &safety, build->note));
-    PAL_TRY(pal_item_number(item, "tolerance", 1e-14, 0.1, &tolerance, build->note));
-    PAL_TRY(pal_item_text(item, "preconditioner", &preconditioner, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.98, &safety, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-14, 0.1, &tolerance, build->diag));
+    PAL_TRY(pal_entry_read_text(item, "preconditioner", &preconditioner, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     bool factor = !strcmp(preconditioner, "factor");
     if (!factor && strcmp(preconditioner, "diagonal"))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
-                            item->path, preconditioner);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
+                                  item->path, preconditioner);
     if (!body->solid || !body->mass_operator)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
-                            item->path, item->name);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
+                                  item->path, item->name);
     central *row = PAL_NEW(build->arena, central, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->solid = body->solid, row->mass = body->mass_operator;
     row->n_unseen = UNSEEN;
     row->safety = safety, row->tolerance = tolerance, row->wild = 1;
-    row->cell_m = cbrt(pal_solid_volume_m3(body->solid) / build->def->cells->n_cell);
+    row->cell_m = cbrt(pal_subdivision_solid_volume_m3(body->solid) / build->def->cells->n_cell);
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
         pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MOST_ENTRY,
@@ -181,9 +182,9 @@ static void precondition(void *user, const double *r, double *out)
 static bool renew(central *row, const pal_body *body)
 {
     const pal_mass_operator *m = row->mass;
-    if (row->sampled == row->solid->sampled && !memcmp(row->fixed, body->held, (size_t)body->n_dof)) return false;
+    if (row->sampled == row->solid->sampled && !memcmp(row->fixed, body->fixed, (size_t)body->n_dof)) return false;
     row->sampled = row->solid->sampled;
-    memcpy(row->fixed, body->held, (size_t)body->n_dof);
+    memcpy(row->fixed, body->fixed, (size_t)body->n_dof);
     for (int i = 0; i < m->n_point; i++) {
         int32_t k = m->start[i];
         while (m->point[k] != i) k++;
@@ -199,7 +200,7 @@ static void solve(central *row, double *x, double target)
 {
     for (int i = 0; i < row->mass->n_point; i++)
         if (row->fixed[i]) pal_set3(row->cg.r + 3 * (size_t)i, 0, 0, 0);
-    row->report.n_cg += pal_conjugate_run(&row->cg, x, target, 0, MOST);
+    row->report.n_cg += pal_conjugate_gradient_run(&row->cg, x, target, 0, MOST);
 }
 
 /* ---- the limit ---- */
@@ -211,7 +212,7 @@ static bool solve_mass(void *user, const double *b, double *out)
     memcpy(row->cg.r, b, n_byte);
     memset(out, 0, n_byte);
     row->a = 1, row->b = 0;
-    solve(row, out, exact * sqrt(pal_sum_products(row->cg.n, b, b)));
+    solve(row, out, exact * sqrt(pal_dot_product(row->cg.n, b, b)));
     return true;
 }
 
@@ -219,8 +220,8 @@ static bool gather(central *row)
 {
     pal_step *step = row->step;
     const size_t used = step->scratch ? pal_arena_used(step->scratch) : 0;
-    const bool good = !pal_gather(step);
-    if (step->scratch) pal_arena_return(step->scratch, used);
+    const bool good = !pal_assemble_forces(step);
+    if (step->scratch) pal_arena_rewind(step->scratch, used);
     return good;
 }
 
@@ -231,7 +232,7 @@ static bool multiply_stiffness(void *user, const double *v, double *out)
     const int n = row->cg.n;
     double most = 0;
     for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-    const double small = most > 0 ? small_h * row->step->body->h_m / most : 0, per = most > 0 ? 1 / small : 0;
+    const double small = most > 0 ? small_h * row->step->body->edge_m / most : 0, per = most > 0 ? 1 / small : 0;
     for (int i = 0; i < n; i++) row->at[i] = row->x[i] + small * v[i];
     if (!gather(row)) return false;
     for (int i = 0; i < n; i++) out[i] = row->fixed[i / 3] ? 0 : per * (row->g0[i] - row->g[i]);
@@ -242,11 +243,11 @@ static bool multiply_stiffness(void *user, const double *v, double *out)
 static bool multiply_bound(void *user, const double *v, double *out)
 {
     central *row = user;
-    const pal_point_rows *rows = &row->solid->rows;
-    pal_point_rows_place(rows, v, row->f);
+    const pal_interpolation *rows = &row->solid->rows;
+    pal_interpolation_apply(rows, v, row->f);
     for (int i = 0; i < rows->n_row; i++) pal_scale3(row->f + 3 * (size_t)i, row->bound[i], row->f + 3 * (size_t)i);
     memset(out, 0, sizeof *out * (size_t)row->cg.n);
-    pal_point_rows_pull(rows, row->f, out);
+    pal_interpolation_apply_transpose(rows, row->f, out);
     for (int i = 0; i < row->cg.n; i++) out[i] *= !row->fixed[i / 3];
     return true;
 }
@@ -254,7 +255,7 @@ static bool multiply_bound(void *user, const double *v, double *out)
 /* adds any signs at the free points, of length `share` of the vector's own, 1 when there is none */
 static void add_any(const central *row, double share, double *z)
 {
-    const double norm = sqrt(pal_sum_products(row->cg.n, z, z)), each = share * norm / sqrt(row->cg.n);
+    const double norm = sqrt(pal_dot_product(row->cg.n, z, z)), each = share * norm / sqrt(row->cg.n);
     for (int i = 0; i < row->cg.n; i++) {
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
         bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u, bits ^= bits >> 32;
@@ -267,14 +268,14 @@ static double find_rows2(central *row, pal_step *step)
 {
     pal_body *body = step->body;
     const pal_body kept = *body;
-    const bool apart = step->drag_apart;
+    const bool apart = step->drag_separate;
     const int n_cg = row->report.n_cg;
     double most = NAN;
     row->step = step, row->x = body->x;
     memcpy(row->at, body->x, sizeof(double) * (size_t)row->cg.n);
     body->x = row->at, body->v = row->still, body->g = row->g;
     body->d = row->d, body->dv = row->dv, body->f = row->f;
-    step->drag_apart = true;
+    step->drag_separate = true;
     if (gather(row)) {
         memcpy(row->g0, row->g, sizeof(double) * (size_t)row->cg.n);
         if (!row->known) memset(row->lanczos.z, 0, sizeof(double) * (size_t)row->cg.n);
@@ -282,7 +283,7 @@ static double find_rows2(central *row, pal_step *step)
         row->lanczos.multiply = multiply_stiffness;
         most = pal_lanczos_run(&row->lanczos, near, row->known ? 3 : 8, row->known ? AGAIN : FIRST);
     }
-    step->drag_apart = apart;
+    step->drag_separate = apart;
     body->x = kept.x, body->v = kept.v, body->g = kept.g;
     body->d = kept.d, body->dv = kept.dv, body->f = kept.f;
     row->report.n_cg = n_cg;
@@ -327,7 +328,7 @@ static void find_contact(central *row, const pal_step *step)
     row->contact2 = find_bound(row);
     clear_bound(row);
     for (int i = 0; i < step->n_contact + step->n_force; i++) {
-        const pal_row *of = i < step->n_contact ? &step->contact[i] : &step->force[i - step->n_contact];
+        const pal_component *of = i < step->n_contact ? &step->contact[i] : &step->force[i - step->n_contact];
         if (of->effect->damping && !of->effect->drag) of->effect->damping(of->self, step->body, row->bound);
     }
     row->contact_1_s = find_bound(row);
@@ -352,22 +353,22 @@ static void look(central *row, pal_step *step)
 }
 
 /* true: elements were found that run on something else from now on */
-static bool untangle(central *row, pal_step *step)
+static bool recover(central *row, pal_step *step)
 {
     pal_body *body = step->body;
     double *d = body->d;
     unsigned seen = 0;
     if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
     row->n_unseen = 0;
-    pal_point_rows_place(body->embed, body->x, row->d);
+    pal_interpolation_apply(body->interpolation, body->x, row->d);
     body->d = row->d;
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->untangle) seen |= step->force[i].effect->untangle(step->force[i].self, step);
+        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
-    if (seen & PAL_TANGLE_CHANGED) row->dt_s = 0;
-    row->tangled = (seen & PAL_TANGLED) && !(seen & PAL_TANGLE_STILL);
-    return seen & PAL_TANGLE_CHANGED;
+    if (seen & PAL_INVERSION_CHANGED) row->dt_s = 0;
+    row->has_inversion = (seen & PAL_INVERTED) && !(seen & PAL_INVERSION_AT_REST);
+    return seen & PAL_INVERSION_CHANGED;
 }
 
 /* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */
@@ -376,10 +377,10 @@ static double limit(void *self, pal_step *step)
     central *row = self;
     const pal_body *body = step->body;
     if (!finite_state(body)) return NAN;
-    if (renew(row, body) || untangle(row, step)) row->known = false;
+    if (renew(row, body) || recover(row, step)) row->known = false;
     if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
     if (step->sub == 0) find_contact(row, step);
-    const double rows2 = row->tangled ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
+    const double rows2 = row->has_inversion ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
                  c = row->contact_1_s;
     row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->wild;
     return row->limit_s;
@@ -389,7 +390,7 @@ static double limit(void *self, pal_step *step)
 
 static double drag_rate(const pal_step *step)
 {
-    double rate = step->body->brake_1_s;
+    double rate = step->body->stiffening_damping_1_s;
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
     return rate;
@@ -403,11 +404,11 @@ static bool begin_change(central *row, const pal_body *body)
     for (int i = 0; i < body->n_dof; i++) {
         double *was = row->was + 3 * (size_t)i, *change = row->change + 3 * (size_t)i;
         const double *v = body->v + 3 * (size_t)i;
-        if (body->held[i] == 2 && row->dt_s > 0)
+        if (body->fixed[i] == 2 && row->dt_s > 0)
             pal_sub3(change, v, was);
         else
             pal_copy3(was, v);
-        if (body->held[i] == 1) pal_scale3(change, -1, v);
+        if (body->fixed[i] == 1) pal_scale3(change, -1, v);
         any |= change[0] != 0 || change[1] != 0 || change[2] != 0;
     }
     return any;
@@ -429,7 +430,7 @@ static void find_change(central *row, const pal_step *step)
                  over = row->limit_s > 0 ? dt / row->limit_s : 0;
     const double scale = step->heavy && over > 1 ? over * over : 1;
     const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
-    const double most = k * (rate + (varies ? row->mass->damping_most_1_s : 0));
+    const double most = k * (rate + (varies ? row->mass->damping_max_1_s : 0));
     double theta = row->dt_s / (dt + row->dt_s);
     if (most > 0) theta = fmax(theta, 1 - 1 / most);
     const double a = scale + theta * k * rate, b = varies ? theta * k : 0;
@@ -439,7 +440,7 @@ static void find_change(central *row, const pal_step *step)
     row->a = a, row->b = b;
     for (int i = 0; i < row->cg.n; i++)
         if (row->fixed[i / 3]) row->cg.r[i] = 0;
-    const double norm = sqrt(pal_sum_products(row->cg.n, row->cg.r, row->cg.r));
+    const double norm = sqrt(pal_dot_product(row->cg.n, row->cg.r, row->cg.r));
     if (step->sub == 0) row->report.n_cg = 0;
     solve(row, row->change, row->tolerance * norm);
     /* forces that are no numbers give velocities that are none */
@@ -452,24 +453,24 @@ static void shorten(pal_body *body, double *v, double to)
 {
     uint64_t before = pal_clock_ns();
     pal_scale3(v, to, v);
-    body->rescue.n_clamped++;
-    body->rescue.ns += pal_clock_ns() - before;
+    body->safeguards.n_clamped++;
+    body->safeguards.ns += pal_clock_ns() - before;
 }
 
 /* v+ and p+; the longest way of a point against the others, which is no number when a velocity is none */
 static double move(central *row, pal_body *body, double dt)
 {
-    const double most_m = most_move_S * body->size_m;
-    const uint64_t n_clamped = body->rescue.n_clamped;
+    const double max_m = max_move_S * body->length_scale_m;
+    const uint64_t n_clamped = body->safeguards.n_clamped;
     double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
         /* led points have theirs */
-        if (body->held[i] == 1) pal_set3(v, 0, 0, 0);
-        if (!body->held[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
+        if (body->fixed[i] == 1) pal_set3(v, 0, 0, 0);
+        if (!body->fixed[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;
         poison += 0 * way;
-        if (way > most_m) shorten(body, v, most_m / way);
+        if (way > max_m) shorten(body, v, max_m / way);
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);
         pal_copy3(row->was + 3 * (size_t)i, v);
         pal_axpy3(mean, 1.0 / body->n_dof, v);
@@ -479,15 +480,15 @@ static double move(central *row, pal_body *body, double dt)
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
         most2 = fmax(most2, pal_dot3(from, from));
     }
-    row->wild = body->rescue.n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
+    row->wild = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
     return dt * sqrt(most2) + poison;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     central *row = self;
-    step->drag_apart = true;
-    PAL_TRY(pal_gather(step));
+    step->drag_separate = true;
+    PAL_TRY(pal_assemble_forces(step));
     renew(row, step->body);
     find_change(row, step);
     row->way_m += move(row, step->body, step->dt_s);
@@ -503,14 +504,14 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     row->dt_s = 0;
     row->wild = 1;
-    row->tangled = false;
+    row->has_inversion = false;
     row->known = false;
     row->n_unseen = UNSEEN;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    (void)body, (void)to, (void)note;
+    (void)body, (void)to, (void)diag;
     ((central *)self)->known = false;
     return PAL_ERR_OK;
 }

@@ -2,15 +2,15 @@
  * linearisation per step (newton 1) or as many as asked. First order, damps; contact and drag are implicit too.
  *
  * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
- * refresh (true), warp (true), watch (true); see implicit.h. */
+ * refresh (true), warp (true), watch (true); see implicit_solver.h. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/implicit/implicit.h"
+#include "server/sim/implicit/implicit_solver.h"
 
 #include <string.h>
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_wish wish;
+    pal_implicit_options wish;
     pal_implicit *core = NULL;
     PAL_TRY(pal_implicit_read(item, build, &wish));
     pal_err err = pal_implicit_make(&wish, build, 1, &core);
@@ -29,7 +29,7 @@ static pal_err run(void *self, pal_step *step)
     do {
         memcpy(body->x, core->x0, n_byte);
         PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
-    } while (pal_implicit_settle(core, step));
+    } while (pal_implicit_settle(core, step, true));
     pal_implicit_end(core, step);
     return PAL_ERR_OK;
 }
@@ -43,5 +43,5 @@ const pal_effect pal_effect_implicit_euler = {.name = "implicit_euler",
                                               .reset = pal_implicit_reset,
                                               .implicit = true,
                                               .report = pal_implicit_report,
-                                              .keeps_rows = true,
+                                              .keeps_components = true,
                                               .destroy = pal_implicit_destroy};

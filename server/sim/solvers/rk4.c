@@ -20,8 +20,8 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/surface/pack.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/active_nodes.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
@@ -53,8 +53,8 @@ typedef struct rk4 {
     /* of the body when they were taken */
     uint64_t revision;
     double ramp[2];
-    bool known;   /* limit_s holds */
-    bool tangled; /* rows are to be asked again in the coming step */
+    bool known;         /* limit_s holds */
+    bool has_inversion; /* rows are to be asked again in the coming step */
 
     /* Lanczos' bound on omega^2 of the FORCE rows, 1/s^2, at which common factors it was taken, and sub-steps since */
     double sharp2, sharp_ramp[2];
@@ -65,22 +65,22 @@ typedef struct rk4 {
     double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
 } rk4;
 
-static const double most_way_h = 0.2, most_move_S = 0.2, radius = 2.7;
+static const double max_move_h = 0.2, max_move_S = 0.2, radius = 2.7;
 /* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
 static const double most_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
 enum { PAUSE = 12, LANCZOS = 10 };
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     double safety = 0.9;
-    PAL_TRY(pal_item_number(item, "safety", 0.01, 0.96, &safety, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
-    if (build->body->embed)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
-                            "\"central_cg\" or \"implicit_euler\"",
-                            item->path);
+    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.96, &safety, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    if (build->body->interpolation)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
+                                  "\"central_cg\" or \"implicit_euler\"",
+                                  item->path);
     const pal_body *body = build->body;
     rk4 *row = PAL_NEW(build->arena, rk4, 1);
     if (!row) return PAL_ERR_MEMORY;
@@ -91,8 +91,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
     row->inverse_kg = PAL_NEW(build->arena, double, body->n_dof);
     row->led = PAL_NEW(build->arena, uint8_t, body->n_dof);
     if (!row->stiff || !row->damp || !row->memory || !row->load || !row->inverse_kg || !row->led) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_pack_make(build->body, build->lasting ? build->lasting : build->arena));
-    if (body->shell) {
+    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
+    if (body->adaptive) {
         row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->force = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
@@ -112,8 +112,8 @@ static pal_err make(pal_item *item, pal_build *build, void **self)
 static void take_body(rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    pal_pack_take(body);
-    row->pulls = pal_pack_complete(step);
+    pal_active_nodes_load(body);
+    row->pulls = pal_active_nodes_complete(step);
     for (int k = 0; k < body->n_active && row->pulls; k++)
         row->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
 }
@@ -123,8 +123,8 @@ static void give_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(body->x + i, pal_first(body->pack->xv[k]));
-        pal_quad_store(body->v + i, pal_second(body->pack->xv[k]));
+        pal_quad_store(body->x + i, pal_v8_low(body->pack->xv[k]));
+        pal_quad_store(body->v + i, pal_v8_high(body->pack->xv[k]));
     }
 }
 
@@ -134,10 +134,10 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
     pal_body *body = step->body;
     if (row->pulls) {
         memcpy(body->pack->f, row->load, sizeof *row->load * (size_t)body->n_active);
-        return pal_pack_gather(step);
+        return pal_active_nodes_assemble(step);
     }
     give_motion(body);
-    PAL_TRY(pal_gather(step));
+    PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
         body->pack->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
     return PAL_ERR_OK;
@@ -145,7 +145,7 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 
 /* ---- the limit ---- */
 
-static void add_bounds(rk4 *row, const pal_row *rows, int n, const pal_body *body)
+static void add_bounds(rk4 *row, const pal_component *rows, int n, const pal_body *body)
 {
     for (int i = 0; i < n; i++) {
         const pal_effect *effect = rows[i].effect;
@@ -155,7 +155,7 @@ static void add_bounds(rk4 *row, const pal_row *rows, int n, const pal_body *bod
 }
 
 /* contact comes and goes between steps without any node moving */
-static bool has_bounds(const pal_row *rows, int n)
+static bool has_bounds(const pal_component *rows, int n)
 {
     for (int i = 0; i < n; i++)
         if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
@@ -166,11 +166,11 @@ static bool has_bounds(const pal_row *rows, int n)
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const pal_shell *shell = body->shell;
+    const pal_adaptive_surface *adaptive = body->adaptive;
     /* not finite is not known */
-    if (!row->known || row->revision != body->revision || !(row->way_m <= most_way_h * body->h_m)) return false;
-    if (shell && (row->ramp[0] != shell->spring_ramp || row->ramp[1] != shell->shape_ramp)) return false;
-    if (shell && !row->sharp_known && row->n_since >= PAUSE) return false;
+    if (!row->known || row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m)) return false;
+    if (adaptive && (row->ramp[0] != adaptive->spring_ramp || row->ramp[1] != adaptive->shape_ramp)) return false;
+    if (adaptive && !row->sharp_known && row->n_since >= PAUSE) return false;
     return step->sub != 0 || !has_bounds(step->contact, step->n_contact);
 }
 
@@ -181,7 +181,7 @@ static double most_stiff(const rk4 *row, const pal_body *body)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double omega2 = row->stiff[i] / body->mass_kg[i];
-        if (!body->held[i] && omega2 > most) most = omega2;
+        if (!body->fixed[i] && omega2 > most) most = omega2;
     }
     return most;
 }
@@ -210,17 +210,17 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
         double weight = row->stiff[i] / body->mass_kg[i];
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
         pal_quad q = {0};
-        row->inverse_kg[k] = body->held[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
-        for (int c = 0; c < 3 && !body->held[i]; c++) {
+        row->inverse_kg[k] = body->fixed[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
+        for (int c = 0; c < 3 && !body->fixed[i]; c++) {
             bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u;
             q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
         norm2 += pal_quad_dot(q, q);
-        row->memory[k].from = pal_join(pal_first(body->pack->xv[k]), q);
-        row->memory[k].sum = pal_join(body->pack->f[k], (pal_quad){0});
+        row->memory[k].from = pal_v8_join(pal_v8_low(body->pack->xv[k]), q);
+        row->memory[k].sum = pal_v8_join(body->pack->f[k], (pal_quad){0});
     }
     const pal_quad one = {1, 1, 1, 1};
-    const pal_v8 scale = pal_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
+    const pal_v8 scale = pal_v8_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
     for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
 }
 
@@ -228,23 +228,23 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     double most2 = 0;
     for (int k = 0; k < body->n_active; k++) {
-        pal_quad q = row->inverse_kg[k] * pal_second(row->memory[k].from);
+        pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
         double q2 = pal_quad_dot(q, q);
         most2 = q2 > most2 ? q2 : most2;
     }
-    double small = most2 > 0 ? 1e-6 * body->h_m / sqrt(most2) : 0, per = most2 > 0 ? 1 / small : 0;
+    double small = most2 > 0 ? 1e-6 * body->edge_m / sqrt(most2) : 0, per = most2 > 0 ? 1 / small : 0;
     for (int k = 0; k < body->n_active; k++) {
-        pal_quad move = small * row->inverse_kg[k] * pal_second(row->memory[k].from);
-        pack->xv[k] = pal_join(pal_first(row->memory[k].from) + move, (pal_quad){0});
+        pal_quad move = small * row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
+        pack->xv[k] = pal_v8_join(pal_v8_low(row->memory[k].from) + move, (pal_quad){0});
     }
     PAL_TRY(find_forces(row, step));
     *along = 0;
     for (int k = 0; k < body->n_active; k++) {
-        pack->f[k] = per * row->inverse_kg[k] * (pal_first(row->memory[k].sum) - pack->f[k]);
-        *along += pal_quad_dot(pack->f[k], pal_second(row->memory[k].from));
+        pack->f[k] = per * row->inverse_kg[k] * (pal_v8_low(row->memory[k].sum) - pack->f[k]);
+        *along += pal_quad_dot(pack->f[k], pal_v8_high(row->memory[k].from));
     }
     return PAL_ERR_OK;
 }
@@ -255,14 +255,14 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
     double norm2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
-        pal_quad q = pal_second(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_second(m->sum));
+        pal_quad q = pal_v8_high(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
         norm2 += pal_quad_dot(next, next);
-        m->sum = pal_join(pal_first(m->sum), q);
-        m->from = pal_join(pal_first(m->from), next);
+        m->sum = pal_v8_join(pal_v8_low(m->sum), q);
+        m->from = pal_v8_join(pal_v8_low(m->from), next);
     }
     const pal_quad one = {1, 1, 1, 1};
     const double norm = sqrt(norm2);
-    const pal_v8 scale = pal_join(one, norm > 0 ? one / norm : 0 * one);
+    const pal_v8 scale = pal_v8_join(one, norm > 0 ? one / norm : 0 * one);
     for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
     return norm;
 }
@@ -312,7 +312,7 @@ static void find_sharp(rk4 *row, pal_step *step, double most)
 {
     pal_body *body = step->body;
     const pal_body kept = *body;
-    const bool apart = step->drag_apart;
+    const bool apart = step->drag_separate;
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
         pal_copy3(row->at + i, body->x + i);
@@ -320,14 +320,14 @@ static void find_sharp(rk4 *row, pal_step *step, double most)
     body->x = body->d = row->at;
     body->v = body->dv = row->still;
     body->f = body->g = row->force;
-    step->drag_apart = true;
+    step->drag_separate = true;
     double sharp2 = NAN;
     row->sharp_known = !run_lanczos(row, step, most, &sharp2) && sharp2 == sharp2;
     row->sharp2 = sharp2;
     row->over = more * fmax(1, sqrt(most / row->sharp2));
-    step->drag_apart = apart;
+    step->drag_separate = apart;
     body->x = kept.x, body->d = kept.d, body->v = kept.v, body->dv = kept.dv, body->f = kept.f, body->g = kept.g;
-    row->sharp_ramp[0] = body->shell->spring_ramp, row->sharp_ramp[1] = body->shell->shape_ramp;
+    row->sharp_ramp[0] = body->adaptive->spring_ramp, row->sharp_ramp[1] = body->adaptive->shape_ramp;
     row->n_since = 0;
 }
 
@@ -343,10 +343,10 @@ static bool would_help(const rk4 *row, double most)
 static double bound_force(rk4 *row, pal_step *step, double most)
 {
     const pal_body *body = step->body;
-    const pal_shell *shell = body->shell;
+    const pal_adaptive_surface *adaptive = body->adaptive;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
-    if (!shell || body->x == body->x_rest) return most;
-    bool moved = row->revision != body->revision || !(row->way_m <= most_way_h * body->h_m);
+    if (!adaptive || body->x == body->x_rest) return most;
+    bool moved = row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
         if (would_help(row, most))
@@ -355,25 +355,25 @@ static double bound_force(rk4 *row, pal_step *step, double most)
             row->n_since = 0;
     }
     if (!row->sharp_known) return most;
-    double grown = fmax(1, fmax(shell->spring_ramp / row->sharp_ramp[0], shell->shape_ramp / row->sharp_ramp[1]));
+    double grown = fmax(1, fmax(adaptive->spring_ramp / row->sharp_ramp[0], adaptive->shape_ramp / row->sharp_ramp[1]));
     return fmin(most, grown * row->sharp2);
 }
 
 /* true: something runs on what untangles it */
-static bool untangle(pal_step *step)
+static bool recover(pal_step *step)
 {
     unsigned seen = 0;
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->untangle) seen |= step->force[i].effect->untangle(step->force[i].self, step);
-    return seen & PAL_TANGLED;
+        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
+    return seen & PAL_INVERTED;
 }
 
 static double limit(void *self, pal_step *step)
 {
     rk4 *row = self;
     const pal_body *body = step->body;
-    if (!(step->sub == 0 && row->tangled) && still_known(row, step)) return row->limit_s;
-    row->tangled = untangle(step);
+    if (!(step->sub == 0 && row->has_inversion) && still_known(row, step)) return row->limit_s;
+    row->has_inversion = recover(step);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         row->stiff[i] = row->damp[i] = 0;
@@ -388,13 +388,13 @@ static double limit(void *self, pal_step *step)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double c = row->damp[i] / body->mass_kg[i];
-        if (!body->held[i] && c > most) most = c;
+        if (!body->fixed[i] && c > most) most = c;
     }
     most = fmax(sqrt(most2), most);
     row->limit_s *= most > 0 ? row->reach / most : INFINITY;
     if (!row->sharp_known || row->n_since == 0) row->way_m = 0;
     row->revision = body->revision;
-    if (body->shell) row->ramp[0] = body->shell->spring_ramp, row->ramp[1] = body->shell->shape_ramp;
+    if (body->adaptive) row->ramp[0] = body->adaptive->spring_ramp, row->ramp[1] = body->adaptive->shape_ramp;
     row->known = true;
     return row->limit_s;
 }
@@ -433,7 +433,7 @@ static void find_phi(double z, double phi[4])
 static pal_v8 both(double place, double velocity)
 {
     const pal_quad one = {1, 1, 1, 1};
-    return pal_join(place * one, velocity * one);
+    return pal_v8_join(place * one, velocity * one);
 }
 
 static rates find_rates(double dt_s, double rate)
@@ -465,22 +465,22 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
         int i = pal_body_point(body, k);
         double mass = body->mass_kg[i];
         if (heavy) mass = fmax(mass, fmax(t * t * row->stiff[i], t * row->damp[i]));
-        row->inverse_kg[k] = body->held[i] ? 0 : 1 / mass;
-        row->led[k] = body->held[i] == 2;
-        if (body->held[i] == 1) body->pack->xv[k] = pal_join(pal_first(body->pack->xv[k]), (pal_quad){0});
+        row->inverse_kg[k] = body->fixed[i] ? 0 : 1 / mass;
+        row->led[k] = body->fixed[i] == 2;
+        if (body->fixed[i] == 1) body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
     }
 }
 
 /* velocity and acceleration of a packed node */
-PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_pack *pack, int k)
+PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
 {
-    return pal_join(pal_second(pack->xv[k]), row->inverse_kg[k] * pack->f[k]);
+    return pal_v8_join(pal_v8_high(pack->xv[k]), row->inverse_kg[k] * pack->f[k]);
 }
 
 /* the state at the start, and the second stage's */
 static void stage_first(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
@@ -494,13 +494,13 @@ static void stage_first(rk4 *row, const pal_body *body, const rates *r)
  * the drag leaves of it, less what the first acceleration gave that */
 static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
         const pal_v8 kept = half * m->from, next = half * y - (y - kept);
         m->sum += r->weight[1] * rate;
-        m->from = pal_join(pal_first(m->from), pal_second(next));
+        m->from = pal_v8_join(pal_v8_low(m->from), pal_v8_high(next));
         pack->xv[k] = kept + r->grow * rate;
     }
 }
@@ -508,7 +508,7 @@ static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 /* from the third stage's forces the fourth stage's state */
 static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 rate = rate_of(row, pack, k);
@@ -520,14 +520,14 @@ static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 /* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
 static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_pack *pack = body->pack;
+    pal_active_nodes *pack = body->pack;
     const double dt2 = r->dt * r->dt;
     double most2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
         const memory *m = &row->memory[k];
         const pal_v8 sum = m->sum + r->weight[2] * rate_of(row, pack, k), square = sum * sum;
         double way2 = square[0] + square[1] + square[2], v2 = dt2 * (square[4] + square[5] + square[6]);
-        pack->xv[k] = pal_join(pal_first(m->from) + pal_first(sum), pal_second(sum));
+        pack->xv[k] = pal_v8_join(pal_v8_low(m->from) + pal_v8_low(sum), pal_v8_high(sum));
         poison += 0 * way2 + 0 * v2;
         way2 = v2 > way2 ? v2 : way2;
         most2 = way2 > most2 ? way2 : most2;
@@ -535,17 +535,17 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
     return most2 + poison;
 }
 
-/* shortens moves, and velocities that would make such, longer than most_m */
-static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double most_m)
+/* shortens moves, and velocities that would make such, longer than max_m */
+static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
         pal_v8 *to = &body->pack->xv[k];
-        pal_quad from = pal_first(row->memory[k].from), move = pal_first(*to) - from, v = pal_second(*to);
+        pal_quad from = pal_v8_low(row->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
         double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
-        if (way > most_m) move *= most_m / way;
-        if (speed > most_m) v *= most_m / speed;
-        if (way > most_m || speed > most_m) *to = pal_join(from + move, v);
-        body->rescue.n_clamped += way > most_m || speed > most_m;
+        if (way > max_m) move *= max_m / way;
+        if (speed > max_m) v *= max_m / speed;
+        if (way > max_m || speed > max_m) *to = pal_v8_join(from + move, v);
+        body->safeguards.n_clamped += way > max_m || speed > max_m;
     }
 }
 
@@ -561,7 +561,7 @@ static pal_err run(void *self, pal_step *step)
     rk4 *row = self;
     pal_body *body = step->body;
     const rates r = find_rates(step->dt_s, drag_rate(step));
-    step->drag_apart = true;
+    step->drag_separate = true;
     take_body(row, step);
     take_masses(row, body, &r, step->heavy);
     PAL_TRY(find_forces(row, step));
@@ -571,11 +571,11 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), most = most_move_S * body->size_m;
+    double way = sqrt(stage_last(row, body, &r)), most = max_move_S * body->length_scale_m;
     if (way > most) {
         uint64_t before = pal_clock_ns();
         clamp_moves(row, body, step->dt_s, most);
-        body->rescue.ns += pal_clock_ns() - before;
+        body->safeguards.ns += pal_clock_ns() - before;
     }
     give_motion(body);
     give_forces(row, body);
@@ -595,9 +595,9 @@ static void reset(void *self, const pal_body *body)
     row->over = most_over;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    (void)to, (void)note;
+    (void)to, (void)diag;
     reset(self, body);
     return PAL_ERR_OK;
 }

@@ -12,15 +12,15 @@
  *
  * Keys: as implicit_euler. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/implicit/implicit.h"
+#include "server/sim/implicit/implicit_solver.h"
 
 #include <string.h>
 
 static const double gamma_share = 0.29289321881345248;
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_wish wish;
+    pal_implicit_options wish;
     pal_implicit *core = NULL;
     PAL_TRY(pal_implicit_read(item, build, &wish));
     pal_err err = pal_implicit_make(&wish, build, gamma_share, &core);
@@ -44,18 +44,20 @@ static pal_err run(void *self, pal_step *step)
     pal_body *body = step->body;
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
-    do {
+    for (bool again = true; again;) {
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
-        if (core->n_risen > 0) { /* one stage of the whole step: see above */
+        if (core->n_energy_rise > 0) { /* one stage of the whole step: see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
-            continue;
+        } else {
+            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
+            if (pal_implicit_settle(core, step, false)) continue;
+            open_second(core, body, step->dt_s);
+            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
         }
-        PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
-        open_second(core, body, step->dt_s);
-        PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
-    } while (pal_implicit_settle(core, step));
+        again = pal_implicit_settle(core, step, true);
+    }
     pal_implicit_end(core, step);
     return PAL_ERR_OK;
 }
@@ -69,5 +71,5 @@ const pal_effect pal_effect_sdirk2 = {.name = "sdirk2",
                                       .reset = pal_implicit_reset,
                                       .implicit = true,
                                       .report = pal_implicit_report,
-                                      .keeps_rows = true,
+                                      .keeps_components = true,
                                       .destroy = pal_implicit_destroy};

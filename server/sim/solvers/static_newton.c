@@ -8,8 +8,8 @@
  *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
  *           made of the present K before the next; where that happens again at once, before every one until an
  *           iteration leaves a tenth of the residual or less,
- *   incomplete: by conjugate gradients with an incomplete factor of K (num/incomplete.h), of K as it is in every
- *           iteration: a tenth of the memory or less, for bodies of many nodes; many more iterations the more nearly
+ *   incomplete: by conjugate gradients with an incomplete factor of K (num/incomplete_cholesky.h), of K as it is in
+ * every iteration: a tenth of the memory or less, for bodies of many nodes; many more iterations the more nearly
  *           incompressible and the thinner the body is.
  * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
  * of forces along each direction, system.h) by conjugate gradients with the same factor (truncated Newton; Nash 2000):
@@ -25,23 +25,23 @@
  * `load_steps` equal parts, each solved before the next.
  *
  * A body that its supports do not hold is refused at load (free "refuse"), or, being one part without any held node,
- * solved by inertia relief (free "inertia_relief"): relief.h balances the loads, K + eps M is what is solved, rigid
- * motion is taken out of every d.
+ * solved by inertia relief (free "inertia_relief"): inertia_relief.h balances the loads, K + eps M is what is solved,
+ * rigid motion is taken out of every d.
  *
  * A body whose nodes are carried by control points (body.h, embed) is solved for the points by pcg, its factor being of
- * the matrix at rest as embedded.h finds it; `direct`, `incomplete` and inertia relief are refused.
+ * the matrix at rest as interpolated_system.h finds it; `direct`, `incomplete` and inertia relief are refused.
  *
  * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3: residual
  * of conjugate gradients over that of the iteration, for laws that are not linear), iterations (500, of one solve).
  * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/num/conjugate.h"
-#include "server/num/incomplete.h"
+#include "server/num/conjugate_gradient.h"
+#include "server/num/incomplete_cholesky.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/implicit/compliance.h"
-#include "server/sim/implicit/relief.h"
-#include "server/sim/subdivision/solid.h"
+#include "server/sim/implicit/inertia_relief.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <limits.h>
 #include <string.h>
@@ -54,34 +54,34 @@ typedef struct static_newton {
     linear_kind linear;
     bool relieved, constant; /* inertia relief; K never changes (linear law) */
     pal_system system;
-    pal_blocks blocks;
-    pal_turns turns;
+    pal_block_matrix blocks;
+    pal_node_rotations turns;
     pal_warp warp;
-    pal_incomplete incomplete; /* in place of the warp's factor */
-    pal_answer answer;
-    pal_conjugate cg;
-    pal_relief relief;
-    double *x0, *outer;     /* at the step's begin; loads that do not come from within [n_dof][3] */
-    double *force, *move;   /* residual and d of the iteration                       [n_dof][3] */
-    double *now, *low;      /* work space of the true stiffness [n_dof][3] */
-    double *inertia;        /* what balances the loads; NULL: no relief              [n_dof][3] */
-    double *node_moved;     /* the way of nodes carried by points; NULL: none        [n_node][3] */
-    uint64_t sampled;       /* of body->solid, at the factor                 */
-    double shift_1_s2;      /* eps                                           */
-    bool has_factor, stale; /* a factor is there; it is not worth its while  */
-    bool eager;             /* nor was it in the iteration after its own: one is made in every iteration */
-    int age;                /* solves with the factor */
-    bool exact;             /* the tangent is too slow here: the true stiffness */
-    int calm;               /* iterations left without it */
-    int part;               /* of the load, of load_steps                    */
-    double scale_N;         /* of the tolerance                              */
+    pal_incomplete_cholesky incomplete; /* in place of the warp's factor */
+    pal_compliance_solver answer;
+    pal_conjugate_gradient cg;
+    pal_inertia_relief relief;
+    double *x0, *external_force; /* at the step's begin; loads that do not come from within [n_dof][3] */
+    double *force, *move;        /* residual and d of the iteration                       [n_dof][3] */
+    double *now, *low;           /* work space of the true stiffness [n_dof][3] */
+    double *inertia;             /* what balances the loads; NULL: no relief              [n_dof][3] */
+    double *node_displacement_m; /* the way of nodes carried by points; NULL: none        [n_node][3] */
+    uint64_t sampled;            /* of body->solid, at the factor                 */
+    double shift_1_s2;           /* eps                                           */
+    bool has_factor, stale;      /* a factor is there; it is not worth its while  */
+    bool eager;                  /* nor was it in the iteration after its own: one is made in every iteration */
+    int age;                     /* solves with the factor */
+    bool exact;                  /* the tangent is too slow here: the true stiffness */
+    int calm;                    /* iterations left without it */
+    int part;                    /* of the load, of load_steps                    */
+    double scale_N;              /* of the tolerance                              */
     pal_solve_report report;
 } static_newton;
 
 static const double relief_share = 1e-8, flops_per_nonzero = 20;
 /* an iteration that leaves more than this of the residual was a slow one */
 static const double slow = 0.1;
-static const double most_move_S = 0.2;
+static const double max_move_S = 0.2;
 /* what conjugate gradients on the true stiffness may leave of the residual where they are cut short */
 static const double enough = 0.1;
 /* energies that differ by less of their size are level (Hager & Zhang 2005), ways of less of a voxel's edge short */
@@ -96,41 +96,41 @@ static size_t bytes3(const static_newton *row)
 
 /* ---- load ---- */
 
-static pal_err read_choice(pal_item *item, const pal_build *build, const char *key, const char *const *names, int n,
-                           int *out)
+static pal_err read_choice(pal_config_entry *item, const pal_build *build, const char *key, const char *const *names,
+                           int n, int *out)
 {
     const char *text = names[*out];
-    PAL_TRY(pal_item_text(item, key, &text, build->note));
+    PAL_TRY(pal_entry_read_text(item, key, &text, build->diag));
     for (int i = 0; i < n; i++)
         if (!strcmp(text, names[i])) {
             *out = i;
             return PAL_ERR_OK;
         }
-    return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s%s%s", item->path, key, text,
-                        names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "", n > 3 ? ", " : "",
-                        n > 3 ? names[3] : "");
+    return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s%s%s", item->path, key,
+                              text, names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "", n > 3 ? ", " : "",
+                              n > 3 ? names[3] : "");
 }
 
-static pal_err read_keys(pal_item *item, const pal_build *build, static_newton *row)
+static pal_err read_keys(pal_config_entry *item, const pal_build *build, static_newton *row)
 {
     static const char *const linear[] = {"auto", "direct", "pcg", "incomplete"}, *const rigid[] = {"refuse",
                                                                                                    "inertia_relief"};
     int kind = 0, relieved = 0;
     row->tolerance = 1e-8, row->cg_tolerance = 1e-3;
     row->newton = 50, row->load_steps = 1, row->iterations = 500;
-    PAL_TRY(pal_item_number(item, "tolerance", 1e-15, 0.5, &row->tolerance, build->note));
-    PAL_TRY(pal_item_number(item, "cg_tolerance", 1e-14, 0.5, &row->cg_tolerance, build->note));
-    PAL_TRY(pal_item_count(item, "newton", 1, 100000, &row->newton, build->note));
-    PAL_TRY(pal_item_count(item, "load_steps", 1, 10000, &row->load_steps, build->note));
-    PAL_TRY(pal_item_count(item, "iterations", 1, 100000, &row->iterations, build->note));
+    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-15, 0.5, &row->tolerance, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "cg_tolerance", 1e-14, 0.5, &row->cg_tolerance, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "newton", 1, 100000, &row->newton, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "load_steps", 1, 10000, &row->load_steps, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &row->iterations, build->diag));
     PAL_TRY(read_choice(item, build, "linear", linear, 4, &kind));
     PAL_TRY(read_choice(item, build, "free", rigid, 2, &relieved));
-    PAL_TRY(pal_item_done(item, build->note));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
     row->linear = (linear_kind)kind;
     row->relieved = relieved;
     const char *law = "";
-    pal_item model = build->def->model;
-    if (pal_item_has(&model, "law")) PAL_TRY(pal_item_text(&model, "law", &law, build->note));
+    pal_config_entry model = build->def->model;
+    if (pal_entry_has(&model, "law")) PAL_TRY(pal_entry_read_text(&model, "law", &law, build->diag));
     row->constant = !strcmp(law, "linear");
     return PAL_ERR_OK;
 }
@@ -145,17 +145,17 @@ static void multiply_true(void *user, const double *p, double *out)
 {
     static_newton *row = user;
     const pal_body *body = row->system.body;
-    pal_system_curve(&row->system, row->now, row->low, p, out);
-    if (row->system.has_contact) pal_system_contact(&row->system, 1, 0, p, out);
+    pal_system_true_stiffness(&row->system, row->now, row->low, p, out);
+    if (row->system.has_contact) pal_system_multiply_contact(&row->system, 1, 0, p, out);
     for (int i = 0; i < row->cg.n; i++)
-        out[i] = body->held[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
+        out[i] = body->fixed[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
 }
 
 static void precondition(void *user, const double *r, double *z)
 {
     static_newton *row = user;
     if (row->linear == LINEAR_INCOMPLETE)
-        pal_incomplete_solve(&row->incomplete, r, z);
+        pal_incomplete_cholesky_solve(&row->incomplete, r, z);
     else
         pal_warp_solve(&row->warp, r, z);
 }
@@ -164,13 +164,14 @@ static pal_err make_arrays(static_newton *row, pal_arena *arena)
 {
     const pal_body *body = row->system.body;
     size_t n3 = 3 * (size_t)body->n_dof;
-    double **const array[] = {&row->x0,  &row->outer, &row->force, &row->move, &row->now,
-                              &row->low, &row->cg.r,  &row->cg.z,  &row->cg.p, &row->cg.q};
+    double **const array[] = {&row->x0,  &row->external_force, &row->force, &row->move, &row->now,
+                              &row->low, &row->cg.r,           &row->cg.z,  &row->cg.p, &row->cg.q};
     for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
         *array[i] = PAL_NEW(arena, double, n3);
         if (!*array[i]) return PAL_ERR_MEMORY;
     }
-    if (body->embed && !(row->node_moved = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
+    if (body->interpolation && !(row->node_displacement_m = PAL_NEW(arena, double, 3 * (size_t)body->n_node)))
+        return PAL_ERR_MEMORY;
     if (row->relieved && !(row->inertia = PAL_NEW(arena, double, n3))) return PAL_ERR_MEMORY;
     row->cg.n = (int)n3;
     row->cg.multiply = multiply;
@@ -193,7 +194,7 @@ static void probe(static_newton *row)
     const pal_body *body = row->system.body;
     double before = pal_clock_s();
     row->sampled = body->solid ? body->solid->sampled : 0;
-    pal_embedded_renew(row->system.embedded);
+    pal_interpolated_system_invalidate(row->system.interpolated_system);
     (void)pal_system_probe(&row->system, INT_MAX);
     pal_system_linearise(&row->system);
     row->report.assemble_s += pal_clock_s() - before;
@@ -201,11 +202,11 @@ static void probe(static_newton *row)
 
 static pal_err factor(static_newton *row)
 {
-    if (row->system.embedded) probe(row);
+    if (row->system.interpolated_system) probe(row);
     assemble(row);
-    PAL_TRY(row->linear == LINEAR_INCOMPLETE ? pal_incomplete_factor(&row->incomplete, &row->blocks)
+    PAL_TRY(row->linear == LINEAR_INCOMPLETE ? pal_incomplete_cholesky_factor(&row->incomplete, &row->blocks)
                                              : pal_warp_factor(&row->warp, &row->blocks));
-    if (row->system.embedded) pal_warp_rest(&row->warp);
+    if (row->system.interpolated_system) pal_warp_set_rest(&row->warp);
     row->has_factor = true;
     row->stale = false;
     row->age = 0;
@@ -230,27 +231,27 @@ static void choose_shift(static_newton *row)
 static pal_err check_supports(static_newton *row, const pal_build *build)
 {
     const pal_body *body = build->body;
-    pal_supports s;
-    PAL_TRY(pal_system_supports(&row->system, &s));
-    if (s.n_loose == 0) {
+    pal_support_report s;
+    PAL_TRY(pal_system_find_supports(&row->system, &s));
+    if (s.n_unsupported == 0) {
         row->relieved = false;
         return PAL_ERR_OK;
     }
-    const double *x = body->x_rest + 3 * s.loose_node;
+    const double *x = body->x_rest + 3 * s.unsupported_node;
     if (!row->relieved)
-        return pal_note_set(
-            build->note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            build->diag, PAL_ERR_REFUSED,
             "body \"%s\": %d of its %d parts (the one at (%g, %g, %g) m) has fewer than three held nodes "
             "off a line, so it has no state of rest; give supports, or free \"inertia_relief\" to "
             "static_newton",
-            body->name, s.n_loose, s.n_part, x[0], x[1], x[2]);
-    if (body->embed)
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "body \"%s\": inertia_relief is for bodies of nodes, this one has control points",
-                            body->name);
+            body->name, s.n_unsupported, s.n_part, x[0], x[1], x[2]);
+    if (body->interpolation)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "body \"%s\": inertia_relief is for bodies of nodes, this one has control points",
+                                  body->name);
     if (s.n_part > 1 || row->system.n_free < body->n_node)
-        return pal_note_set(
-            build->note, PAL_ERR_REFUSED,
+        return pal_diagnostic_set(
+            build->diag, PAL_ERR_REFUSED,
             "body \"%s\": inertia_relief is for one part without held nodes, this body has %d parts and "
             "%d held nodes",
             body->name, s.n_part, body->n_node - row->system.n_free);
@@ -260,29 +261,29 @@ static pal_err check_supports(static_newton *row, const pal_build *build)
 static pal_err make_factors(static_newton *row, pal_build *build)
 {
     pal_body *body = build->body;
-    if (body->embed && (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE))
-        return pal_note_set(build->note, PAL_ERR_REFUSED,
-                            "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
-                            "control points; take \"pcg\"",
-                            body->name, row->linear == LINEAR_DIRECT ? "direct" : "incomplete");
-    if (body->embed) row->linear = LINEAR_PCG;
+    if (body->interpolation && (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE))
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
+                                  "control points; take \"pcg\"",
+                                  body->name, row->linear == LINEAR_DIRECT ? "direct" : "incomplete");
+    if (body->interpolation) row->linear = LINEAR_PCG;
     PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
-    PAL_TRY(pal_turns_make(&row->system, build->arena, &row->turns));
+    PAL_TRY(pal_node_rotations_make(&row->system, build->arena, &row->turns));
     if (row->linear == LINEAR_INCOMPLETE)
-        PAL_TRY(pal_incomplete_make(&row->blocks, body->held, build->arena, &row->incomplete));
+        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->fixed, build->arena, &row->incomplete));
     else
         PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
     pal_system_linearise(&row->system);
     if (row->relieved) choose_shift(row);
     pal_err err = row->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(row);
-    if (!err) err = pal_answer_make(&row->system, &row->turns, &row->blocks, build->arena, &row->answer);
+    if (!err) err = pal_compliance_solver_make(&row->system, &row->turns, &row->blocks, build->arena, &row->answer);
     if (err == PAL_ERR_NUMERIC)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
-                            body->name);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
 }
 
-static pal_err make(pal_item *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     static_newton *row = PAL_NEW(build->arena, static_newton, 1);
     if (!row) return PAL_ERR_MEMORY;
@@ -300,7 +301,7 @@ static void destroy(void *self)
 {
     static_newton *row = self;
     pal_warp_destroy(&row->warp);
-    pal_answer_destroy(&row->answer);
+    pal_compliance_solver_destroy(&row->answer);
 }
 
 /* ---- forces and energy ---- */
@@ -309,7 +310,7 @@ static pal_err run_rows(pal_step *step, bool internal)
 {
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
-        pal_row *force = &step->force[i];
+        pal_component *force = &step->force[i];
         if (force->effect->internal != internal || force->effect->drag) continue;
         force->n_run++;
         PAL_TRY(force->effect->run(force->self, step));
@@ -326,12 +327,12 @@ static pal_err find_outer(static_newton *row, pal_step *step)
     pal_body *body = row->system.body;
     memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
     PAL_TRY(run_rows(step, false));
-    if (!body->embed) {
-        memcpy(row->outer, body->f, bytes3(row));
+    if (!body->interpolation) {
+        memcpy(row->external_force, body->f, bytes3(row));
         return PAL_ERR_OK;
     }
-    memset(row->outer, 0, bytes3(row));
-    pal_point_rows_pull(body->embed, body->f, row->outer);
+    memset(row->external_force, 0, bytes3(row));
+    pal_interpolation_apply_transpose(body->interpolation, body->f, row->external_force);
     return PAL_ERR_OK;
 }
 
@@ -345,29 +346,29 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
 {
     pal_body *body = row->system.body;
     double part = share(row), loads = 0, reactions = 0, *r = row->cg.r, *p = row->cg.p;
-    pal_system_place(&row->system);
-    if (body->embed) memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    for (int i = 0; i < row->cg.n; i++) body->g[i] = part * row->outer[i];
+    pal_system_interpolate(&row->system);
+    if (body->interpolation) memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    for (int i = 0; i < row->cg.n; i++) body->g[i] = part * row->external_force[i];
     PAL_TRY(run_rows(step, true));
-    if (body->embed) pal_point_rows_pull(body->embed, body->f, body->g);
+    if (body->interpolation) pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
     memcpy(r, body->g, bytes3(row));
     if (row->system.has_contact) {
         for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
-        pal_system_contact(&row->system, -1, 0, p, r);
+        pal_system_multiply_contact(&row->system, -1, 0, p, r);
     }
     for (int i = 0; i < body->n_dof; i++) {
-        loads += pal_norm3(row->outer + 3 * i);
-        if (!body->held[i]) continue;
+        loads += pal_norm3(row->external_force + 3 * i);
+        if (!body->fixed[i]) continue;
         reactions += pal_norm3(r + 3 * i);
         pal_set3(r + 3 * i, 0, 0, 0);
     }
-    if (row->relieved && pal_relief_take(body, row->constant ? body->x_rest : body->x, &row->relief)) {
+    if (row->relieved && pal_inertia_relief_make(body, row->constant ? body->x_rest : body->x, &row->relief)) {
         memcpy(row->inertia, r, bytes3(row));
-        pal_relief_balance(&row->relief, body, r);
+        pal_inertia_relief_balance(&row->relief, body, r);
         for (int i = 0; i < row->cg.n; i++) row->inertia[i] = r[i] - row->inertia[i];
     }
     row->scale_N = fmax(loads, reactions);
-    *size = sqrt(pal_sum_products(row->cg.n, r, r));
+    *size = sqrt(pal_dot_product(row->cg.n, r, r));
     return PAL_ERR_OK;
 }
 
@@ -388,19 +389,19 @@ static energy potential(static_newton *row)
     const pal_body *body = row->system.body;
     energy all = {0};
     double *p = row->cg.p, *q = row->cg.q;
-    pal_system_place(&row->system);
+    pal_system_interpolate(&row->system);
     for (int i = 0; i < row->system.n_force; i++) {
-        const pal_row *force = &row->system.force[i];
+        const pal_component *force = &row->system.force[i];
         if (force->effect->internal && force->effect->energy)
             add_energy(&all, force->effect->energy(force->self, body));
     }
     for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
-    add_energy(&all, -share(row) * pal_sum_products(row->cg.n, row->outer, p));
-    if (row->relieved) add_energy(&all, -pal_sum_products(row->cg.n, row->inertia, p));
+    add_energy(&all, -share(row) * pal_dot_product(row->cg.n, row->external_force, p));
+    if (row->relieved) add_energy(&all, -pal_dot_product(row->cg.n, row->inertia, p));
     if (row->system.has_contact) {
         memset(q, 0, bytes3(row));
-        pal_system_contact(&row->system, 1, 0, p, q);
-        add_energy(&all, 0.5 * pal_sum_products(row->cg.n, p, q));
+        pal_system_multiply_contact(&row->system, 1, 0, p, q);
+        add_energy(&all, 0.5 * pal_dot_product(row->cg.n, p, q));
     }
     return all;
 }
@@ -413,7 +414,7 @@ static int run_true(static_newton *row, double target, double size)
 {
     memcpy(row->now, row->system.body->x, bytes3(row));
     row->cg.multiply = multiply_true;
-    int n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
+    int n = pal_conjugate_gradient_run(&row->cg, row->move, target, 1, row->iterations);
     row->cg.multiply = multiply;
     row->report.n_cg += n;
     if (n == row->iterations || row->cg.residual <= fmax(target, enough * size)) return n;
@@ -431,7 +432,7 @@ static void run_gradients(static_newton *row, double size)
     if (!row->constant) target = fmax(target, row->cg_tolerance * size);
     int n = row->exact ? run_true(row, target, size) : 0;
     if (n == 0) {
-        n = pal_conjugate_run(&row->cg, row->move, target, 1, row->iterations);
+        n = pal_conjugate_gradient_run(&row->cg, row->move, target, 1, row->iterations);
         row->report.n_cg += n;
     }
     if (row->linear == LINEAR_INCOMPLETE) return;
@@ -448,13 +449,13 @@ static pal_err solve_linear(static_newton *row, double size)
     bool direct = row->linear == LINEAR_DIRECT && !row->system.has_contact && !row->exact;
     memset(row->move, 0, bytes3(row));
     if (!row->has_factor || fresh || (row->linear == LINEAR_AUTO && (row->stale || row->eager))) PAL_TRY(factor(row));
-    if (row->warp.factor) pal_warp_turn(&row->warp, &row->turns);
+    if (row->warp.factor) pal_warp_rotate(&row->warp, &row->turns);
     double before = pal_clock_s();
     if (direct)
         pal_warp_solve(&row->warp, row->cg.r, row->move);
     else
         run_gradients(row, size);
-    if (row->relieved) pal_relief_still(&row->relief, row->system.body, row->move);
+    if (row->relieved) pal_inertia_relief_remove_rigid(&row->relief, row->system.body, row->move);
     row->report.solve_s += pal_clock_s() - before;
     return PAL_ERR_OK;
 }
@@ -472,12 +473,12 @@ static bool is_flat(static_newton *row, pal_step *step, const way *from, double 
 {
     const pal_body *body = row->system.body;
     bool level = fabs(rise_J) <= level_share * from->energy.size_J;
-    bool short_way = from->longest_m <= short_h * body->h_m;
+    bool short_way = from->longest_m <= short_h * body->edge_m;
     double size;
     if (!level && !short_way) return false;
     if (row->relieved) memcpy(row->now, row->inertia, bytes3(row));
     bool found = !find_residual(row, step, &size) &&
-                 fabs(pal_sum_products(row->cg.n, row->cg.r, row->move)) <= 0.8 * from->slope_J && size <= from->size_N;
+                 fabs(pal_dot_product(row->cg.n, row->cg.r, row->move)) <= 0.8 * from->slope_J && size <= from->size_N;
     if (row->relieved && !found) memcpy(row->inertia, row->now, bytes3(row));
     return found;
 }
@@ -510,19 +511,19 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     /* before the tangent is taken, which energies may disturb */
     if (!row->constant) from.energy = potential(row);
     pal_system_linearise(&row->system);
-    pal_turns_take(&row->turns, &row->system);
+    pal_node_rotations_update(&row->turns, &row->system);
     PAL_TRY(solve_linear(row, size));
-    from.slope_J = pal_sum_products(row->cg.n, row->force, row->move);
+    from.slope_J = pal_dot_product(row->cg.n, row->force, row->move);
     for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
     /* where the true stiffness nearly vanishes, the way is long and means little */
-    double most = most_move_S * body->size_m;
+    double most = max_move_S * body->length_scale_m;
     if (row->exact && from.longest_m > most) {
         for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / from.longest_m;
         from.slope_J *= most / from.longest_m;
         from.longest_m = most;
     }
-    *moved = search(row, step, &from) && from.longest_m > 1e-15 * body->size_m;
+    *moved = search(row, step, &from) && from.longest_m > 1e-15 * body->length_scale_m;
     return PAL_ERR_OK;
 }
 
@@ -554,18 +555,43 @@ static pal_err find_rest(static_newton *row, pal_step *step)
     }
 }
 
-static void settle(static_newton *row, pal_step *step)
+/* true: contact has changed its loads */
+static bool settle(static_newton *row, pal_step *step)
 {
+    bool again = false;
     const pal_body *body = row->system.body;
-    double *moved = body->embed ? row->node_moved : row->move;
+    double *moved = body->interpolation ? row->node_displacement_m : row->move;
     for (int i = 0; i < row->cg.n; i++) row->move[i] = body->x[i] - row->x0[i];
-    if (body->embed) pal_point_rows_place(body->embed, row->move, moved);
+    if (body->interpolation) pal_interpolation_apply(body->interpolation, row->move, moved);
     for (int i = 0; i < step->n_contact; i++) {
-        const pal_row *contact = &step->contact[i];
-        /* what it asks for beyond that comes with the next world step */
+        const pal_component *contact = &step->contact[i];
         if (contact->effect->tangent && contact->effect->tangent->settle)
-            (void)contact->effect->tangent->settle(contact->self, step, moved);
+            again |= contact->effect->tangent->settle(contact->self, step, moved, true);
     }
+    return again;
+}
+
+/* the body at rest under its loads as they are now; *bad: it is no number, and went back to where it was */
+static pal_err solve(static_newton *row, pal_step *step, bool *bad)
+{
+    pal_body *body = row->system.body;
+    PAL_TRY(find_outer(row, step));
+    if (row->system.n_free == 0) {
+        pal_body_update_nodes(body);
+        row->report.converged = true;
+        return PAL_ERR_OK;
+    }
+    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
+    if (row->part == 0) row->part = 1;
+    PAL_TRY(find_rest(row, step));
+    if (row->answer.door.solve) pal_warp_rotate(&row->answer.warp, &row->turns);
+    *bad = !pal_body_finite(body);
+    if (*bad) {
+        pal_body_stop_bad(body, "");
+        memcpy(body->x, row->x0, bytes3(row));
+    }
+    pal_body_update_nodes(body);
+    return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -578,30 +604,15 @@ static pal_err run(void *self, pal_step *step)
     }
     memcpy(row->x0, body->x, bytes3(row));
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->held[i])
+        if (body->fixed[i])
             pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
         else
             pal_set3(body->v + 3 * i, 0, 0, 0);
     }
-    pal_system_touch(&row->system, step);
-    PAL_TRY(find_outer(row, step));
-    if (row->system.n_free == 0) {
-        pal_body_place(body);
-        row->report.converged = true;
-        return PAL_ERR_OK;
-    }
-    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
-    if (row->part == 0) row->part = 1;
-    PAL_TRY(find_rest(row, step));
-    if (row->answer.door.solve) pal_warp_turn(&row->answer.warp, &row->turns);
-    if (!pal_body_finite(body)) {
-        pal_body_stop_bad(body, "");
-        memcpy(body->x, row->x0, bytes3(row));
-        pal_body_place(body);
-        return PAL_ERR_OK;
-    }
-    pal_body_place(body);
-    settle(row, step);
+    pal_system_linearise_contact(&row->system, step);
+    bool bad = false;
+    do PAL_TRY(solve(row, step, &bad));
+    while (row->system.n_free > 0 && !bad && settle(row, step));
     return PAL_ERR_OK;
 }
 
@@ -619,12 +630,12 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     row->part = 0;
     if (row->system.n_free == 0) return;
-    pal_turns_reset(&row->turns);
+    pal_node_rotations_reset(&row->turns);
     /* a factor of some other state: made again when it is wanted */
     if (row->linear != LINEAR_PCG && row->warp.n_factor > 1) row->has_factor = false;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_note *note)
+static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     static_newton *row = self;
     pal_body *own = row->system.body;
@@ -633,14 +644,14 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     if (!row->answer.door.solve) return PAL_ERR_OK;
     double *x = own->x, *d = own->d;
     own->x = own->x_rest, own->d = own->node_rest;
-    if (own->embed) probe(row);
-    pal_turns_reset(&row->turns);
+    if (own->interpolation) probe(row);
+    pal_node_rotations_reset(&row->turns);
     pal_system_linearise(&row->system);
-    pal_err err = pal_answer_factor(&row->answer, &row->system, &row->blocks);
+    pal_err err = pal_compliance_solver_factor(&row->answer, &row->system, &row->blocks);
     own->x = x, own->d = d;
     if (err == PAL_ERR_NUMERIC)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
-                            body->name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
+                                  body->name);
     return err;
 }
 
@@ -664,5 +675,5 @@ const pal_effect pal_effect_static_newton = {.name = "static_newton",
                                              .reset = reset,
                                              .implicit = true,
                                              .report = report,
-                                             .keeps_rows = true,
+                                             .keeps_components = true,
                                              .destroy = destroy};

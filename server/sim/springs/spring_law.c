@@ -17,40 +17,40 @@ void pal_spring_factors(double poisson, bool without_area, double factor[3])
     factor[PAL_SPRING_VOLUME] = bulk - (5.0 / 3 + 5 * share) * shear;
 }
 
-static double derived_J(const pal_spring *spring, const pal_material *material, double h_m)
+static double derived_J(const pal_spring *spring, const pal_material *material, double edge_m)
 {
     double factor[3];
     pal_spring_factors(material->poisson, spring->without_area, factor);
-    return factor[spring->kind] * material->young_Pa * h_m * h_m * h_m;
+    return factor[spring->kind] * material->young_Pa * edge_m * edge_m * edge_m;
 }
 
-pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out)
+pal_err pal_spring_read(pal_spring_kind kind, pal_config_entry *item, const pal_build *build, pal_spring *out)
 {
-    bool on_grid = build->def->spring_grid.k_J[kind] != NULL, given = on_grid || pal_item_has(item, "k_J");
+    bool on_grid = build->def->spring_grid.k_J[kind] != NULL, given = on_grid || pal_entry_has(item, "k_J");
     const char *weights = given ? "equal" : "volume";
     *out = (pal_spring){.kind = kind, .given = given, .on_grid = on_grid};
-    if (on_grid && pal_item_has(item, "k_J"))
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.k_J: stands beside a grid that gives the same",
-                            item->path);
-    PAL_TRY(pal_item_text(item, "weights", &weights, build->note));
+    if (on_grid && pal_entry_has(item, "k_J"))
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.k_J: stands beside a grid that gives the same",
+                                  item->path);
+    PAL_TRY(pal_entry_read_text(item, "weights", &weights, build->diag));
     if (strcmp(weights, "equal") != 0 && strcmp(weights, "volume") != 0)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s.weights: \"%s\", wanted \"equal\" or \"volume\"",
-                            item->path, weights);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.weights: \"%s\", wanted \"equal\" or \"volume\"",
+                                  item->path, weights);
     out->by_volume = weights[0] == 'v';
-    PAL_TRY(pal_item_bool(item, "without_area", &out->without_area, build->note));
-    out->k_J = on_grid ? 1 : derived_J(out, &build->def->material, build->body->h_m);
-    PAL_TRY(pal_item_number(item, "k_J", 0, 1e60, &out->k_J, build->note));
-    PAL_TRY(pal_item_number(item, "c_Js", 0, 1e60, &out->c_Js, build->note));
-    PAL_TRY(pal_item_done(item, build->note));
-    if (!build->body->tets || !build->body->slots)
-        return pal_note_set(build->note, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", item->path,
-                            item->name);
+    PAL_TRY(pal_entry_read_bool(item, "without_area", &out->without_area, build->diag));
+    out->k_J = on_grid ? 1 : derived_J(out, &build->def->material, build->body->edge_m);
+    PAL_TRY(pal_entry_read_number(item, "k_J", 0, 1e60, &out->k_J, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "c_Js", 0, 1e60, &out->c_Js, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    if (!build->body->tets || !build->body->node_order)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", item->path,
+                                  item->name);
     return PAL_ERR_OK;
 }
 
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material)
 {
-    if (!spring->given) spring->k_J = derived_J(spring, material, body->h_m);
+    if (!spring->given) spring->k_J = derived_J(spring, material, body->edge_m);
 }
 
 static double tet_volume(const pal_tets *tets, int t)
@@ -162,7 +162,7 @@ pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const
     if (!spring->by_volume && !share) return PAL_ERR_OK;
     PAL_TRY(sum_volumes(spring, body, share, item, n_item, n_corner, out));
     if (!spring->by_volume) return PAL_ERR_OK;
-    double h = body->h_m;
+    double h = body->edge_m;
     for (int i = 0; i < n_item; i++) {
         double l2 = n_corner == 4 ? h * h : mean_square_edge(body->x_rest, item + n_corner * i, n_corner);
         out[i] *= l2 / (h * h * h * h * h);

@@ -12,14 +12,14 @@
  * modulus; f_v the rest. A body without area springs takes f_a = 0: the same moduli from two rows. A Poisson ratio
  * below 0.26 is simulated as 0.26.
  *
- * Regions of other materials (def.h): every tetrahedron counts in V_i by factor E of its own material over those of the
- * body, at its centre; with equal weights the mean of that over the spring's tetrahedra stands. That is for constants
- * that are derived; those that are given stand for all materials, as they do when the material is edited.
+ * Regions of other materials (definition.h): every tetrahedron counts in V_i by factor E of its own material over those
+ * of the body, at its centre; with equal weights the mean of that over the spring's tetrahedra stands. That is for
+ * constants that are derived; those that are given stand for all materials, as they do when the material is edited.
  *
  * Constants on a grid (paper B 3.5): k_i is the weight times the mean over the spring's corners of the grid's value
  * there. Thread: [load], pal_spring_material [sim]. */
-#ifndef PAL_SIM_SPRING_LAW_H
-#define PAL_SIM_SPRING_LAW_H
+#ifndef PAL_SIM_SPRINGS_SPRING_LAW_H
+#define PAL_SIM_SPRINGS_SPRING_LAW_H
 #include "server/sim/core/effect.h"
 
 typedef enum pal_spring_kind { PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME } pal_spring_kind;
@@ -40,7 +40,7 @@ void pal_spring_factors(double poisson, bool without_area, double factor[3]);
 /* keys k_J (absent: the grid's, else derived), c_Js (0; on a grid: of a spring with the row's mean constant, the others
  * in proportion), weights ("equal" | "volume"; absent: equal when the constants are given), without_area (false); no
  * other key is allowed. REFUSED: k_J beside a grid that gives the same */
-pal_err pal_spring_read(pal_spring_kind kind, pal_item *item, const pal_build *build, pal_spring *out);
+pal_err pal_spring_read(pal_spring_kind kind, pal_config_entry *item, const pal_build *build, pal_spring *out);
 /* the weights q_i of springs between the corners item [n_item][n_corner] -> out [n_item]; share [n_tet]: times what
  * each tetrahedron counts, NULL: all are of one material; MEMORY */
 pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,

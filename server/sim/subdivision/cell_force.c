@@ -1,5 +1,5 @@
 /* Elements of subdivided solids in their own frames: forces, energy, and products with the tangent Q K Q'. */
-#include "server/sim/subdivision/cell_lanes.h"
+#include "server/sim/subdivision/cell_simd.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 enum { FORCE = 1, ENERGY = 2, LINEARISE = 4, SWELL = 8 };
 
 /* b.u, b the element's swell */
-PAL_INLINE pal_wide swelling(const double *swell, int n_node, pal_wide (*u)[PAL_CELL_NODES_MOST])
+PAL_INLINE pal_wide swelling(const double *swell, int n_node, pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
     pal_wide sum = {0};
     for (int m = 0; m < n_node; m++)
@@ -15,7 +15,7 @@ PAL_INLINE pal_wide swelling(const double *swell, int n_node, pal_wide (*u)[PAL_
     return sum;
 }
 /* u += p b */
-PAL_INLINE void add_swelling(const double *swell, int n_node, pal_wide p, pal_wide (*u)[PAL_CELL_NODES_MOST])
+PAL_INLINE void add_swelling(const double *swell, int n_node, pal_wide p, pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
     for (int m = 0; m < n_node; m++)
         for (int i = 0; i < 3; i++) u[i][m] += p * pal_wide_load(swell + (3 * m + i) * PAL_LANES);
@@ -42,7 +42,7 @@ static void find_push(const pal_cells_elastic *c)
 
 /* g (world axes, forces with Q held) += what the turning of Q adds */
 PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
-                         const pal_wide s[9], pal_wide (*y)[PAL_CELL_NODES_MOST], pal_wide (*g)[PAL_CELL_NODES_MOST])
+                         const pal_wide s[9], pal_wide (*y)[PAL_CELL_MAX_NODES], pal_wide (*g)[PAL_CELL_MAX_NODES])
 {
     const pal_wide zero = {0};
     pal_wide world[3] = {zero, zero, zero}, t[3], frame[9], w[9];
@@ -65,7 +65,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
 {
     const int n_live = cell_live(group, block, lane);
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
-    pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9], energy = {0};
+    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9], energy = {0};
     if (n_live == 0 || (!(what & LINEARISE) && cell_away(c, group, block, lane, n_live))) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
@@ -86,7 +86,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
     if (apart) add_swelling(swell, n_node, push, u);
     if (what & ENERGY) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->tangle.n_away > 0) {
+    if (c->recovery.n_away > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
         energy *= here;
         for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
@@ -125,7 +125,7 @@ static void swell_all(pal_cells_elastic *c, const double *d)
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    if (c->tangle.n_away > 0) (void)pal_cell_tangle_force(&c->tangle, c->solid, d, f);
+    if (c->recovery.n_away > 0) (void)pal_cell_recovery_force(&c->recovery, c->solid, d, f);
     if (c->op == PAL_CELL_EDGES) {
         pal_cells_edges_force(c, d, f);
         return;
@@ -144,7 +144,8 @@ PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, dou
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    double patches = c->tangle.n_away > 0 && !c->tangle.weighs ? pal_cell_tangle_force(&c->tangle, c->solid, d, f) : 0;
+    double patches =
+        c->recovery.n_away > 0 && !c->recovery.weighs ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
     if (c->op == PAL_CELL_EDGES) return patches + pal_cells_edges_energy(c, d);
     return patches + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
 }
@@ -165,8 +166,8 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const int n_live = cell_live(group, b, l);
             const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
-            pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
-            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
+            pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
+            if (n_live == 0 || (!c->recovery.off && cell_away(c, group, b, l, n_live))) continue;
             cell_gather(node, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
@@ -174,8 +175,9 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
             if (c->volume.n > 0)
                 add_swelling(swell_at(group, n_node, b, l), n_node, give_swelling(c, group->home + b * PAL_LANES + l),
                              u);
-            const pal_wide by =
-                c->tangle.n_away > 0 && !c->tangle.off ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
+            const pal_wide by = c->recovery.n_away > 0 && !c->recovery.off
+                                    ? k * pal_wide_load(group->here + b * PAL_LANES + l)
+                                    : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
             cell_turn(r, n_node, u, u);
             cell_scatter(node, n_node, n_live, u, out);
@@ -188,8 +190,8 @@ PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n
     for (int b = 0; b < group->n_block; b++)
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const int n_live = cell_live(group, b, l);
-            pal_wide u[3][PAL_CELL_NODES_MOST], r[9];
-            if (n_live == 0 || (!c->tangle.off && cell_away(c, group, b, l, n_live))) continue;
+            pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
+            if (n_live == 0 || (!c->recovery.off && cell_away(c, group, b, l, n_live))) continue;
             cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
@@ -215,23 +217,23 @@ void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const doub
     multiply_all(c, PAL_CELL_CUBIC, 64, k, p, out);
     multiply_all(c, PAL_CELL_HEX, 8, k, p, out);
     multiply_all(c, PAL_CELL_PYRAMID, 5, k, p, out);
-    if (c->tangle.n_away > 0 && !c->tangle.off) pal_cell_tangle_multiply(&c->tangle, c->solid, k, p, out);
+    if (c->recovery.n_away > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, c->solid, k, p, out);
 }
 
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
 {
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *group = &c->group[kind];
-        double n[PAL_CELL_NODES_MOST], middle[3] = {0.5, 0.5, 0.5}, r[9];
+        double n[PAL_CELL_MAX_NODES], middle[3] = {0.5, 0.5, 0.5}, r[9];
         pal_cell_shape(group->n_node, middle, n, NULL);
         for (int e = 0; e < group->n; e++) {
             const int b = e / PAL_LANES, l = e % PAL_LANES;
             const int32_t *node = group->node + (size_t)b * (size_t)group->n_node * PAL_LANES + l;
             for (int i = 0; i < 9; i++) r[i] = group->turn[((size_t)b * 9 + i) * PAL_LANES + l];
-            const int patch = c->tangle.patch[c->tangle.first[kind] + e];
-            if (patch >= 0 && !c->tangle.off) memcpy(r, c->tangle.of[patch].turn, sizeof r);
+            const int patch = c->recovery.patch[c->recovery.first[kind] + e];
+            if (patch >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[patch].turn, sizeof r);
             for (int m = 0; m < group->n_node; m++) {
-                double share = n[m] * c->tangle.shear_J[c->tangle.first[kind] + e];
+                double share = n[m] * c->recovery.shear_J[c->recovery.first[kind] + e];
                 for (int i = 0; i < 9; i++) turn[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
             }
         }
@@ -240,7 +242,7 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
 
 /* ---- turned over ---- */
 
-/* 8 corners of the cells of half a block, in the order of num/shape.h */
+/* 8 corners of the cells of half a block, in the order of num/shape_functions.h */
 PAL_INLINE void cell_corners(const int32_t *node, int n_node, const double *d, pal_wide (*x)[8])
 {
     static const int own[8] = {21, 37, 25, 41, 22, 38, 26, 42}, base[8] = {0, 1, 3, 2, 4, 4, 4, 4};
@@ -292,7 +294,7 @@ void pal_cells_corners_make(pal_cells_elastic *c)
                 for (int p = 0; p < 8; p++) mean += 0.125 * det[p];
                 for (int p = 0; p < 8; p++)
                     pal_wide_store(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l,
-                                   pal_wide_pick(det[p] > 0.01 * mean, 1 / det[p], 0 * mean));
+                                   pal_wide_select(det[p] > 0.01 * mean, 1 / det[p], 0 * mean));
             }
     }
 }
@@ -300,7 +302,8 @@ void pal_cells_corners_make(pal_cells_elastic *c)
 PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d)
 {
     const pal_cell_group *g = &c->group[kind];
-    double *least = c->tangle.ratio[0] + c->tangle.first[kind], *most = c->tangle.ratio[1] + c->tangle.first[kind];
+    double *least = c->recovery.ratio[0] + c->recovery.first[kind],
+           *most = c->recovery.ratio[1] + c->recovery.first[kind];
     for (int b = 0; b < g->n_block; b++)
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const pal_wide one = 1 - (pal_wide){0};
@@ -310,8 +313,8 @@ PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, 
             corner_volumes(x, det);
             for (int p = 0; p < 8; p++) {
                 pal_wide inverse = pal_wide_load(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l);
-                pal_wide ratio = pal_wide_pick(inverse > 0, det[p] * inverse, one);
-                low = pal_wide_pick(ratio < low, ratio, low), high = pal_wide_pick(ratio > high, ratio, high);
+                pal_wide ratio = pal_wide_select(inverse > 0, det[p] * inverse, one);
+                low = pal_wide_select(ratio < low, ratio, low), high = pal_wide_select(ratio > high, ratio, high);
             }
             for (int k = 0; k < n_live; k++)
                 least[b * PAL_LANES + l + k] = low[k], most[b * PAL_LANES + l + k] = high[k];

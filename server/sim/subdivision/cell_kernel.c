@@ -3,13 +3,13 @@
 
 #include "server/num/polar.h"
 #include "server/sim/elements/elastic_law.h"
-#include "server/sim/subdivision/cell_lanes.h"
+#include "server/sim/subdivision/cell_simd.h"
 
 #include <math.h>
 #include <string.h>
 
 /* gradients of the trilinear shape functions at the Gauss points */
-typedef double point_gradients[PAL_CELL_POINTS][8][3];
+typedef double point_gradients[PAL_CELL_GAUSS_POINTS][8][3];
 
 /* ---- tables ---- */
 
@@ -45,9 +45,9 @@ static void make_line(pal_cell_line *line)
 
 static void trilinear_gradients(int n_node, point_gradients g)
 {
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
         double at[3];
-        pal_cell_point(p, at);
+        pal_cell_gauss_point(p, at);
         pal_cell_shape(n_node, at, NULL, g[p]);
     }
 }
@@ -82,8 +82,8 @@ static pal_err allocate(pal_cell_group *g, pal_arena *arena)
     bool all = g->node && g->rest && g->frame && g->q && g->turn && g->volume && g->middle && g->corner && g->here &&
                g->energy_J;
     if (g->n_node == PAL_CUBIC_NODES) {
-        g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 9);
-        g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_POINTS * 2);
+        g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 9);
+        g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 2);
         return all && g->scale && g->stiff ? PAL_ERR_OK : PAL_ERR_MEMORY;
     }
     g->k = PAL_NEW(arena, float, n_lane * 9 * (size_t)pal_cell_pairs(g->n_node));
@@ -98,12 +98,12 @@ static int element_of(const pal_cell_group *g, int block, int lane)
 }
 
 /* sqrt(dV) J^-1 at the points and the volume of a cubic element */
-static double take_points(const double *x, const int32_t *node, double (*g)[PAL_CELL_NODES_MOST][3], float *scale)
+static double take_points(const double *x, const int32_t *node, double (*g)[PAL_CELL_MAX_NODES][3], float *scale)
 {
     double volume = 0;
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double at[3], J[9], inverse[9], weight = pal_cell_point(p, at);
-        double dv = weight * pal_solid_jacobian(x, node, PAL_CUBIC_NODES, g[p], J);
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        double at[3], J[9], inverse[9], weight = pal_cell_gauss_point(p, at);
+        double dv = weight * pal_subdivision_solid_jacobian(x, node, PAL_CUBIC_NODES, g[p], J);
         invert3(J, inverse);
         double root = sqrt(dv);
         for (int i = 0; i < 9; i++) scale[(size_t)(9 * p + i) * PAL_LANES] = (float)(root * inverse[i]);
@@ -115,17 +115,17 @@ static double take_points(const double *x, const int32_t *node, double (*g)[PAL_
 static double trilinear_volume(const double *x, const int32_t *node, int n_node, point_gradients g)
 {
     double volume = 0;
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double at[3], J[9], weight = pal_cell_point(p, at);
-        volume += weight * pal_solid_jacobian(x, node, n_node, g[p], J);
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        double at[3], J[9], weight = pal_cell_gauss_point(p, at);
+        volume += weight * pal_subdivision_solid_jacobian(x, node, n_node, g[p], J);
     }
     return volume;
 }
 
 /* nodes, rest shape and frame of one lane; false: folded over in its middle */
-static bool take_lane(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *g, int block, int lane)
+static bool take_lane(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *g, int block, int lane)
 {
-    const int32_t *node = pal_solid_nodes(solid, kind, element_of(g, block, lane));
+    const int32_t *node = pal_subdivision_solid_nodes(solid, kind, element_of(g, block, lane));
     const double *from = solid->node_rest + 3 * (size_t)node[cell_reference(g->n_node)];
     const size_t b = (size_t)block, n_node = (size_t)g->n_node, l = (size_t)lane;
     double J[9], inverse[9];
@@ -134,16 +134,16 @@ static bool take_lane(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
         for (size_t i = 0; i < 3; i++)
             g->rest[((b * n_node + m) * 3 + i) * PAL_LANES + l] = solid->node_rest[3 * (size_t)node[m] + i] - from[i];
     }
-    pal_solid_jacobian(solid->node_rest, node, g->n_node, g->middle, J);
+    pal_subdivision_solid_jacobian(solid->node_rest, node, g->n_node, g->middle, J);
     if (!(invert3(J, inverse) > 0)) return false;
     for (size_t i = 0; i < 9; i++) g->frame[(b * 9 + i) * PAL_LANES + l] = inverse[i];
     return true;
 }
 
-static pal_err make_group(const pal_solid *solid, pal_cell_kind kind, pal_arena *arena, pal_cell_group *g,
-                          pal_note *note)
+static pal_err make_group(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_arena *arena, pal_cell_group *g,
+                          pal_diagnostic *diag)
 {
-    double middle[3] = {0.5, 0.5, 0.5}, shape[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3];
+    double middle[3] = {0.5, 0.5, 0.5}, shape[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3];
     point_gradients trilinear;
     g->n_node = pal_cell_kind_nodes(kind), g->n = solid->elements.n[kind];
     g->n_block = (g->n + PAL_LANES - 1) / PAL_LANES;
@@ -151,19 +151,19 @@ static pal_err make_group(const pal_solid *solid, pal_cell_kind kind, pal_arena 
     PAL_TRY(allocate(g, arena));
     pal_cell_shape(g->n_node, middle, NULL, g->middle);
     if (kind != PAL_CELL_CUBIC) trilinear_gradients(g->n_node, trilinear);
-    for (int p = 0; p < PAL_CELL_POINTS && kind == PAL_CELL_CUBIC; p++) {
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS && kind == PAL_CELL_CUBIC; p++) {
         double at[3];
-        pal_cell_point(p, at);
+        pal_cell_gauss_point(p, at);
         pal_cell_shape(g->n_node, at, NULL, shape[p]);
     }
     for (int b = 0; b < g->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) {
             int e = element_of(g, b, l);
-            const int32_t *node = pal_solid_nodes(solid, kind, e);
+            const int32_t *node = pal_subdivision_solid_nodes(solid, kind, e);
             if (!take_lane(solid, kind, g, b, l))
-                return pal_note_set(note, PAL_ERR_REFUSED,
-                                    "cell %d of the subdivided solid is folded over in its middle",
-                                    solid->elements.cell[kind][e]);
+                return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                          "cell %d of the subdivided solid is folded over in its middle",
+                                          solid->elements.cell[kind][e]);
             g->volume[b * PAL_LANES + l] =
                 kind == PAL_CELL_CUBIC
                     ? take_points(solid->node_rest, node, shape, g->scale + (size_t)b * 64 * 9 * PAL_LANES + l)
@@ -176,23 +176,23 @@ static pal_err make_group(const pal_solid *solid, pal_cell_kind kind, pal_arena 
 
 /* Lame constants of the lanes of half a block at a point; of what is not shared with the control cell (cell_volume.c)
  */
-static void lame_lanes(const pal_solid_samples *s, const pal_cell_group *g, bool shared, int block, int lane, int point,
-                       pal_wide *mu, pal_wide *lambda)
+static void lame_lanes(const pal_material_samples *s, const pal_cell_group *g, bool shared, int block, int lane,
+                       int point, pal_wide *mu, pal_wide *lambda)
 {
     for (int l = 0; l < PAL_WIDE; l++) {
-        size_t at = (size_t)element_of(g, block, lane + l) * PAL_CELL_POINTS + (size_t)point;
+        size_t at = (size_t)element_of(g, block, lane + l) * PAL_CELL_GAUSS_POINTS + (size_t)point;
         double m, la;
         pal_lame((double)s->young_Pa[at], fmin((double)s->poisson[at], 0.4999), &m, &la);
-        (*mu)[l] = m, (*lambda)[l] = shared ? pal_cell_lambda_kept(m, la) : la;
+        (*mu)[l] = m, (*lambda)[l] = shared ? pal_cell_own_lambda(m, la) : la;
     }
 }
 
-static void fill_cubic(const pal_solid *solid, bool shared, pal_cell_group *g)
+static void fill_cubic(const pal_subdivision_solid *solid, bool shared, pal_cell_group *g)
 {
     for (int b = 0; b < g->n_block; b++)
-        for (int p = 0; p < PAL_CELL_POINTS; p++)
+        for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++)
             for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-                float *to = g->stiff + ((size_t)b * PAL_CELL_POINTS + (size_t)p) * 2 * PAL_LANES + l;
+                float *to = g->stiff + ((size_t)b * PAL_CELL_GAUSS_POINTS + (size_t)p) * 2 * PAL_LANES + l;
                 pal_wide mu, lambda;
                 lame_lanes(&solid->samples[PAL_CELL_CUBIC], g, shared, b, l, p, &mu, &lambda);
                 cell_store_float(to, mu), cell_store_float(to + PAL_LANES, lambda);
@@ -225,8 +225,8 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
 /* K_ab = int mu (g_b g_a' + g_a.g_b I - 2/3 g_a g_b') dV + k_a k_b' / int kappa dV, k_a = int kappa g_a dV, kappa =
  * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
  * `mean`: K of A 3.2, int B' C B dV */
-static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn, bool mean,
-                      bool shared, int block, int lane)
+static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn,
+                      bool mean, bool shared, int block, int lane)
 {
     const int n_node = group->n_node, n_pair = pal_cell_pairs(n_node);
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
@@ -234,16 +234,17 @@ static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
     pal_wide k[28][9], g[8][3], swell[8][3], mu, lambda, all = {0};
     for (int i = 0; i < 9 * n_pair; i++) k[i / 9][i % 9] = (pal_wide){0};
     for (int i = 0; i < 3 * n_node; i++) swell[i / 3][i % 3] = (pal_wide){0};
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double at[3], weight = pal_cell_point(p, at);
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        double at[3], weight = pal_cell_gauss_point(p, at);
         pal_wide volume = rest_gradients(rest, n_node, dn[p], weight, g);
         lame_lanes(&solid->samples[kind], group, shared, block, lane, p, &mu, &lambda);
         mu *= volume;
-        pal_wide kappa = lambda * volume + mu * (2.0 / 3), outer = mean ? mu * (-2.0 / 3) : lambda * volume;
+        pal_wide kappa = lambda * volume + mu * (2.0 / 3), external_force = mean ? mu * (-2.0 / 3) : lambda * volume;
         all += kappa;
         for (int a = 1, pair = 0; a < n_node; a++) {
             pal_wide m[3], la[3];
-            for (int i = 0; i < 3; i++) m[i] = mu * g[a][i], la[i] = outer * g[a][i], swell[a][i] += kappa * g[a][i];
+            for (int i = 0; i < 3; i++)
+                m[i] = mu * g[a][i], la[i] = external_force * g[a][i], swell[a][i] += kappa * g[a][i];
             for (int b = 1; b <= a; b++, pair++) {
                 pal_wide dot = m[0] * g[b][0] + m[1] * g[b][1] + m[2] * g[b][2];
                 for (int i = 0; i < 3; i++)
@@ -261,7 +262,8 @@ static void fill_half(const pal_solid *solid, pal_cell_kind kind, pal_cell_group
     for (int i = 0; i < 9 * n_pair; i++) cell_store_float(to + (size_t)i * PAL_LANES, k[i / 9][i % 9]);
 }
 
-static void fill_stored(const pal_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean, bool shared)
+static void fill_stored(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean,
+                        bool shared)
 {
     point_gradients dn;
     trilinear_gradients(group->n_node, dn);
@@ -273,19 +275,19 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
 {
     if (c->sampled == c->solid->sampled) return;
     c->sampled = c->solid->sampled;
-    pal_kept_forget(&c->kept);
+    pal_force_cache_invalidate(&c->kept);
     const bool shared = c->volume.n > 0, mean = c->op == PAL_CELL_POLAR;
     fill_cubic(c->solid, shared, &c->group[PAL_CELL_CUBIC]);
     fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, shared);
     fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean, shared);
     pal_cell_volume_refresh(c);
-    pal_cell_tangle_refresh(&c->tangle, c);
+    pal_cell_recovery_refresh(&c->recovery, c);
 }
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)
 {
-    pal_kept_forget(&c->kept);
-    pal_cell_tangle_reset(&c->tangle, c);
+    pal_force_cache_invalidate(&c->kept);
+    pal_cell_recovery_reset(&c->recovery, c);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
         for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;
@@ -293,15 +295,15 @@ void pal_cells_elastic_reset(pal_cells_elastic *c)
     }
 }
 
-pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal_arena *arena, pal_cells_elastic *out,
-                               pal_note *note)
+pal_err pal_cells_elastic_make(const pal_subdivision_solid *solid, pal_cell_operator op, pal_arena *arena,
+                               pal_cells_elastic *out, pal_diagnostic *diag)
 {
     memset(out, 0, sizeof *out);
     out->solid = solid, out->op = op;
     make_line(&out->line);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
-        PAL_TRY(make_group(solid, kind, arena, &out->group[kind], note));
-    PAL_TRY(pal_cell_tangle_make(solid, arena, &out->tangle));
+        PAL_TRY(make_group(solid, kind, arena, &out->group[kind], diag));
+    PAL_TRY(pal_cell_recovery_make(solid, arena, &out->recovery));
     pal_cells_corners_make(out);
     PAL_TRY(pal_cell_volume_make(out, arena));
     pal_cells_elastic_reset(out);

@@ -13,19 +13,19 @@
  * factorisation over the 4 x 4 x 4 points. Trilinear ones have K without their node 0, which takes minus the sum.
  * K is rounded to float where it is stored; sums are double.
  * All memory from the arena. Thread: make [load], else [sim]; energy and force move the rotations' warm start. */
-#ifndef PAL_SIM_CELL_KERNEL_H
-#define PAL_SIM_CELL_KERNEL_H
-#include "server/num/blocks.h"
-#include "server/sim/core/kept.h"
-#include "server/sim/subdivision/cell_tangle.h"
-#include "server/sim/subdivision/solid.h"
+#ifndef PAL_SIM_SUBDIVISION_CELL_KERNEL_H
+#define PAL_SIM_SUBDIVISION_CELL_KERNEL_H
+#include "server/num/block_matrix.h"
+#include "server/sim/core/force_cache.h"
+#include "server/sim/subdivision/cell_recovery.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 
 typedef enum pal_cell_operator {
     PAL_CELL_POLAR, /* d^ = Q'y - X                                                            */
     PAL_CELL_EDGES, /* d^ = R d of A 3.2.2 with errata A5 to A8 (cell_operator.c); no gradient */
 } pal_cell_operator;
 
-/* the line of four: coefficients of even and odd parts (cell_lanes.h) */
+/* the line of four: coefficients of even and odd parts (cell_simd.h) */
 typedef struct pal_cell_line {
     double even[2][2], odd[2][2];   /* B at the points: half sums and differences of its columns      */
     double slope_odd[2][2], bow[2]; /* derivative at the points of a cubic from its values there      */
@@ -46,7 +46,7 @@ typedef struct pal_cell_group {
     float *k;            /* others: blocks K_ab, b <= a, of nodes 1.., N/m
                                                   [n_block][pairs][9][8] */
     double *corner;      /* 1 / volume at rest at the 8 points that look for turned over elements [n_block][8][8] */
-    double *here;        /* 1: an element, 0: part of a patch (cell_tangle.h)      [n_block][8] */
+    double *here;        /* 1: an element, 0: part of a patch (cell_recovery.h)      [n_block][8] */
     double *energy_J;    /* of each element when energy was asked for last         [n_block][8] */
     int32_t *home;       /* control cell of each element, where changes of volume have theirs [n_block][8] */
     double *swell;       /* int kappa grad N dV, J/m, kappa of what they share          [n_block][n_node][3][8] */
@@ -63,18 +63,18 @@ typedef struct pal_cell_volume {
 } pal_cell_volume;
 
 typedef struct pal_cells_elastic {
-    const pal_solid *solid;
+    const pal_subdivision_solid *solid;
     pal_cell_operator op;
-    uint64_t sampled; /* of the solid, what the constants were made for */
-    pal_kept kept;    /* made by the row, of PAL_CELL_POLAR under an implicit solver */
-    pal_cell_tangle tangle;
+    uint64_t sampled;     /* of the solid, what the constants were made for */
+    pal_force_cache kept; /* made by the row, of PAL_CELL_POLAR under an implicit solver */
+    pal_cell_recovery recovery;
     pal_cell_volume volume;
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
 } pal_cells_elastic;
 
 /* lambda of an element's own where its control cell has the rest */
-static inline double pal_cell_lambda_kept(double mu, double lambda)
+static inline double pal_cell_own_lambda(double mu, double lambda)
 {
     return lambda < mu ? lambda : mu;
 }
@@ -84,8 +84,8 @@ static inline int pal_cell_pairs(int n_node)
 }
 
 /* REFUSED: an element that is folded over in its middle, with its cell; MEMORY. The solid is borrowed */
-pal_err pal_cells_elastic_make(const pal_solid *solid, pal_cell_operator op, pal_arena *arena, pal_cells_elastic *out,
-                               pal_note *note);
+pal_err pal_cells_elastic_make(const pal_subdivision_solid *solid, pal_cell_operator op, pal_arena *arena,
+                               pal_cells_elastic *out, pal_diagnostic *diag);
 /* constants anew where the solid has other samples than they were made for; no heap */
 void pal_cells_elastic_refresh(pal_cells_elastic *c);
 void pal_cells_elastic_reset(pal_cells_elastic *c); /* rotations are none again */
@@ -117,12 +117,12 @@ void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell
 
 /* what stands at the Gauss points of one element; strain and stress small, in the element's axes */
 typedef struct pal_cell_points {
-    double volume_m3[PAL_CELL_POINTS]; /* at rest; their sum is the element's */
-    double strain[PAL_CELL_POINTS][6]; /* xx yy zz yz zx xy, not doubled      */
-    double von_mises_Pa[PAL_CELL_POINTS], energy_J_m3[PAL_CELL_POINTS];
-    double det_f[PAL_CELL_POINTS];   /* volume now over volume at rest      */
-    double stretch[PAL_CELL_POINTS]; /* largest principal stretch less 1 */
-    double turn[9];                  /* Q                                   */
+    double volume_m3[PAL_CELL_GAUSS_POINTS]; /* at rest; their sum is the element's */
+    double strain[PAL_CELL_GAUSS_POINTS][6]; /* xx yy zz yz zx xy, not doubled      */
+    double von_mises_Pa[PAL_CELL_GAUSS_POINTS], energy_J_m3[PAL_CELL_GAUSS_POINTS];
+    double det_f[PAL_CELL_GAUSS_POINTS];   /* volume now over volume at rest      */
+    double stretch[PAL_CELL_GAUSS_POINTS]; /* largest principal stretch less 1 */
+    double turn[9];                        /* Q                                   */
 } pal_cell_points;
 /* the same for both operators */
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,

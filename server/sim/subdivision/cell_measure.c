@@ -9,11 +9,11 @@
 #include <string.h>
 
 /* d(x, y, z)/d(u, v, w) at the points from values at the nodes, by sums along w, then v, then u */
-static void cubic_gradients(const double x[PAL_CELL_NODES_MOST][3], double J[PAL_CELL_POINTS][9])
+static void cubic_gradients(const double x[PAL_CELL_MAX_NODES][3], double J[PAL_CELL_GAUSS_POINTS][9])
 {
     double b[4][4], s[4][4], one[16][4][2][3], two[4][16][3][3];
     for (int p = 0; p < 4; p++) pal_spline(pal_gauss4_at[p], b[p], s[p]);
-    memset(one, 0, sizeof one), memset(two, 0, sizeof two), memset(J, 0, PAL_CELL_POINTS * sizeof *J);
+    memset(one, 0, sizeof one), memset(two, 0, sizeof two), memset(J, 0, PAL_CELL_GAUSS_POINTS * sizeof *J);
     for (int m = 0; m < 64; m++)
         for (int p = 0; p < 4; p++)
             for (int i = 0; i < 3; i++) {
@@ -37,19 +37,19 @@ static void cubic_gradients(const double x[PAL_CELL_NODES_MOST][3], double J[PAL
             }
 }
 
-static void gradients(int n_node, const double *at, const int32_t *node, double J[PAL_CELL_POINTS][9])
+static void gradients(int n_node, const double *at, const int32_t *node, double J[PAL_CELL_GAUSS_POINTS][9])
 {
-    double x[PAL_CELL_NODES_MOST][3], g[PAL_CELL_NODES_MOST][3];
+    double x[PAL_CELL_MAX_NODES][3], g[PAL_CELL_MAX_NODES][3];
     if (n_node == PAL_CUBIC_NODES) {
         for (int m = 0; m < n_node; m++) memcpy(x[m], at + 3 * (size_t)node[m], sizeof x[m]);
         cubic_gradients((const double(*)[3])x, J);
         return;
     }
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
         double u[3];
-        pal_cell_point(p, u);
+        pal_cell_gauss_point(p, u);
         pal_cell_shape(n_node, u, NULL, g);
-        pal_solid_jacobian(at, node, n_node, g, J[p]);
+        pal_subdivision_solid_jacobian(at, node, n_node, g, J[p]);
     }
 }
 
@@ -68,31 +68,31 @@ static void middle_turn(const pal_cell_group *group, const double *d, const int3
 {
     const size_t block = (size_t)(element / PAL_LANES), lane = (size_t)(element % PAL_LANES);
     double J[9], f[9], q[4];
-    pal_solid_jacobian(d, node, group->n_node, group->middle, J);
+    pal_subdivision_solid_jacobian(d, node, group->n_node, group->middle, J);
     for (int i = 0; i < 9; i++) {
         f[i] = 0;
         for (size_t k = 0; k < 3; k++)
             f[i] += J[3 * (i / 3) + (int)k] * group->frame[(block * 9 + 3 * k + (size_t)(i % 3)) * PAL_LANES + lane];
     }
     for (size_t i = 0; i < 4; i++) q[i] = group->q[(block * 4 + i) * PAL_LANES + lane];
-    pal_polar_turn(f, q, 200);
+    pal_polar_rotation(f, q, 200);
     pal_quat_matrix(q, turn);
 }
 
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,
                               pal_cell_points *out)
 {
-    const pal_solid_samples *samples = &c->solid->samples[kind];
-    const int32_t *node = pal_solid_nodes(c->solid, kind, element);
+    const pal_material_samples *samples = &c->solid->samples[kind];
+    const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, element);
     const pal_cell_group *group = &c->group[kind];
-    double now[PAL_CELL_POINTS][9], rest[PAL_CELL_POINTS][9];
+    double now[PAL_CELL_GAUSS_POINTS][9], rest[PAL_CELL_GAUSS_POINTS][9];
     middle_turn(group, d, node, element, out->turn);
     gradients(group->n_node, d, node, now);
     gradients(group->n_node, c->solid->node_rest, node, rest);
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        const size_t sample = (size_t)element * PAL_CELL_POINTS + (size_t)p;
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        const size_t sample = (size_t)element * PAL_CELL_GAUSS_POINTS + (size_t)p;
         double f[9], h[9], stress[9], at[3], mu, lambda, *e = out->strain[p];
-        out->volume_m3[p] = pal_cell_point(p, at) * deformation(now[p], rest[p], f);
+        out->volume_m3[p] = pal_cell_gauss_point(p, at) * deformation(now[p], rest[p], f);
         out->det_f[p] = pal_det3(f);
         out->stretch[p] = pal_largest_strain(f);
         for (int i = 0; i < 3; i++)
@@ -116,19 +116,19 @@ void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_
 {
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const int n_node = c->group[kind].n_node;
-        double shape[PAL_CELL_POINTS][PAL_CELL_NODES_MOST];
+        double shape[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES];
         if (c->group[kind].n == 0) continue;
-        for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
             double at[3];
-            pal_cell_point(p, at);
+            pal_cell_gauss_point(p, at);
             pal_cell_shape(n_node, at, shape[p], NULL);
         }
         for (int e = 0; e < c->group[kind].n; e++) {
-            const int32_t *node = pal_solid_nodes(c->solid, kind, e);
+            const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, e);
             pal_cell_points points;
-            double share[PAL_CELL_NODES_MOST] = {0}, part[PAL_CELL_NODES_MOST] = {0};
+            double share[PAL_CELL_MAX_NODES] = {0}, part[PAL_CELL_MAX_NODES] = {0};
             pal_cells_elastic_points(c, d, kind, e, &points);
-            for (int p = 0; p < PAL_CELL_POINTS; p++) {
+            for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
                 const double volume = points.volume_m3[p], of = value(&points, p) * volume;
                 for (int m = 0; m < n_node; m++) share[m] += shape[p][m] * volume, part[m] += shape[p][m] * of;
             }

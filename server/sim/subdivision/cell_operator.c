@@ -13,13 +13,13 @@
  * s1 x s2 below 1e-8 |s1| |s2| (an angle of 0 or 180 degrees) gives no axis: that of rest is taken, turned by the
  * element's last rotation Q. The sum is brought into the axes Q, and forces f = Q K Q' R d back; they have no net
  * force, but a net torque, and no energy. */
-#include "server/sim/subdivision/cell_lanes.h"
+#include "server/sim/subdivision/cell_simd.h"
 
 #include <math.h>
 
 /* relative vectors of the lattice's edges, at their first node [direction][node][component] */
 typedef struct edge_vectors {
-    pal_wide at[3][PAL_CELL_NODES_MOST][3];
+    pal_wide at[3][PAL_CELL_MAX_NODES][3];
 } edge_vectors;
 
 /* the lattice: nodes a side, steps between neighbours along u, v, w, whether corners above w = 0 are one */
@@ -28,7 +28,7 @@ typedef struct lattice {
     bool apex;
 } lattice;
 
-PAL_INLINE void from_to(pal_wide (*x)[PAL_CELL_NODES_MOST], int a, int b, pal_wide s[3])
+PAL_INLINE void from_to(pal_wide (*x)[PAL_CELL_MAX_NODES], int a, int b, pal_wide s[3])
 {
     for (int i = 0; i < 3; i++) s[i] = x[i][b] - x[i][a];
 }
@@ -47,7 +47,7 @@ PAL_INLINE pal_wide root(pal_wide q)
 }
 
 /* a - a' and b - b' at node `at` of ends a and b; x now, y at rest */
-PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CELL_NODES_MOST], const pal_wide r[9],
+PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL_MAX_NODES], const pal_wide r[9],
                        int at, int a, int b, pal_wide va[3], pal_wide vb[3])
 {
     const pal_wide zero = {0}, tiny2 = zero + 1e-16;
@@ -58,19 +58,20 @@ PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CEL
     pal_wide rest2 = dot(rest, rest), cs0 = dot(r1, r2), h02 = rest2 + cs0 * cs0, both = h2 * h02;
     pal_wide sn = root(sn2), sn0 = root(rest2);
     pal_wide_mask there = (both > 0) & (rest2 > tiny2 * h02), seen = sn2 > tiny2 * h2;
-    pal_wide over = pal_wide_pick(there, 1 + zero, zero) / pal_wide_pick(there, root(both), 1 + zero);
+    pal_wide over = pal_wide_select(there, 1 + zero, zero) / pal_wide_select(there, root(both), 1 + zero);
     pal_wide cosine = (cs * cs0 + sn * sn0) * over, sine = (sn * cs0 - cs * sn0) * over;
     /* half of delta, which stays short of half a turn by the smaller of both angles at rest: sh = sin, less = 1 - cos,
      * by = sin / |s1 x s2| with one division for all */
     pal_wide half2 = 0.5 + 0.5 * cosine;
-    pal_wide ch = root(pal_wide_pick(half2 > 1e-16, half2, zero + 1e-16)), length = pal_wide_pick(seen, sn, 1 + zero);
+    pal_wide ch = root(pal_wide_select(half2 > 1e-16, half2, zero + 1e-16)),
+             length = pal_wide_select(seen, sn, 1 + zero);
     pal_wide inverse = 1 / (ch * length * (1 + ch)), by = 0.5 * sine * (1 + ch) * inverse;
     pal_wide sh = by * length, less = sh * sh * ch * length * inverse;
     if (pal_wide_all(seen)) {
         for (int i = 0; i < 3; i++) axis[i] *= by;
     } else {
-        pal_wide instead = pal_wide_pick(there & ~seen, sh, zero) / pal_wide_pick(there, sn0, 1 + zero);
-        by = pal_wide_pick(seen, by, zero);
+        pal_wide instead = pal_wide_select(there & ~seen, sh, zero) / pal_wide_select(there, sn0, 1 + zero);
+        by = pal_wide_select(seen, by, zero);
         for (int i = 0; i < 3; i++)
             axis[i] = axis[i] * by + (r[3 * i] * rest[0] + r[3 * i + 1] * rest[1] + r[3 * i + 2] * rest[2]) * instead;
     }
@@ -79,7 +80,7 @@ PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CEL
 }
 
 /* the four corners of the square at node `at` in the plane of directions a, b; share of each in the edges' vectors */
-PAL_INLINE void square(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CELL_NODES_MOST],
+PAL_INLINE void square(const lattice *g, pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL_MAX_NODES],
                        const pal_wide r[9], int at, int a, int b, const double share[2][2], edge_vectors *e)
 {
     for (int q = 0; q < 4; q++) {
@@ -97,7 +98,7 @@ PAL_INLINE void square(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], pal
     }
 }
 
-PAL_INLINE void stretches(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CELL_NODES_MOST],
+PAL_INLINE void stretches(const lattice *g, pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL_MAX_NODES],
                           edge_vectors *e)
 {
     const pal_wide zero = {0};
@@ -108,12 +109,12 @@ PAL_INLINE void stretches(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], 
             from_to(x, m, m + g->step[a], s), from_to(y, m, m + g->step[a], t);
             pal_wide l = root(dot(s, s)), l0 = root(dot(t, t));
             pal_wide_mask there = l > 0;
-            pal_wide by = pal_wide_pick(there, l - l0, zero) / pal_wide_pick(there, l, 1 + zero);
+            pal_wide by = pal_wide_select(there, l - l0, zero) / pal_wide_select(there, l, 1 + zero);
             for (int i = 0; i < 3; i++) e->at[a][m][i] = by * s[i];
         }
 }
 
-PAL_INLINE void shears(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], pal_wide (*y)[PAL_CELL_NODES_MOST],
+PAL_INLINE void shears(const lattice *g, pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL_MAX_NODES],
                        const pal_wide r[9], edge_vectors *e)
 {
     const int last = g->n - 1;
@@ -132,7 +133,7 @@ PAL_INLINE void shears(const lattice *g, pal_wide (*x)[PAL_CELL_NODES_MOST], pal
 }
 
 /* d [3][n^3] = edges' vectors summed along lines, from the middle of each */
-PAL_INLINE void sum_lines(const lattice *g, const edge_vectors *e, pal_wide (*d)[PAL_CELL_NODES_MOST])
+PAL_INLINE void sum_lines(const lattice *g, const edge_vectors *e, pal_wide (*d)[PAL_CELL_MAX_NODES])
 {
     const pal_wide zero = {0};
     for (int m = 0; m < g->n * g->n * g->n; m++) d[0][m] = d[1][m] = d[2][m] = zero;
@@ -156,8 +157,8 @@ PAL_INLINE void sum_lines(const lattice *g, const edge_vectors *e, pal_wide (*d)
 }
 
 /* u = Q' R d of half a block: y nodes now, from one of them, spoilt; u of node 0 is 0 where K has no row for it */
-PAL_INLINE void displaced(const double *rest, int n_node, const pal_wide r[9], pal_wide (*y)[PAL_CELL_NODES_MOST],
-                          pal_wide (*u)[PAL_CELL_NODES_MOST])
+PAL_INLINE void displaced(const double *rest, int n_node, const pal_wide r[9], pal_wide (*y)[PAL_CELL_MAX_NODES],
+                          pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
     static const int corner_node[8] = {0, 1, 3, 2, 4, 4, 4, 4};
     const bool cubic = n_node == PAL_CUBIC_NODES;
@@ -165,7 +166,7 @@ PAL_INLINE void displaced(const double *rest, int n_node, const pal_wide r[9], p
                        .step = {cubic ? 16 : 1, cubic ? 4 : 2, cubic ? 1 : 4},
                        .apex = n_node == PAL_PYRAMID_NODES};
     edge_vectors e;
-    pal_wide x0[3][PAL_CELL_NODES_MOST], (*x)[PAL_CELL_NODES_MOST] = y, x1[3][PAL_CELL_NODES_MOST];
+    pal_wide x0[3][PAL_CELL_MAX_NODES], (*x)[PAL_CELL_MAX_NODES] = y, x1[3][PAL_CELL_MAX_NODES];
     for (int m = 0; m < g.n * g.n * g.n; m++)
         for (int i = 0; i < 3; i++) {
             int node = g.apex ? corner_node[m] : m;
@@ -194,14 +195,14 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int n_live = cell_live(group, block, lane);
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
-    pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9], energy = {0};
+    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9], energy = {0};
     if (n_live == 0 || cell_away(c, group, block, lane, n_live)) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     displaced(rest, n_node, r, y, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, f ? NULL : &energy);
     if (!f) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->tangle.n_away > 0) {
+    if (c->recovery.n_away > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
         energy *= here;
         for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
@@ -243,7 +244,7 @@ PAL_INLINE void one_displaced(pal_cells_elastic *c, pal_cell_kind kind, int n_no
     pal_cell_group *group = &c->group[kind];
     const int block = element / PAL_LANES, lane = element % PAL_LANES / PAL_WIDE * PAL_WIDE;
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
-    pal_wide y[3][PAL_CELL_NODES_MOST], u[3][PAL_CELL_NODES_MOST], r[9], s[9];
+    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9];
     cell_gather(group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     if (c->op == PAL_CELL_EDGES) {

@@ -27,12 +27,12 @@ static bool asked(const pal_cells_elastic *c)
 {
     float most = 0;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
-        for (size_t i = 0; i < (size_t)c->solid->elements.n[kind] * PAL_CELL_POINTS; i++)
+        for (size_t i = 0; i < (size_t)c->solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++)
             most = fmaxf(most, c->solid->samples[kind].poisson[i]);
     return c->op == PAL_CELL_POLAR && most > from_poisson;
 }
 
-static int32_t home_of(const pal_solid *solid, pal_cell_kind kind, int element)
+static int32_t home_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element)
 {
     return solid->subdivision.cell_origin[solid->elements.cell[kind][element]];
 }
@@ -40,7 +40,7 @@ static int32_t home_of(const pal_solid *solid, pal_cell_kind kind, int element)
 /* all nodes of each control cell's elements, for those who want to know what moves what */
 static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
 {
-    const pal_solid *solid = c->solid;
+    const pal_subdivision_solid *solid = c->solid;
     const int n = c->volume.n;
     int32_t *count = PAL_NEW(arena, int32_t, n), *node;
     int most = 1;
@@ -58,7 +58,7 @@ static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             const int32_t home = home_of(solid, kind, e);
             const int n_node = pal_cell_kind_nodes(kind);
-            memcpy(node + (size_t)home * (size_t)most + count[home], pal_solid_nodes(solid, kind, e),
+            memcpy(node + (size_t)home * (size_t)most + count[home], pal_subdivision_solid_nodes(solid, kind, e),
                    sizeof *node * (size_t)n_node);
             count[home] += n_node;
         }
@@ -71,7 +71,7 @@ static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
 
 pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena)
 {
-    const pal_solid *solid = c->solid;
+    const pal_subdivision_solid *solid = c->solid;
     c->volume = (pal_cell_volume){.n = 0};
     if (!asked(c)) return PAL_ERR_OK;
     int n = 0;
@@ -95,21 +95,21 @@ pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena)
 }
 
 /* b of one element; returns int kappa dV */
-static double swell_of(const pal_solid *solid, pal_cell_kind kind, int element, double (*dn)[PAL_CELL_NODES_MOST][3],
-                       double b[PAL_CELL_NODES_MOST][3])
+static double swell_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element,
+                       double (*dn)[PAL_CELL_MAX_NODES][3], double b[PAL_CELL_MAX_NODES][3])
 {
-    const int32_t *node = pal_solid_nodes(solid, kind, element);
+    const int32_t *node = pal_subdivision_solid_nodes(solid, kind, element);
     const int n_node = pal_cell_kind_nodes(kind);
-    const size_t first = (size_t)element * PAL_CELL_POINTS;
+    const size_t first = (size_t)element * PAL_CELL_GAUSS_POINTS;
     double all = 0;
-    memset(b, 0, sizeof *b * PAL_CELL_NODES_MOST);
-    for (size_t p = 0; p < PAL_CELL_POINTS; p++) {
-        const pal_solid_samples *s = &solid->samples[kind];
+    memset(b, 0, sizeof *b * PAL_CELL_MAX_NODES);
+    for (size_t p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        const pal_material_samples *s = &solid->samples[kind];
         double J[9], cofactor[9], mu, lambda;
-        const double det = pal_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
+        const double det = pal_subdivision_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
         pal_cofactor3(J, cofactor);
         pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], 0.4999), &mu, &lambda);
-        const double kappa_J = (lambda - pal_cell_lambda_kept(mu, lambda)) * s->volume_m3[first + p];
+        const double kappa_J = (lambda - pal_cell_own_lambda(mu, lambda)) * s->volume_m3[first + p];
         all += kappa_J;
         /* J^-T = cofactor / det */
         for (int m = 0; m < n_node; m++)
@@ -124,10 +124,10 @@ void pal_cell_volume_refresh(pal_cells_elastic *c)
     memset(c->volume.share, 0, sizeof(double) * (size_t)c->volume.n);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
-        double dn[PAL_CELL_POINTS][PAL_CELL_NODES_MOST][3], b[PAL_CELL_NODES_MOST][3];
-        for (int p = 0; p < PAL_CELL_POINTS && g->n > 0; p++) {
+        double dn[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3], b[PAL_CELL_MAX_NODES][3];
+        for (int p = 0; p < PAL_CELL_GAUSS_POINTS && g->n > 0; p++) {
             double at[3];
-            pal_cell_point(p, at);
+            pal_cell_gauss_point(p, at);
             pal_cell_shape(g->n_node, at, NULL, dn[p]);
         }
         for (int i = 0; i < g->n_block * PAL_LANES; i++) {

@@ -5,9 +5,9 @@
 
 #include <string.h>
 
-pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_shell *shell, pal_arena *arena)
+pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, pal_arena *arena)
 {
-    size_t n = (size_t)shell->levels.n_vertex[shell->levels.n_level - 1];
+    size_t n = (size_t)adaptive->levels.n_vertex[adaptive->levels.n_level - 1];
     *measure = (pal_refine_measure){.frame.quat = {1, 0, 0, 0}};
     measure->sum = PAL_NEW(arena, double, 8 * n);
     measure->rest_curvature = PAL_NEW(arena, double, n);
@@ -17,10 +17,10 @@ pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_shell *sh
 
 /* ---- curvature ---- */
 
-static void add_normals(double *sum, const pal_shell *shell, const double *x)
+static void add_normals(double *sum, const pal_adaptive_surface *adaptive, const double *x)
 {
-    for (int t = 0; t < shell->n_tri; t++) {
-        const int32_t *c = shell->tri + 3 * (size_t)t;
+    for (int t = 0; t < adaptive->n_tri; t++) {
+        const int32_t *c = adaptive->tri + 3 * (size_t)t;
         const double *a = x + 3 * (size_t)c[0];
         double ab[3], ac[3], n[3];
         pal_sub3(ab, x + 3 * (size_t)c[1], a);
@@ -33,10 +33,10 @@ static void add_normals(double *sum, const pal_shell *shell, const double *x)
     }
 }
 
-static void add_springs(double *sum, const pal_shell *shell, const double *x)
+static void add_springs(double *sum, const pal_adaptive_surface *adaptive, const double *x)
 {
-    for (int s = 0; s < shell->n_spring; s++) {
-        const int32_t *end = shell->levels.edge[shell->spring[s]].vertex;
+    for (int s = 0; s < adaptive->n_spring; s++) {
+        const int32_t *end = adaptive->levels.edge[adaptive->spring[s]].vertex;
         double *a = sum + 8 * (size_t)end[0], *b = sum + 8 * (size_t)end[1], d[3], d2;
         pal_sub3(d, x + 3 * (size_t)end[1], x + 3 * (size_t)end[0]);
         d2 = pal_dot3(d, d);
@@ -48,11 +48,11 @@ static void add_springs(double *sum, const pal_shell *shell, const double *x)
     }
 }
 
-static void take_sums(double *sum, const pal_shell *shell, const double *x)
+static void take_sums(double *sum, const pal_adaptive_surface *adaptive, const double *x)
 {
-    for (int k = 0; k < shell->n_node; k++) memset(sum + 8 * (size_t)shell->node[k], 0, 8 * sizeof *sum);
-    add_normals(sum, shell, x);
-    add_springs(sum, shell, x);
+    for (int k = 0; k < adaptive->n_node; k++) memset(sum + 8 * (size_t)adaptive->node[k], 0, 8 * sizeof *sum);
+    add_normals(sum, adaptive, x);
+    add_springs(sum, adaptive, x);
 }
 
 static inline double curvature(const double *sum)
@@ -60,10 +60,12 @@ static inline double curvature(const double *sum)
     return 2 * pal_dot3(sum, sum + 3) / (pal_norm3(sum) * sum[6]);
 }
 
-void pal_refine_curvature(pal_refine_measure *measure, const pal_shell *shell, const double *x, double *out)
+void pal_refine_curvature(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, const double *x,
+                          double *out)
 {
-    take_sums(measure->sum, shell, x);
-    for (int k = 0; k < shell->n_node; k++) out[shell->node[k]] = curvature(measure->sum + 8 * (size_t)shell->node[k]);
+    take_sums(measure->sum, adaptive, x);
+    for (int k = 0; k < adaptive->n_node; k++)
+        out[adaptive->node[k]] = curvature(measure->sum + 8 * (size_t)adaptive->node[k]);
 }
 
 /* ---- marks ---- */
@@ -71,7 +73,7 @@ void pal_refine_curvature(pal_refine_measure *measure, const pal_shell *shell, c
 /* value and thresholds as squares */
 static inline int judge(double value2, double limit2, double quiet2)
 {
-    return value2 > limit2 ? PAL_REFINE_STRONG : value2 < quiet2 ? PAL_REFINE_QUIET : PAL_REFINE_BETWEEN;
+    return value2 > limit2 ? PAL_REFINE_REQUESTED : value2 < quiet2 ? PAL_REFINE_QUIET : PAL_REFINE_BETWEEN;
 }
 
 static inline int larger(int a, int b)
@@ -79,7 +81,7 @@ static inline int larger(int a, int b)
     return a > b ? a : b;
 }
 
-static double speed2(const pal_shell_frame *frame, const double *x, const double *v)
+static double speed2(const pal_rigid_fit *frame, const double *x, const double *v)
 {
     double arm[3], rigid[3], rest[3];
     pal_sub3(arm, x, frame->centre_m);
@@ -89,26 +91,26 @@ static double speed2(const pal_shell_frame *frame, const double *x, const double
 }
 
 /* sums of curvature now, after that at rest where the nodes have changed */
-static void take_curvature(pal_refine_measure *measure, const pal_shell *shell, const pal_body *body)
+static void take_curvature(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, const pal_body *body)
 {
-    if (!measure->known || measure->revision != shell->revision) {
-        pal_refine_curvature(measure, shell, body->x_rest, measure->rest_curvature);
+    if (!measure->known || measure->revision != adaptive->revision) {
+        pal_refine_curvature(measure, adaptive, body->x_rest, measure->rest_curvature);
         measure->known = true;
-        measure->revision = shell->revision;
+        measure->revision = adaptive->revision;
     }
-    take_sums(measure->sum, shell, body->x);
+    take_sums(measure->sum, adaptive, body->x);
 }
 
-void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_shell *shell, const pal_body *body,
+void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, const pal_body *body,
                            const pal_refine_limits *limits)
 {
     const bool force = limits->force_N > 0, speed = limits->speed_m_s > 0, bend = limits->curvature_1_m > 0;
-    const double m_0 = shell->level_mass_kg[0], speed_2 = limits->speed_m_s * limits->speed_m_s,
+    const double m_0 = adaptive->level_mass_kg[0], speed_2 = limits->speed_m_s * limits->speed_m_s,
                  force_2 = limits->force_N * limits->force_N, bend_2 = limits->curvature_1_m * limits->curvature_1_m;
-    if (speed) pal_shell_fit_frame(shell, body, &measure->frame);
-    if (bend) take_curvature(measure, shell, body);
-    for (int k = 0; k < shell->n_node; k++) {
-        const size_t i = (size_t)shell->node[k];
+    if (speed) pal_adaptive_fit_rigid(adaptive, body, &measure->frame);
+    if (bend) take_curvature(measure, adaptive, body);
+    for (int k = 0; k < adaptive->n_node; k++) {
+        const size_t i = (size_t)adaptive->node[k];
         const double share = body->mass_kg[i] / m_0;
         int mark = PAL_REFINE_QUIET;
         if (force) {
@@ -129,16 +131,16 @@ void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_shell *shell, 
 
 /* ---- both sides of a switch ---- */
 
-void pal_switch_take(pal_switch_side *side, const pal_step *step)
+void pal_refine_balance_compute(pal_refine_balance *side, const pal_step *step)
 {
     const pal_body *body = step->body;
-    *side = (pal_switch_side){0};
+    *side = (pal_refine_balance){0};
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         const double m = body->mass_kg[i], *v = body->v + 3 * (size_t)i;
         side->mass_kg += m;
         side->kinetic_J += 0.5 * m * pal_dot3(v, v);
-        if (body->held[i]) continue;
+        if (body->fixed[i]) continue;
         double turn[3];
         pal_cross3(turn, body->x + 3 * (size_t)i, v);
         pal_axpy3(side->momentum_kg_m_s, m, v);

@@ -1,10 +1,10 @@
 /* What the row refine decides on: external force, speed and change of curvature at the active nodes of a shell, and
  * what is kept at a switch of level (C, criterion for refinement and simplification). Private to sim.
  * Thread: [sim], make [load]; no heap in [sim]. */
-#ifndef PAL_SIM_REFINE_MEASURE_H
-#define PAL_SIM_REFINE_MEASURE_H
+#ifndef PAL_SIM_SURFACE_REFINE_MEASURE_H
+#define PAL_SIM_SURFACE_REFINE_MEASURE_H
 #include "server/sim/core/effect.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 /* thresholds at a node of level 0; 0: the criterion is off. A node asks for finer faces beyond a threshold, and is
  * quiet below half of what would be the threshold on the level above */
@@ -20,50 +20,51 @@ typedef struct pal_refine_limits {
 
 /* a node whose numbers are not finite is BETWEEN: it asks for nothing and nothing is taken from it */
 typedef enum pal_refine_mark {
-    PAL_REFINE_QUIET,   /* of every criterion */
-    PAL_REFINE_BETWEEN, /* neither            */
-    PAL_REFINE_STRONG   /* beyond a threshold */
+    PAL_REFINE_QUIET,    /* of every criterion */
+    PAL_REFINE_BETWEEN,  /* neither            */
+    PAL_REFINE_REQUESTED /* beyond a threshold */
 } pal_refine_mark;
 
 typedef struct pal_refine_measure {
     double *sum;            /* of a node: normals of triangles 3, d/d.d of springs 3, springs, free [n_vertex][8] */
     double *rest_curvature; /* 1/m, at the present nodes                                            [n_vertex]    */
     uint8_t *mark;          /* pal_refine_mark of the nodes of the last call                        [n_vertex]    */
-    pal_shell_frame frame;
+    pal_rigid_fit frame;
     uint64_t revision; /* of the shell that rest_curvature belongs to */
     bool known;
 } pal_refine_measure;
 
 /* MEMORY */
-pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_shell *shell, pal_arena *arena);
+pal_err pal_refine_measure_make(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, pal_arena *arena);
 /* marks every active node; about 60 ns a node with all criteria on */
-void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_shell *shell, const pal_body *body,
+void pal_refine_mark_nodes(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, const pal_body *body,
                            const pal_refine_limits *limits);
 /* curvature in places x [n_vertex][3] at the nodes, 1/m; NaN where the triangles have no area together. out is
  * [n_vertex], written at nodes only, and may be measure->rest_curvature */
-void pal_refine_curvature(pal_refine_measure *measure, const pal_shell *shell, const double *x, double *out);
+void pal_refine_curvature(pal_refine_measure *measure, const pal_adaptive_surface *adaptive, const double *x,
+                          double *out);
 
 /* one side of a switch of level */
-typedef struct pal_switch_side {
+typedef struct pal_refine_balance {
     double mass_kg;
     double momentum_kg_m_s[3], turn_kg_m2_s[3]; /* of the free nodes; angular momentum about the body frame's origin */
     double kinetic_J, spring_J, shape_J;        /* springs and anchors with their ramps                              */
     double other_J;                             /* FORCE rows beside edge_spring and shape_spring                    */
-} pal_switch_side;
-static inline double pal_switch_total_J(const pal_switch_side *s)
+} pal_refine_balance;
+static inline double pal_refine_balance_total_J(const pal_refine_balance *s)
 {
     return s->kinetic_J + s->spring_J + s->shape_J + s->other_J;
 }
 /* sums at the body's present state */
-void pal_switch_take(pal_switch_side *side, const pal_step *step);
+void pal_refine_balance_compute(pal_refine_balance *side, const pal_step *step);
 
 /* all that one evaluation changed is one switch */
-typedef struct pal_switch_report {
-    uint64_t n_switch;                  /* since reset                                   */
-    uint64_t n_split, n_join;           /* faces, since reset                          */
-    double time_s;                      /* of the last switch, simulated since reset     */
-    pal_switch_side before, raw, after; /* raw: before anything was corrected */
-} pal_switch_report;
-/* of a row refine (pal_row.self), for tests and tools; lives as long as the row */
-const pal_switch_report *pal_refine_report(const void *self);
+typedef struct pal_refine_history {
+    uint64_t n_switch;                     /* since reset                                   */
+    uint64_t n_split, n_join;              /* faces, since reset                          */
+    double time_s;                         /* of the last switch, simulated since reset     */
+    pal_refine_balance before, raw, after; /* raw: before anything was corrected */
+} pal_refine_history;
+/* of a row refine (pal_component.self), for tests and tools; lives as long as the row */
+const pal_refine_history *pal_refine_report(const void *self);
 #endif

@@ -1,12 +1,12 @@
 /* Where the nodes of one body lie in the elements of another (transfer.h). */
-#include "server/sim/transfer/transfer_parts.h"
+#include "server/sim/transfer/transfer_core.h"
 
 #include "server/base/vec3.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/solid.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/subdivision/subdivision_solid.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -26,20 +26,21 @@ static void free_bare(bare *b)
 {
     pal_locate_destroy(b->locate);
     free(b->tets.tet);
-    pal_solid_free(b->body.solid);
+    pal_subdivision_solid_free(b->body.solid);
     pal_arena_destroy(b->arena);
 }
 
-static pal_err make_bare(const pal_scene *scene, int index, pal_note *note, bare *out)
+static pal_err make_bare(const pal_scene *scene, int index, pal_diagnostic *diag, bare *out)
 {
     const pal_body_def *def = &scene->body[index];
     const pal_model *model = pal_model_find(def->model.name);
     if (!model)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", def->name, def->model.name);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", def->name,
+                                  def->model.name);
     out->arena = pal_arena_create(1 << 16, true);
     pal_recipe *recipe = malloc(sizeof *recipe);
-    pal_item item = def->model;
-    pal_build build = {.scene = scene, .def = def, .body = &out->body, .arena = out->arena, .note = note};
+    pal_config_entry item = def->model;
+    pal_build build = {.scene = scene, .def = def, .body = &out->body, .arena = out->arena, .diag = diag};
     out->body.name = def->name;
     pal_err err = out->arena && recipe ? model->build(&item, &build, recipe) : PAL_ERR_MEMORY;
     free(recipe);
@@ -62,7 +63,7 @@ static void add_tet(bare *b, const int32_t *node, const int corner[4])
 {
     int32_t *c = b->tets.tet + 4 * (size_t)b->tets.n_tet;
     for (int k = 0; k < 4; k++) c[k] = node[corner[k]];
-    double six = six_volumes(b->tets.x, c), h = b->body.h_m;
+    double six = six_volumes(b->tets.x, c), h = b->body.edge_m;
     if (!(fabs(six) > 1e-9 * h * h * h)) return;
     if (six < 0) {
         int32_t swap = c[2];
@@ -76,15 +77,15 @@ static pal_err cut_solid(bare *b)
 {
     static const int hex[5][4] = {{0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}, {1, 2, 4, 7}};
     static const int pyramid[2][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}};
-    const pal_solid *s = b->body.solid;
+    const pal_subdivision_solid *s = b->body.solid;
     size_t most = 5 * ((size_t)s->elements.n[PAL_CELL_CUBIC] + (size_t)s->elements.n[PAL_CELL_HEX]) +
                   2 * (size_t)s->elements.n[PAL_CELL_PYRAMID];
-    b->tets = (pal_tets){.n_node = b->body.n_node, .x = b->body.node_rest, .h_m = b->body.h_m};
+    b->tets = (pal_tets){.n_node = b->body.n_node, .x = b->body.node_rest, .edge_m = b->body.edge_m};
     b->tets.tet = malloc(4 * sizeof(int32_t) * (most + 1));
     if (!b->tets.tet) return PAL_ERR_MEMORY;
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int e = 0; e < s->elements.n[kind]; e++) {
-            const int32_t *node = pal_solid_nodes(s, (pal_cell_kind)kind, e);
+            const int32_t *node = pal_subdivision_solid_nodes(s, (pal_cell_kind)kind, e);
             int32_t corner[8];
             for (int c = 0; c < 8 && kind == PAL_CELL_CUBIC; c++)
                 corner[c] = node[16 * (1 + (c & 1)) + 4 * (1 + (c >> 1 & 1)) + 1 + (c >> 2)];
@@ -95,7 +96,7 @@ static pal_err cut_solid(bare *b)
     return PAL_ERR_OK;
 }
 
-static pal_err make_locate(bare *b, pal_note *note)
+static pal_err make_locate(bare *b, pal_diagnostic *diag)
 {
     const pal_body *body = &b->body;
     const pal_tets *tets = body->tets;
@@ -106,7 +107,7 @@ static pal_err make_locate(bare *b, pal_note *note)
     pal_err err =
         tets ? pal_locate_create(tets, body->n_corner == 8 ? body->hexes : NULL, &b->locate) : PAL_ERR_REFUSED;
     if (err == PAL_ERR_REFUSED)
-        return pal_note_set(note, err, "body \"%s\": it has no elements to be switched from or to", body->name);
+        return pal_diagnostic_set(diag, err, "body \"%s\": it has no elements to be switched from or to", body->name);
     return err;
 }
 
@@ -128,10 +129,10 @@ static void hold_near(int n_corner, double local[4])
 }
 
 /* the row of a point that is in no one's rows yet */
-static void add_point(const bare *in, const double x[3], pal_row_build *rows)
+static void add_point(const bare *in, const double x[3], pal_interpolation_builder *rows)
 {
     const pal_body *body = &in->body;
-    double local[4], weight[PAL_CORNERS_MOST];
+    double local[4], weight[PAL_MAX_CORNERS];
     int n = body->n_corner == 8 || body->n_corner == 10 ? body->n_corner : 4;
     int e = pal_locate_point(in->locate, x, local, NULL);
     hold_near(n, local);
@@ -143,21 +144,22 @@ static void add_point(const bare *in, const double x[3], pal_row_build *rows)
         memcpy(weight, local, sizeof local);
     const int32_t *node = n == 4 ? (body->solid ? in->tets.tet : body->tets->tet) : body->element;
     for (int c = 0; c < n; c++)
-        if (fabs(weight[c]) > 1e-12) pal_row_add(rows, node[(size_t)n * (size_t)e + (size_t)c], weight[c]);
-    pal_row_end(rows);
+        if (fabs(weight[c]) > 1e-12)
+            pal_interpolation_builder_add(rows, node[(size_t)n * (size_t)e + (size_t)c], weight[c]);
+    pal_interpolation_builder_end_row(rows);
 }
 
 /* nodes of `of` by those of `in` */
-static pal_err make_rows(const bare *of, const bare *in, pal_point_rows *out)
+static pal_err make_rows(const bare *of, const bare *in, pal_interpolation *out)
 {
-    pal_row_build rows;
-    pal_row_build_begin(&rows, of->body.n_node, in->body.n_node, MOST_ENTRY);
+    pal_interpolation_builder rows;
+    pal_interpolation_builder_begin(&rows, of->body.n_node, in->body.n_node, MOST_ENTRY);
     for (int i = 0; i < of->body.n_node && !rows.err; i++) {
         double x[3];
         for (int c = 0; c < 3; c++) x[c] = of->body.node_rest[3 * i + c] + of->origin_m[c] - in->origin_m[c];
         add_point(in, x, &rows);
     }
-    return pal_row_build_finish(&rows, out);
+    return pal_interpolation_builder_finish(&rows, out);
 }
 
 static bool same_cells(const pal_scene *a, const pal_scene *b, int body)
@@ -187,35 +189,36 @@ static pal_err take_room(pal_transfer *t)
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, bare *a, bare *b,
+static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag, bare *a, bare *b,
                     pal_transfer *t)
 {
-    PAL_TRY(make_bare(from, body, note, a));
-    PAL_TRY(make_bare(to, body, note, b));
+    PAL_TRY(make_bare(from, body, diag, a));
+    PAL_TRY(make_bare(to, body, diag, b));
     t->body = body;
-    t->shell = a->body.shell != NULL;
-    t->same_points = a->body.solid && b->body.solid && same_cells(from, to, body);
+    t->adaptive = a->body.adaptive != NULL;
+    t->same_control_points = a->body.solid && b->body.solid && same_cells(from, to, body);
     t->n_from = a->body.n_node, t->n_to = b->body.n_node, t->n_dof = b->body.n_dof;
-    if (!a->body.shell != !b->body.shell)
-        return pal_note_set(note, PAL_ERR_REFUSED,
-                            "body \"%s\": a surface that adapts and a full body are no one thing",
-                            from->body[body].name);
-    if (t->shell && !same_surface(&from->body[body].mesh->surface, &to->body[body].mesh->surface))
-        return pal_note_set(note, PAL_ERR_REFUSED, "body \"%s\": another surface", from->body[body].name);
+    if (!a->body.adaptive != !b->body.adaptive)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "body \"%s\": a surface that adapts and a full body are no one thing",
+                                  from->body[body].name);
+    if (t->adaptive && !same_surface(&from->body[body].mesh->surface, &to->body[body].mesh->surface))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": another surface", from->body[body].name);
     PAL_TRY(take_room(t));
-    if (t->shell) return PAL_ERR_OK;
-    PAL_TRY(make_locate(a, note));
-    PAL_TRY(make_locate(b, note));
+    if (t->adaptive) return PAL_ERR_OK;
+    PAL_TRY(make_locate(a, diag));
+    PAL_TRY(make_locate(b, diag));
     PAL_TRY(make_rows(b, a, &t->in));
     return make_rows(a, b, &t->back);
 }
 
-pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, pal_transfer **out)
+pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag,
+                          pal_transfer **out)
 {
     bare *two = calloc(2, sizeof *two);
     pal_transfer *t = calloc(1, sizeof *t);
-    pal_err err = two && t ? make(from, to, body, note, &two[0], &two[1], t) : PAL_ERR_MEMORY;
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "no memory to switch body \"%s\"", from->body[body].name);
+    pal_err err = two && t ? make(from, to, body, diag, &two[0], &two[1], t) : PAL_ERR_MEMORY;
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "no memory to switch body \"%s\"", from->body[body].name);
     for (int k = 0; k < 2 && two; k++) free_bare(&two[k]);
     free(two);
     if (err)
@@ -228,12 +231,12 @@ pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, 
 void pal_transfer_free(pal_transfer *t)
 {
     if (!t) return;
-    pal_point_rows_free(&t->in);
-    pal_point_rows_free(&t->back);
+    pal_interpolation_free(&t->in);
+    pal_interpolation_free(&t->back);
     for (int k = 0; k < 5; k++) free(t->work[k]);
     free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old), free(t->load),
         free(t->moving);
-    free(t->fix), free(t->seen_room);
-    pal_point_rows_free(&t->spread);
+    free(t->fix), free(t->snapshot_room);
+    pal_interpolation_free(&t->spread);
     free(t);
 }

@@ -17,29 +17,29 @@
  * every node (of such a surface every vertex in use) is moved by its missing force over a bound of its stiffness (kinks
  * go first), until the elastic energy is what it was, or 40 times (200 where it is half as much again), not at all
  * where it is no more than that. What is left is made up for by the length of the displacement from rest (of a body
- * that nothing holds, from its best rigid place), by PAL_TRANSFER_SCALE at most, and where that is not enough (the
- * report's scale stands at its bound), or the mass is another one, by the velocity, by PAL_TRANSFER_RATE at most. A
- * body without velocity whose displacement stands at its bound has another energy then: the report says so. A body that
- * rests under a load with the same elastic energy stands about half way between where it rested before and where it
- * will: a point moves by half of what the methods differ in, which is less than the sum of their errors. The other half
- * is let go as the difference of all forces goes out (ease.h). Momentum: a body that nothing holds keeps momentum and
- * spin of before; what they ask for of the kinetic energy they have (equal masses: the same).
+ * that nothing holds, from its best rigid place), by PAL_TRANSFER_MAX_SCALE at most, and where that is not enough (the
+ * report's scale stands at its bound), or the mass is another one, by the velocity, by PAL_TRANSFER_MAX_VELOCITY_SCALE
+ * at most. A body without velocity whose displacement stands at its bound has another energy then: the report says so.
+ * A body that rests under a load with the same elastic energy stands about half way between where it rested before and
+ * where it will: a point moves by half of what the methods differ in, which is less than the sum of their errors. The
+ * other half is let go as the difference of all forces goes out (blend_component.h). Momentum: a body that nothing
+ * holds keeps momentum and spin of before; what they ask for of the kinetic energy they have (equal masses: the same).
  *
  * Sight and touch. The same nodes as near as they can stand show a skin elsewhere: the way from what the new body would
- * show to what the old one did is let go with the forces (pal_world_lag), so that nothing is seen to jump, and tools
- * touch what is seen.
+ * show to what the old one did is let go with the forces (pal_world_blend_display), so that nothing is seen to jump,
+ * and tools touch what is seen.
  *
- * What is carried besides: time, tools, poses, materials, other bodies (pal_world_follow), lasting loads, and what a
- * tool holds (pal_effect.hand) or presses, with what friction holds (holder.h), and brushes on bodies
+ * What is carried besides: time, tools, poses, materials, other bodies (pal_world_transfer), lasting loads, and what a
+ * tool holds (pal_effect.hand) or presses, with what friction holds (tool_contact.h), and brushes on bodies
  * that have some. Thread: one at a
  * time. */
-#ifndef PAL_SIM_TRANSFER_H
-#define PAL_SIM_TRANSFER_H
+#ifndef PAL_SIM_TRANSFER_TRANSFER_H
+#define PAL_SIM_TRANSFER_TRANSFER_H
 #include "server/sim/world/world.h"
 
 /* most that a displacement, and a velocity, is lengthened or shortened for the sake of the energy */
-#define PAL_TRANSFER_SCALE 1.8
-#define PAL_TRANSFER_RATE  4.0
+#define PAL_TRANSFER_MAX_SCALE          1.8
+#define PAL_TRANSFER_MAX_VELOCITY_SCALE 4.0
 
 typedef struct pal_transfer pal_transfer;
 
@@ -51,9 +51,10 @@ typedef struct pal_transfer_report {
      * that lies within the new elements. Skins hang on the nodes of their mesh, so that a vertex may move where no
      * point does
      */
-    double most_move_m, body_move_m;
+    double max_move_m, body_move_m;
     /* farthest that a shown vertex goes from one frame to the next because of the switch: what is shown begins where it
-     * was and is let go over PAL_EASE_STEPS steps (ease.h). Without memory for that: as far as the body moves */
+     * was and is let go over PAL_BLEND_STEPS steps (blend_component.h). Without memory for that: as far as the body
+     * moves */
     double frame_move_m;
     int n_smooth; /* rounds of smoothing that it took */
     double scale; /* of the displacement, 1: as interpolated and smoothed */
@@ -62,12 +63,13 @@ typedef struct pal_transfer_report {
 /* What the carry needs, found beforehand: where every node of the body in scene `to` lies in that in `from` and the
  * other way round, and memory. REFUSED: an adaptive surface and another model, or two of different surfaces; what the
  * models say; MEMORY. Borrows nothing. [load] */
-pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_note *note, pal_transfer **out);
+pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag,
+                          pal_transfer **out);
 void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
 /* `next`, a new world of `to`, goes on where `before`, one of `from`, is. Both stand still; the forces in before are
  * worked out anew, its state is as it was. Deterministic. Heap memory for row `ease`; where there is none, the forces
  * change at once. [sim] */
-void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
+void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
 
 /* Most of a carry's time goes into smoothing what was interpolated. That part can be rehearsed while the old world goes
  * on: look takes copies of the old body and of what pulls on it (one evaluation of its forces, hash and state as they
@@ -76,8 +78,8 @@ void pal_transfer_carry(pal_transfer *transfer, pal_world *next, const pal_world
  * more rounds, never another result than within its bounds. look: false: there is nothing to rehearse (a body that
  * adapts, that is frozen), or no memory. [sim of before] rehearse: after look; the old world may go on meanwhile. [any]
  */
-bool pal_transfer_look(pal_transfer *transfer, const pal_world *before);
+bool pal_transfer_snapshot(pal_transfer *transfer, const pal_world *before);
 void pal_transfer_rehearse(pal_transfer *transfer, pal_world *next);
 /* farthest that a node of the old body has gone since it was looked at, m; between two of its steps. [sim of before] */
-double pal_transfer_gone_m(const pal_transfer *transfer, const pal_world *before);
+double pal_transfer_drift_m(const pal_transfer *transfer, const pal_world *before);
 #endif

@@ -1,5 +1,5 @@
 /* Forces of a carry (transfer.h): from the nodes of the old body to those of the new one. */
-#include "server/sim/transfer/transfer_parts.h"
+#include "server/sim/transfer/transfer_core.h"
 
 #include "server/base/vec3.h"
 
@@ -17,7 +17,7 @@ typedef struct lookers {
     double *weight;
 } lookers;
 
-static bool find_lookers(const pal_point_rows *in, int n_from, lookers *out)
+static bool find_lookers(const pal_interpolation *in, int n_from, lookers *out)
 {
     int32_t n = in->start[in->n_row];
     out->first = calloc((size_t)n_from + 2, sizeof *out->first);
@@ -38,57 +38,57 @@ static bool find_lookers(const pal_point_rows *in, int n_from, lookers *out)
 /* old node i's force goes to the new nodes that look to it, over their masses as they do; the remainder (of nodes that
  * no new one, or next to none, looks to) by place */
 static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const lookers *l, int i,
-                       pal_row_build *rows)
+                       pal_interpolation_builder *rows)
 {
     double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
     for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
     double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
     for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
-        pal_row_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
+        pal_interpolation_builder_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
     for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)
-        pal_row_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
-    pal_row_end(rows);
+        pal_interpolation_builder_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
+    pal_interpolation_builder_end_row(rows);
 }
 
 /* old node i's force to the new nodes around it, by their masses as well: light ones, at the rim of cut elements, would
  * be thrown by what their heavy neighbours bear with ease */
-static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_row_build *rows)
+static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_interpolation_builder *rows)
 {
-    const pal_point_rows *back = &t->back;
+    const pal_interpolation *back = &t->back;
     double sum = 0;
     for (int32_t k = back->start[i]; k < back->start[i + 1]; k++)
         sum += fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
     for (int32_t k = back->start[i]; k < back->start[i + 1]; k++) {
         double share = fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
-        pal_row_add(rows, back->point[k], sum > 0 ? share / sum : back->weight[k]);
+        pal_interpolation_builder_add(rows, back->point[k], sum > 0 ? share / sum : back->weight[k]);
     }
-    pal_row_end(rows);
+    pal_interpolation_builder_end_row(rows);
 }
 
 /* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
  * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
  * look to the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
-void pal_transfer_spread(pal_transfer *t, const pal_body *from, const pal_body *to)
+void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    bool lumped = !from->embed && from->n_node >= to->n_node;
+    bool lumped = !from->interpolation && from->n_node >= to->n_node;
     lookers l = {0};
-    pal_row_build rows;
-    if (t->shell || t->spread.n_row > 0) return;
+    pal_interpolation_builder rows;
+    if (t->adaptive || t->spread.n_row > 0) return;
     if (lumped || find_lookers(&t->in, from->n_node, &l)) {
-        pal_row_build_begin(&rows, from->n_node, to->n_node, INT32_MAX);
+        pal_interpolation_builder_begin(&rows, from->n_node, to->n_node, INT32_MAX);
         for (int i = 0; i < from->n_node && !rows.err; i++) {
             if (lumped)
                 add_by_mass(t, to, i, &rows);
             else
                 add_spread(t, from, to, &l, i, &rows);
         }
-        (void)pal_row_build_finish(&rows, &t->spread);
+        (void)pal_interpolation_builder_finish(&rows, &t->spread);
     }
     free(l.first), free(l.who), free(l.weight);
 }
 
 /* how forces at old nodes go to new ones; without memory for a better way by place */
-const pal_point_rows *pal_transfer_rows(const pal_transfer *t)
+const pal_interpolation *pal_transfer_force_map(const pal_transfer *t)
 {
     return t->spread.n_row > 0 ? &t->spread : &t->back;
 }
@@ -99,14 +99,14 @@ const pal_point_rows *pal_transfer_rows(const pal_transfer *t)
  * of the step */
 static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    const pal_point_rows *rows = pal_transfer_rows(t);
+    const pal_interpolation *rows = pal_transfer_force_map(t);
     double *mass = t->bound, *moving = t->rate;
-    if (from->embed || from->implicit || t->shell) return;
+    if (from->interpolation || from->implicit || t->adaptive) return;
     memset(mass, 0, sizeof *mass * (size_t)to->n_node);
     memset(moving, 0, 3 * sizeof *moving * (size_t)to->n_node);
     for (int i = 0; i < from->n_node; i++)
-        if (from->held[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
-    pal_point_rows_pull(rows, t->moving, moving);
+        if (from->fixed[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
+    pal_interpolation_apply_transpose(rows, t->moving, moving);
     for (int i = 0; i < from->n_node; i++)
         for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
             mass[rows->point[k]] += rows->weight[k] * from->node_mass_kg[i];
@@ -118,31 +118,31 @@ static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
 
 /* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
  * before as it stands, whose g goes */
-void pal_transfer_pull(pal_transfer *t, const pal_body *from, const pal_body *to)
+void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     size_t n = 3 * (size_t)from->n_node;
     memset(t->pull, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    if (from->embed) {
+    if (from->interpolation) {
         double *a = from->g;
         for (int i = 0; i < from->n_dof; i++)
-            pal_scale3(a + 3 * i, from->held[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
-        pal_point_rows_place(from->embed, a, t->old);
+            pal_scale3(a + 3 * i, from->fixed[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
+        pal_interpolation_apply(from->interpolation, a, t->old);
         for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
     } else {
         memcpy(t->old, from->f, n * sizeof *t->old);
         for (int i = 0; i < from->n_node; i++)
-            if (from->held[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
+            if (from->fixed[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
     }
-    pal_point_rows_pull(pal_transfer_rows(t), t->old, t->pull);
+    pal_interpolation_apply_transpose(pal_transfer_force_map(t), t->old, t->pull);
     lighten(t, from, to);
 }
 
 /* lasting loads */
 void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena)
 {
-    if (!from->outer) return;
-    if (!to->outer) to->outer = PAL_NEW(arena, double, 3 * (size_t)to->n_node);
-    if (!to->outer) return;
-    memset(to->outer, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    pal_point_rows_pull(&t->back, from->outer, to->outer);
+    if (!from->external_force) return;
+    if (!to->external_force) to->external_force = PAL_NEW(arena, double, 3 * (size_t)to->n_node);
+    if (!to->external_force) return;
+    memset(to->external_force, 0, 3 * sizeof(double) * (size_t)to->n_node);
+    pal_interpolation_apply_transpose(&t->back, from->external_force, to->external_force);
 }

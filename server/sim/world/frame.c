@@ -1,20 +1,20 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/world/frame.h"
 
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 
 #include <stdlib.h>
 
 /* room for the triangles of a part that adapts; no table taken yet */
-static bool make_slots(pal_frame_part *part, const pal_shell *shell)
+static bool make_slots(pal_frame_part *part, const pal_adaptive_surface *adaptive)
 {
-    const pal_levels *levels = &shell->levels;
-    part->n_slot = shell->n_slot;
+    const pal_levels *levels = &adaptive->levels;
+    part->n_slot = adaptive->n_slot;
     part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
     part->slot_log = UINT64_MAX;
-    part->n_all = levels->n_vertex[levels->n_level - 1];
-    part->n_all_spring = pal_levels_n_edge(levels, levels->n_level - 1);
+    part->n_finest = levels->n_vertex[levels->n_level - 1];
+    part->n_finest_spring = pal_levels_n_edge(levels, levels->n_level - 1);
     return part->slot != NULL;
 }
 
@@ -30,15 +30,15 @@ pal_frame *pal_frame_create(const pal_world *world)
     pal_frame *frame = calloc(1, sizeof *frame);
     if (!frame) return NULL;
     frame->slowdown = 1;
-    for (int i = 0; i < pal_world_parts(world); i++) {
+    for (int i = 0; i < pal_world_part_count(world); i++) {
         pal_shown shown;
         pal_world_shown(world, i, &shown);
         pal_frame_part *part = &frame->part[frame->n_part++];
         part->n_vertex = shown.n_vertex;
         part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
         const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
-        bool made = part->position_m && (!shown.adapts || make_slots(part, body->shell)) &&
-                    (!body->embed || make_points(part, body));
+        bool made = part->position_m && (!shown.adapts || make_slots(part, body->adaptive)) &&
+                    (!body->interpolation || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);
             return NULL;

@@ -1,13 +1,13 @@
 /* What a step shows: copied out of the world, float metres in the scene frame, safe to read on another thread.
  * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. Room for fields comes and
  * goes with pal_frame_fit, so their pointers hold while nobody fills the frame again. */
-#ifndef PAL_SIM_FRAME_H
-#define PAL_SIM_FRAME_H
+#ifndef PAL_SIM_WORLD_FRAME_H
+#define PAL_SIM_WORLD_FRAME_H
 #include "server/sim/core/body.h"
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 #include "server/sim/core/tools.h"
 
-enum { PAL_FRAME_ROWS = 64 };
+enum { PAL_FRAME_COMPONENT_MAX = 64 };
 
 /* a field in colour; value NULL: not shown */
 typedef struct pal_frame_field {
@@ -21,20 +21,20 @@ typedef struct pal_frame_part {
     float *position_m; /* [n_vertex][3] */
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
-    char why[PAL_WHY]; /* one sentence while frozen, else empty */
-    /* since the body's reset: what kept it within its bounds (rescue.h), how many in all, and their time */
-    pal_rescues rescue;
+    char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
+    /* since the body's reset: what kept it within its bounds (safeguards.h), how many in all, and their time */
+    pal_safeguards safeguards;
     uint64_t n_rescue, rescue_ns;
     bool asleep;       /* at rest: its rows are not run until something comes near (row sleep)      */
     uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
-    /* bodies that adapt (sim/shell.h): the table of drawn triangles at this revision, 0 0 0 in empty places. Vertices
-     * of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
+    /* bodies that adapt (sim/adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty places.
+     * Vertices of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
     int n_slot;
-    int32_t *slot;           /* [n_slot][3]                                      */
-    uint64_t slot_log;       /* changes taken in so far, of pal_shell.n_log      */
-    int n_active, n_spring;  /* nodes and springs now                            */
-    int n_all, n_all_spring; /* and if all of the body were of its finest level  */
+    int32_t *slot;                 /* [n_slot][3]                                      */
+    uint64_t slot_log;             /* changes taken in so far, of pal_adaptive_surface.n_log      */
+    int n_active, n_spring;        /* nodes and springs now                            */
+    int n_finest, n_finest_spring; /* and if all of the body were of its finest level  */
     /* bodies whose nodes are carried by control points (body.embed): those, body frame, for sculpting */
     int n_point;     /* 0: another body */
     double *point_m; /* [n_point][3]    */
@@ -47,9 +47,9 @@ typedef struct pal_frame_tool {
     double force_N[3]; /* on the tool, mean over the step                */
     double radius_m;
     int n_patch;
-    pal_patch patch[PAL_PATCH_MAX];
-    bool has_grip;
-    double grip_x0_m[3], grip_f0_N[3], grip_k_N_m[6], grip_b_Ns_m;
+    pal_contact_patch patch[PAL_CONTACT_PATCH_MAX];
+    bool has_grasp;
+    double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m;
 } pal_frame_tool;
 
 typedef struct pal_frame {
@@ -69,8 +69,8 @@ typedef struct pal_frame {
     int n_tool;
     pal_frame_tool tool[PAL_TOOL_MAX];
     int n_row;
-    uint32_t row_ns[PAL_FRAME_ROWS];      /* of the last step, in the plan's order           */
-    const char *row_name[PAL_FRAME_ROWS]; /* constants; more than at load while fields are shown */
-    int row_body[PAL_FRAME_ROWS];         /* whose row it is                                     */
+    uint32_t component_ns[PAL_FRAME_COMPONENT_MAX];      /* of the last step, in the plan's order           */
+    const char *component_name[PAL_FRAME_COMPONENT_MAX]; /* constants; more than at load while fields are shown */
+    int component_body[PAL_FRAME_COMPONENT_MAX];         /* whose row it is                                     */
 } pal_frame;
 #endif

@@ -1,13 +1,13 @@
 /* The world: steps a plan. Reading order: pal_world_step at the end. */
-#include "server/sim/world/world_parts.h"
+#include "server/sim/world/world_core.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/plan/plan.h"
-#include "server/sim/recovery/brake.h"
-#include "server/sim/subdivision/solid_body.h"
-#include "server/sim/surface/shell.h"
-#include "server/sim/world/field.h"
+#include "server/sim/recovery/stiffening_damper.h"
+#include "server/sim/subdivision/subdivision_body.h"
+#include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/field_components.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@
 
 /* ---- load ---- */
 
-pal_step pal_world_step_of(pal_world *w, int b)
+pal_step pal_world_body_step(pal_world *w, int b)
 {
     pal_plan *p = &w->plan;
     return (pal_step){.body = &p->body[b],
@@ -35,9 +35,9 @@ double pal_world_find_limit(pal_world *w, int sub)
 {
     double least = INFINITY;
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = pal_world_step_of(w, b);
+        pal_step step = pal_world_body_step(w, b);
         step.sub = sub;
-        const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        const pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         if (step.body->frozen || step.body->asleep || !solve->effect->limit) continue;
         double limit = solve->effect->limit(solve->self, &step);
         step.body->dt_limit_s = limit;
@@ -54,19 +54,19 @@ double pal_world_find_limit(pal_world *w, int sub)
 static int count_substeps(const pal_world *w, double time_s, double limit_s)
 {
     double n = ceil(time_s / limit_s * (1 - 1e-12));
-    return n < 1 ? 1 : n > w->most_substep ? w->most_substep + 1 : (int)n;
+    return n < 1 ? 1 : n > w->max_substep ? w->max_substep + 1 : (int)n;
 }
 
 static bool refines(const pal_world *w, int b)
 {
-    return w->plan.body[b].shell && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
+    return w->plan.body[b].adaptive && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
 }
 
 /* what FORCE rows have kept of the last forces (turns of elements), so that a new world is as one that was reset */
 static void forget_forces(pal_world *w, int b)
 {
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
-        const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
+        const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
         if (row->effect->reset) row->effect->reset(row->self, &w->plan.body[b]);
     }
 }
@@ -78,19 +78,19 @@ static double find_rest_limit(pal_world *w)
     double least = INFINITY, limit_s = w->limit_s;
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_body *body = &w->plan.body[b];
-        const pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        const pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         if (!solve->effect->limit) continue;
         double *x = body->x, *d = body->d;
         body->x = body->x_rest;
-        if (!body->embed) body->d = body->x_rest;
-        pal_body_place(body);
-        pal_step step = pal_world_step_of(w, b);
+        if (!body->interpolation) body->d = body->x_rest;
+        pal_body_update_nodes(body);
+        pal_step step = pal_world_body_step(w, b);
         step.n_contact = 0;
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
-        pal_body_place(body);
+        pal_body_update_nodes(body);
         /* refinement may bring the finest level, each level about half the step (C eq. 9) */
-        if (refines(w, b)) limit = ldexp(limit, body->shell->finest + 1 - body->shell->levels.n_level);
+        if (refines(w, b)) limit = ldexp(limit, body->adaptive->finest + 1 - body->adaptive->levels.n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
         if (body->solid) forget_forces(w, b);
         if (!(limit >= least)) least = limit;
@@ -99,20 +99,20 @@ static double find_rest_limit(pal_world *w)
     return least;
 }
 
-pal_err pal_world_check_budget(pal_world *w, pal_note *note)
+pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
 {
     double limit = find_rest_limit(w);
     int n = count_substeps(w, w->step_s, limit);
     bool adapts = false;
     for (int b = 0; b < w->plan.n_body; b++) adapts |= refines(w, b);
-    if (!(limit > 0) || n > w->most_substep) {
+    if (!(limit > 0) || n > w->max_substep) {
         char who[120];
-        pal_world_name_limit(w, who, sizeof who);
-        return pal_note_set(
-            note, PAL_ERR_BUDGET,
+        pal_world_describe_limit(w, who, sizeof who);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_BUDGET,
             "a step of %g s needs %.0f sub-steps of %.3g s%s%s, most_substep allows %d: take a softer or "
             "denser material, larger elements%s or a shorter step",
-            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "", who, w->most_substep,
+            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "", who, w->max_substep,
             adapts ? ", fewer levels" : "");
     }
     w->rest_limit_s = limit;
@@ -138,9 +138,9 @@ static pal_err make_part(pal_world *w, int b)
     pal_world_part *p = &w->part[b];
     const double *x = body->skin ? body->surface->x : body->node_rest;
     if (body->n_shown == 0) return PAL_ERR_OK;
-    const int32_t *tri = body->shell ? body->shell->slot : body->surface->tri;
+    const int32_t *tri = body->adaptive ? body->adaptive->slot : body->surface->tri;
     p->n_vertex = body->n_shown;
-    p->n_tri = body->shell ? body->shell->n_slot : body->surface->n_tri;
+    p->n_tri = body->adaptive ? body->adaptive->n_slot : body->surface->n_tri;
     p->rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
     p->tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
     if (!p->rest_m || !p->tri) return PAL_ERR_MEMORY;
@@ -149,7 +149,7 @@ static pal_err make_part(pal_world *w, int b)
         for (int c = 0; c < 3; c++) p->rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
     }
     memcpy(p->tri, tri, 3 * sizeof *tri * (size_t)p->n_tri);
-    return body->shell ? make_parents(w, &body->shell->levels, p) : PAL_ERR_OK;
+    return body->adaptive ? make_parents(w, &body->adaptive->levels, p) : PAL_ERR_OK;
 }
 
 /* tools with the defaults that depend on bodies */
@@ -158,20 +158,20 @@ static void make_tools(pal_world *w, const pal_scene *scene)
     w->tools.n_tool = scene->n_tool;
     for (int t = 0; t < scene->n_tool; t++) {
         double radius = scene->tool[t].radius_m;
-        w->tools.tool[t].radius_m = radius > 0 ? radius : 0.04 * w->plan.body[0].size_m;
+        w->tools.tool[t].radius_m = radius > 0 ? radius : 0.04 * w->plan.body[0].length_scale_m;
         w->tools.tool[t].force_cap_N = scene->tool[t].force_cap_N;
     }
 }
 
 void pal_world_show(pal_world *w, int b)
 {
-    pal_step step = pal_world_step_of(w, b);
+    pal_step step = pal_world_body_step(w, b);
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
-        pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
+        pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
         row->n_run++;
         (void)row->effect->run(row->self, &step);
     }
-    pal_body_add_lag(step.body);
+    pal_body_add_display_offset(step.body);
     pal_arena_reset(w->scratch);
     step.body->n_output++;
     step.body->stale = false;
@@ -182,34 +182,34 @@ void pal_world_show_all(pal_world *w)
     for (int b = 0; b < w->plan.n_body; b++) pal_world_show(w, b);
 }
 
-static pal_err create(pal_world *w, const pal_scene *scene, pal_note *note)
+static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_scene_check(scene, note));
+    PAL_TRY(pal_scene_check(scene, diag));
     w->arena = pal_arena_create(1 << 20, true);
     if (!w->arena) return PAL_ERR_MEMORY;
     w->step_s = scene->step_s;
-    w->most_substep = scene->most_substep;
-    PAL_TRY(pal_plan_build(scene, w->arena, note, &w->plan));
+    w->max_substep = scene->max_substep;
+    PAL_TRY(pal_plan_build(scene, w->arena, diag, &w->plan));
     w->scratch = pal_arena_create(w->plan.scratch_byte + 64, false);
     if (!w->scratch) return PAL_ERR_MEMORY;
     make_tools(w, scene);
     for (int b = 0; b < w->plan.n_body; b++) {
         w->material[b] = scene->body[b].material;
-        PAL_TRY(pal_material_check(&w->material[b], note));
+        PAL_TRY(pal_material_check(&w->material[b], diag));
         PAL_TRY(make_part(w, b));
     }
-    PAL_TRY(pal_field_check(&w->plan, note));
-    PAL_TRY(pal_world_check_budget(w, note));
+    PAL_TRY(pal_field_components_check(&w->plan, diag));
+    PAL_TRY(pal_world_check_budget(w, diag));
     w->n_substep = count_substeps(w, w->step_s, pal_world_find_limit(w, 0));
     pal_world_show_all(w);
     return PAL_ERR_OK;
 }
 
-pal_err pal_world_create(const pal_scene *scene, pal_note *note, pal_world **out)
+pal_err pal_world_create(const pal_scene *scene, pal_diagnostic *diag, pal_world **out)
 {
     pal_world *w = calloc(1, sizeof *w);
-    pal_err err = w ? create(w, scene, note) : PAL_ERR_MEMORY;
-    if (err == PAL_ERR_MEMORY) pal_note_set(note, err, "out of memory for the scene \"%s\"", scene->name);
+    pal_err err = w ? create(w, scene, diag) : PAL_ERR_MEMORY;
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "out of memory for the scene \"%s\"", scene->name);
     if (err)
         pal_world_destroy(w);
     else
@@ -221,9 +221,9 @@ void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
     pal_plan_free(&world->plan);
-    pal_field_free(&world->fields);
-    pal_brush_rows_free(&world->brushes);
-    pal_ease_rows_free(&world->eases);
+    pal_field_components_free(&world->fields);
+    pal_brush_components_free(&world->brushes);
+    pal_blend_components_free(&world->blends);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -232,31 +232,32 @@ void pal_world_destroy(pal_world *world)
 /* ---- a step ---- */
 
 /* stored in the rows of a body */
-double pal_world_row_energy_J(const pal_world *w, int b)
+double pal_world_component_energy_J(const pal_world *w, int b)
 {
     double sum = 0;
     for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_row *row = &w->plan.row[i];
-        if (w->plan.row_body[i] == b && row->effect->energy) sum += row->effect->energy(row->self, &w->plan.body[b]);
+        const pal_component *row = &w->plan.row[i];
+        if (w->plan.component_body[i] == b && row->effect->energy)
+            sum += row->effect->energy(row->self, &w->plan.body[b]);
     }
     return sum;
 }
 
-pal_err pal_world_pull(pal_world *world, int body)
+pal_err pal_world_assemble_forces(pal_world *world, int body)
 {
-    pal_step step = pal_world_step_of(world, body);
+    pal_step step = pal_world_body_step(world, body);
     pal_body_begin_loads(step.body);
-    pal_err err = pal_gather(&step);
+    pal_err err = pal_assemble_forces(&step);
     pal_arena_reset(world->scratch);
     return err;
 }
 
 /* a row that fails stops its body alone; true: it has */
-static bool fails(pal_world *w, pal_body *body, const pal_row *row, pal_err err)
+static bool fails(pal_world *w, pal_body *body, const pal_component *row, pal_err err)
 {
     if (!err) return false;
     pal_body_stop(body, -1, "row %s: %s", row->effect->name, pal_err_text(err));
-    if (!w->row_err) w->row_err = err;
+    if (!w->component_err) w->component_err = err;
     return true;
 }
 
@@ -266,9 +267,9 @@ static void run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
     pal_body_begin_loads(body);
-    if (body->outer) pal_body_cap_loads(body, true);
+    if (body->external_force) pal_body_cap_loads(body, true);
     for (int i = 0; i < step->n_contact; i++) {
-        pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
+        pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
         row->n_run++;
         if (fails(w, body, row, row->effect->run(row->self, step))) return;
@@ -288,22 +289,22 @@ static void run_substep(pal_world *w, pal_step *shared)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
         if (w->plan.body[b].frozen || w->plan.body[b].asleep) continue;
-        pal_step step = pal_world_step_of(w, b);
+        pal_step step = pal_world_body_step(w, b);
         step.body->stale = true;
         step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
         step.time_s = shared->time_s;
         step.heavy = shared->heavy && step.body->dt_limit_s < step.dt_s;
-        step.body->rescue.n_heavy += step.heavy;
+        step.body->safeguards.n_mass_scaled += step.heavy;
         run_contact(w, &step, b);
-        pal_row *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
         solve->n_run++;
         if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
         /* nodes follow their points, for contact and for what comes after the step */
-        if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_place(step.body);
+        if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_update_nodes(step.body);
         uint64_t took = pal_clock_ns() - before;
         solve->spent_ns += took - (force_ns(&step) - forces);
-        if (step.heavy) step.body->rescue.ns += took;
+        if (step.heavy) step.body->safeguards.ns += took;
         pal_arena_reset(w->scratch);
     }
 }
@@ -312,16 +313,16 @@ static void run_substep(pal_world *w, pal_step *shared)
 static void run_stage(pal_world *w, pal_stage stage, double dt_s)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = pal_world_step_of(w, b);
+        pal_step step = pal_world_body_step(w, b);
         step.dt_s = dt_s;
         step.n_sub = 1;
         bool output = stage == PAL_STAGE_OUTPUT,
-             skips = output ? w->unwatched && !step.body->asleep : step.body->asleep;
+             skips = output ? w->unobserved && !step.body->asleep : step.body->asleep;
         /* a body that fell asleep in this step is shown where it lies: that is how tools are seen to come near */
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         int n_run = 0;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
-            pal_row *row = &w->plan.row[w->plan.first[stage][b] + i];
+            pal_component *row = &w->plan.row[w->plan.first[stage][b] + i];
             /* a frozen body is shown where it stopped, as long as that is somewhere; its guard may put it back */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
@@ -333,7 +334,7 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         }
         pal_arena_reset(w->scratch);
         if (!output) continue;
-        if (n_run > 0) pal_body_add_lag(step.body);
+        if (n_run > 0) pal_body_add_display_offset(step.body);
         step.body->n_output++, step.body->stale = false;
     }
 }
@@ -342,17 +343,17 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
  * may touch it */
 static void begin_step(pal_world *w, double dt_s)
 {
-    bool held = false;
-    for (int t = 0; t < w->tools.n_tool; t++) held |= w->tools.tool[t].present || w->tools.tool[t].ramp > 0;
+    bool fixed = false;
+    for (int t = 0; t < w->tools.n_tool; t++) fixed |= w->tools.tool[t].present || w->tools.tool[t].ramp > 0;
     for (int b = 0; b < w->plan.n_body; b++) {
-        pal_step step = pal_world_step_of(w, b);
+        pal_step step = pal_world_body_step(w, b);
         step.dt_s = dt_s, step.n_sub = 1;
         for (int i = 0; i < w->plan.n_of[PAL_STAGE_GUARD][b] && step.body->asleep; i++) {
-            const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_GUARD][b] + i];
+            const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_GUARD][b] + i];
             if (row->effect->wakes && row->effect->wakes(row->self, &step)) step.body->asleep = false;
         }
-        bool touched = held && step.n_contact > 0 && !step.body->frozen && !step.body->asleep;
-        if (w->unwatched && touched && step.body->stale) pal_world_show(w, b);
+        bool touched = fixed && step.n_contact > 0 && !step.body->frozen && !step.body->asleep;
+        if (w->unobserved && touched && step.body->stale) pal_world_show(w, b);
     }
 }
 
@@ -364,7 +365,7 @@ static void run_substeps(pal_world *w, double dt_s)
     pal_step step = {.dt_s = 0};
     for (int sub = 0; sub == 0 || sub < n_sub; sub++) {
         double limit = pal_world_find_limit(w, sub), left_s = dt_s - done_s;
-        int budget = w->most_substep - sub;
+        int budget = w->max_substep - sub;
         if (sub == 0 || step.dt_s > limit) {
             int n = count_substeps(w, left_s, limit);
             step.heavy = n > budget;
@@ -373,7 +374,7 @@ static void run_substeps(pal_world *w, double dt_s)
         }
         step.sub = sub, step.n_sub = n_sub;
         step.time_s = w->time_s + done_s + step.dt_s;
-        pal_tools_advance(&w->tools, sub, n_sub, step.dt_s);
+        pal_tools_begin_substep(&w->tools, sub, n_sub, step.dt_s);
         run_substep(w, &step);
         done_s += step.dt_s;
     }
@@ -392,24 +393,25 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     pal_world *w = world;
     if (!(dt_s > 0) || !isfinite(dt_s)) return PAL_ERR_REFUSED;
     /* a step that is too long at rest is refused; deformation is dealt with on the way */
-    if (count_substeps(w, dt_s, w->rest_limit_s) > w->most_substep) return PAL_ERR_BUDGET;
+    if (count_substeps(w, dt_s, w->rest_limit_s) > w->max_substep) return PAL_ERR_BUDGET;
     uint64_t began = pal_clock_thread_ns();
     int frozen = count_frozen(w);
     for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
-    for (int t = 0; t < w->tools.n_tool; t++) pal_tool_take(&w->tools.tool[t], w->has_asked[t] ? &w->asked[t] : NULL);
-    w->row_err = PAL_ERR_OK;
+    for (int t = 0; t < w->tools.n_tool; t++)
+        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL);
+    w->component_err = PAL_ERR_OK;
     begin_step(w, dt_s);
     run_substeps(w, dt_s);
-    pal_tools_finish(&w->tools, w->n_substep);
+    pal_tools_end_step(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;
-    for (int b = 0; b < w->plan.n_body; b++) pal_brake_pass(&w->plan.body[b], dt_s);
+    for (int b = 0; b < w->plan.n_body; b++) pal_stiffening_damper_advance(&w->plan.body[b], dt_s);
     run_stage(w, PAL_STAGE_ADAPT, dt_s);
     run_stage(w, PAL_STAGE_GUARD, dt_s);
     run_stage(w, PAL_STAGE_OUTPUT, dt_s);
     w->step_ns = pal_clock_thread_ns() - began;
     w->end_ns = pal_clock_ns();
-    return w->row_err ? w->row_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
+    return w->component_err ? w->component_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
 }
 
 /* ---- what others see: frames and shown surfaces are in world_show.c ---- */
@@ -428,17 +430,18 @@ double pal_world_energy_J(const pal_world *world)
 {
     double sum = 0;
     for (int b = 0; b < world->plan.n_body; b++)
-        sum += pal_body_kinetic_J(&world->plan.body[b]) + pal_world_row_energy_J(world, b);
+        sum += pal_body_kinetic_J(&world->plan.body[b]) + pal_world_component_energy_J(world, b);
     return sum;
 }
 
 size_t pal_world_bytes(const pal_world *world)
 {
-    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte + pal_field_bytes(&world->fields) +
-           pal_brush_rows_bytes(&world->brushes) + pal_ease_rows_bytes(&world->eases) + pal_plan_bytes(&world->plan);
+    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte +
+           pal_field_components_bytes(&world->fields) + pal_brush_components_bytes(&world->brushes) +
+           pal_blend_components_bytes(&world->blends) + pal_plan_bytes(&world->plan);
 }
 
-int pal_world_bodies(const pal_world *world)
+int pal_world_body_count(const pal_world *world)
 {
     return world->plan.n_body;
 }
@@ -455,7 +458,7 @@ const pal_tools *pal_world_tools(const pal_world *world)
 
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out)
 {
-    const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    const pal_component *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
     *out = (pal_solve_report){0};
     if (solve->effect->report) solve->effect->report(solve->self, out);
     return solve->effect->report != NULL;

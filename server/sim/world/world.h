@@ -3,8 +3,8 @@
  *
  * Scene frame: metres, origin at the first body's mesh origin; the others are offset by the difference of their
  * meshes' origin_m. Poses and frames use it. */
-#ifndef PAL_SIM_WORLD_H
-#define PAL_SIM_WORLD_H
+#ifndef PAL_SIM_WORLD_WORLD_H
+#define PAL_SIM_WORLD_WORLD_H
 #include "server/sim/core/brush.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/world/frame.h"
@@ -12,14 +12,14 @@
 typedef struct pal_world pal_world;
 
 /* one row of the plan, for people and the panel */
-typedef struct pal_row_info {
+typedef struct pal_component_info {
     const char *name, *body, *stage;
     size_t n_byte;
-    uint64_t spent_ns; /* last step */
-    uint64_t n_run;    /* times it was run since load */
-    const char *why;   /* what in the scene calls for it: "bodies[0].effects[2]"; lives as long as the world */
-    bool fixed;        /* pal_world_switch_row would refuse to switch it off now */
-} pal_row_info;
+    uint64_t spent_ns;  /* last step */
+    uint64_t n_run;     /* times it was run since load */
+    const char *reason; /* what in the scene calls for it: "bodies[0].effects[2]"; lives as long as the world */
+    bool fixed;         /* pal_world_switch_component would refuse to switch it off now */
+} pal_component_info;
 
 /* shown surface of a part; pointers borrow from the world and its scene and do not change while revision is the same */
 typedef struct pal_shown {
@@ -39,7 +39,7 @@ typedef struct pal_shown {
     const int32_t *coarse_tri; /* triangles of the vertices below n_coarse [n_coarse_tri][3] */
 } pal_shown;
 
-pal_err pal_world_create(const pal_scene *scene, pal_note *note,
+pal_err pal_world_create(const pal_scene *scene, pal_diagnostic *diag,
                          pal_world **out); /* [load] borrows scene's meshes, copies the rest */
 void pal_world_destroy(pal_world *world);  /* [load] */
 
@@ -47,10 +47,10 @@ void pal_world_destroy(pal_world *world);  /* [load] */
  * not finite, a position farther than 100 body sizes, a tool that does not exist. [sim] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
 /* moves on by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number; BUDGET: more sub-steps than
- * scene->most_substep even at rest, a body that refines being on its finest level (both: nothing moved); FROZEN when a
+ * scene->max_substep even at rest, a body that refines being on its finest level (both: nothing moved); FROZEN when a
  * body diverged in this step and was frozen (body.why), or what a row gave that failed and froze its body: the other
  * bodies have moved on all the same. Where deformation alone asks for more than the budget, the step goes on
- * with heavier nodes (pal_body.n_heavy). [sim]
+ * with heavier nodes (pal_body.n_mass_scaled). [sim]
  */
 pal_err pal_world_step(pal_world *world, double dt_s);
 /* every body back to rest, tools let go, time 0. [sim] */
@@ -59,38 +59,38 @@ void pal_world_reset(pal_world *world);
  * bodies, tools and time go on as if nothing had been. REFUSED: no such body. [sim] */
 pal_err pal_world_reset_body(pal_world *world, int body);
 /* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
-pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note);
+pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag);
 /* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body
  * takes memory. Of a body that adapts a node out of use is no such node, and the load of one that goes out of use waits
- * until it is in use again. A node bears pal_body_bears_N of it, and of a body that is held still less and less from 2
- * S off its rest place on, a hundredth of that from 4 S (rescue.n_capped). REFUSED: not finite, no such node; MEMORY.
- * [load] */
+ * until it is in use again. A node bears pal_body_node_load_cap_N of it, and of a body that is held still less and less
+ * from 2 S off its rest place on, a hundredth of that from 4 S (rescue.n_capped). REFUSED: not finite, no such node;
+ * MEMORY. [load] */
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
-/* A field of a body in colour (row field_out, 10 times a simulated second): wanted, the row is put into the running
+/* A field of a body in colour (row field_output, 10 times a simulated second): wanted, the row is put into the running
  * plan with memory of its own and its values are there at once; not wanted, row and memory are gone again. What the
  * scene asks for itself stays either way. Poses, motion and hash know nothing of it. REFUSED: no such body, or its
  * model does not give the field (one sentence); MEMORY. Between steps; takes and frees heap memory. [sim] */
-pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note);
-bool pal_world_gives(const pal_world *world, int body, pal_field field); /* would it be refused? */
+pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_diagnostic *diag);
+bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* would it be refused? */
 
 /* What the hand of a tool does to a body (brush.h): begins, changes, or with kind NONE or NULL ends the brush of slot
  * 0..PAL_TOOL_MAX-1. The first brush of a body puts the row `brush` into the running plan. Letting a tool go ends the
  * brushes of its slot, a reset ends all at once. REFUSED (one sentence): no such body or slot, a body without brushes,
  * a bad number, nothing within reach; MEMORY; both change nothing. Between steps; takes heap memory. [sim] */
-pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note);
-/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_EASE_STEPS steps (ease.h): what
- * makes up for a change between two steps. Replaces one that still acts; reset ends it. REFUSED: no such body; MEMORY.
- * Between steps; takes heap memory. [sim] */
-pal_err pal_world_ease(pal_world *world, int body, const double *force_N);
+pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag);
+/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_BLEND_STEPS steps
+ * (blend_component.h): what makes up for a change between two steps. Replaces one that still acts; reset ends it.
+ * REFUSED: no such body; MEMORY. Between steps; takes heap memory. [sim] */
+pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N);
 /* The way from where a body is shown by its nodes to where it is shown now, m, body frame [n_shown][3]: added to what
- * is shown and touched, and let go with that load over as many steps (body.lag_m), so that a change between two steps
- * moves no shown vertex by more than a tenth of it in a frame. Shows the body at once. REFUSED: no such body; MEMORY.
- * Between steps; takes heap memory. [sim] */
-pal_err pal_world_lag(pal_world *world, int body, const float *lag_m);
+ * is shown and touched, and let go with that load over as many steps (body.display_offset_m), so that a change between
+ * two steps moves no shown vertex by more than a tenth of it in a frame. Shows the body at once. REFUSED: no such body;
+ * MEMORY. Between steps; takes heap memory. [sim] */
+pal_err pal_world_blend_display(pal_world *world, int body, const float *display_offset_m);
 /* rows of brushes and loads that have gone out are taken out of the plan. After every step of a world that shall be
  * repeatable to the bit, as sub-steps may depend on the row; frees heap memory. [sim] */
-void pal_world_tidy(pal_world *world);
+void pal_world_remove_idle(pal_world *world);
 
 /* Switches a row off, or on again, in the running world. Off: the row is gone from the plan with its memory, as if the
  * scene had no such entry; what it did goes on from where it is (x, v and all else stay, the row's energy leaves the
@@ -100,8 +100,8 @@ void pal_world_tidy(pal_world *world);
  * scene: the one that the world was made from. Nothing and OK when it is so already. REFUSED (one sentence, nothing
  * changed): no such body, no entry asks for such a row, the body's solver, what it shows, its last elastic row, a
  * support that moves; BUDGET: too stiff for the step; MEMORY. Between steps; takes and frees heap memory. [sim] */
-pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
-                             pal_note *note);
+pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+                                   pal_diagnostic *diag);
 
 /* Bodies that sleep (row sleep) are awake in the next step: for measuring what a step costs. [sim] */
 void pal_world_wake(pal_world *world);
@@ -115,10 +115,10 @@ void pal_world_watch(pal_world *world, bool watched);
  * many points x, v, lasting loads and, of those that adapt, the levels. x, v [n_dof][3] are the state of body `edited`
  * in their place (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are
  * over. Both stand still. Heap memory when a material has changed. [sim] */
-void pal_world_follow(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
+void pal_world_transfer(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
 /* after it, of the edited body: each lasting load goes to the node that is nearest at rest to the one that bore it;
  * their sum stays. Without memory it bears none. [sim] */
-void pal_world_loads_by_place(pal_world *world, int body, const pal_world *before);
+void pal_world_transfer_loads(pal_world *world, int body, const pal_world *before);
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
 /* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
@@ -129,26 +129,27 @@ void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
 pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */
 
-uint64_t pal_world_tick(const pal_world *world);                                  /* steps since create or reset */
-double pal_world_time_s(const pal_world *world);                                  /* simulated since then         */
-void pal_world_material_now(const pal_world *world, int body, pal_material *out); /* with live edits; copies */
-int pal_world_rows(const pal_world *world);
-void pal_world_row(const pal_world *world, int row, pal_row_info *out);
-int pal_world_parts(const pal_world *world);
+uint64_t pal_world_tick(const pal_world *world);                                      /* steps since create or reset */
+double pal_world_time_s(const pal_world *world);                                      /* simulated since then         */
+void pal_world_current_material(const pal_world *world, int body, pal_material *out); /* with live edits; copies */
+int pal_world_component_count(const pal_world *world);
+void pal_world_component_info(const pal_world *world, int row, pal_component_info *out);
+int pal_world_part_count(const pal_world *world);
 void pal_world_shown(const pal_world *world, int part, pal_shown *out);
 double pal_world_limit_s(const pal_world *world);  /* largest stable sub-step at the end of the last step */
 int pal_world_substeps(const pal_world *world);    /* of the last step; before it: of the scene's step at rest */
 double pal_world_energy_J(const pal_world *world); /* kinetic and of every row that has one */
 size_t pal_world_bytes(const pal_world *world);    /* memory of the world's arenas           */
 /* for tests, tools and the lab: the bodies themselves [sim] */
-int pal_world_bodies(const pal_world *world);
+int pal_world_body_count(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
-const pal_body *pal_world_look(const pal_world *world, int body); /* the same to read */
+const pal_body *pal_world_view_body(const pal_world *world, int body); /* the same to read */
 /* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact; what a row failed with [sim]
  */
-pal_err pal_world_pull(pal_world *world, int body);
-void pal_world_moved(pal_world *world, int body); /* after its x was set from outside: limits are taken anew */
-const pal_row *pal_world_effect(const pal_world *world, int row); /* the row itself, in the plan's order */
+pal_err pal_world_assemble_forces(pal_world *world, int body);
+void pal_world_invalidate_limits(pal_world *world,
+                                 int body); /* after its x was set from outside: limits are taken anew */
+const pal_component *pal_world_component(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
 /* what the solver of a body says of itself; false: it says nothing */
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out);

@@ -1,23 +1,23 @@
 /* Commands to a world between two steps: poses, resets, materials, fields, brushes, rows. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/recovery/brake.h"
-#include "server/sim/subdivision/solid_body.h"
-#include "server/sim/surface/shell.h"
-#include "server/sim/world/world_parts.h"
+#include "server/sim/recovery/stiffening_damper.h"
+#include "server/sim/subdivision/subdivision_body.h"
+#include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world_core.h"
 
 #include <string.h>
 
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
 {
     if (tool < 0 || tool >= world->tools.n_tool) return PAL_ERR_REFUSED;
-    if (pose && !pal_pose_ok(pose, 100 * world->plan.body[0].size_m)) return PAL_ERR_REFUSED;
-    world->has_asked[tool] = pose != NULL;
+    if (pose && !pal_pose_ok(pose, 100 * world->plan.body[0].length_scale_m)) return PAL_ERR_REFUSED;
+    world->has_requested_pose[tool] = pose != NULL;
     if (pose) {
         world->asked[tool] = *pose;
         world->pose_ns[tool] = pal_clock_ns();
     } else {
-        pal_brush_rows_end(&world->brushes, tool);
+        pal_brush_components_end(&world->brushes, tool);
     }
     return PAL_ERR_OK;
 }
@@ -32,15 +32,15 @@ static void rest_body(pal_world *w, int b)
     memset(body->g, 0, n_byte);
     memset(body->f, 0, n_load);
     memset(body->load, 0, n_load);
-    if (body->outer) memset(body->outer, 0, n_load);
-    pal_body_place(body);
+    if (body->external_force) memset(body->external_force, 0, n_load);
+    pal_body_update_nodes(body);
     body->frozen = body->asleep = false;
-    body->brake_1_s = body->brake_s = 0;
-    body->why[0] = 0;
-    body->rescue = (pal_rescues){0};
+    body->stiffening_damping_1_s = body->stiffening_damping_s = 0;
+    body->reason[0] = 0;
+    body->safeguards = (pal_safeguards){0};
     for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_row *row = &w->plan.row[i];
-        if (w->plan.row_body[i] == b && row->effect->reset) row->effect->reset(row->self, body);
+        const pal_component *row = &w->plan.row[i];
+        if (w->plan.component_body[i] == b && row->effect->reset) row->effect->reset(row->self, body);
     }
 }
 
@@ -59,7 +59,7 @@ void pal_world_reset(pal_world *world)
     for (int t = 0; t < world->tools.n_tool; t++) {
         const pal_tool *old = &world->tools.tool[t];
         world->tools.tool[t] = (pal_tool){.radius_m = old->radius_m, .force_cap_N = old->force_cap_N};
-        world->has_asked[t] = false;
+        world->has_requested_pose[t] = false;
     }
     world->tick = 0;
     world->time_s = 0;
@@ -67,84 +67,86 @@ void pal_world_reset(pal_world *world)
     pal_world_show_all(world);
 }
 
-static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_note *note)
+static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_diagnostic *diag)
 {
     pal_body *body = &w->plan.body[b];
-    if (body->solid) pal_solid_material(body, to);
+    if (body->solid) pal_subdivision_solid_set_material(body, to);
     for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_row *row = &w->plan.row[i];
-        if (w->plan.row_body[i] != b || !row->effect->material) continue;
-        PAL_TRY(row->effect->material(row->self, body, to, note));
+        const pal_component *row = &w->plan.row[i];
+        if (w->plan.component_body[i] != b || !row->effect->material) continue;
+        PAL_TRY(row->effect->material(row->self, body, to, diag));
     }
     double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
     for (int i = 0; i < body->n_dof && !body->solid; i++) body->mass_kg[i] *= ratio;
-    if (body->shell) {
-        body->shell->options.mass_kg *= ratio;
-        for (int l = 0; l < body->shell->levels.n_level; l++) body->shell->level_mass_kg[l] *= ratio;
+    if (body->adaptive) {
+        body->adaptive->options.mass_kg *= ratio;
+        for (int l = 0; l < body->adaptive->levels.n_level; l++) body->adaptive->level_mass_kg[l] *= ratio;
     }
-    body->load_cap_N = pal_body_cap_N(body, to->young_Pa);
-    body->corner_kg *= ratio;
+    body->load_cap_N = pal_body_load_cap_N(body, to->young_Pa);
+    body->full_corner_kg *= ratio;
     w->material[b] = *to;
     return PAL_ERR_OK;
 }
 
-pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_note *note)
+pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag)
 {
     if (body < 0 || body >= world->plan.n_body)
-        return pal_note_set(note, PAL_ERR_REFUSED, "body %d does not exist", body);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", body);
     pal_material to = *material, was = world->material[body];
-    PAL_TRY(pal_material_check(&to, note));
+    PAL_TRY(pal_material_check(&to, diag));
     world->plan.body[body].asleep = false;
     /* asking rows for their energy may change what they keep: only where it may matter */
-    bool brakes = !world->plan.body[body].implicit && !world->plan.body[body].embed && to.young_Pa > 10 * was.young_Pa;
-    double before_J = brakes ? pal_world_row_energy_J(world, body) : 0;
-    pal_err err = apply_material(world, body, &to, note);
-    if (!err) err = pal_world_check_budget(world, note);
-    if (!err && brakes) pal_brake_begin(&world->plan.body[body], before_J, pal_world_row_energy_J(world, body));
+    bool brakes =
+        !world->plan.body[body].implicit && !world->plan.body[body].interpolation && to.young_Pa > 10 * was.young_Pa;
+    double before_J = brakes ? pal_world_component_energy_J(world, body) : 0;
+    pal_err err = apply_material(world, body, &to, diag);
+    if (!err) err = pal_world_check_budget(world, diag);
+    if (!err && brakes)
+        pal_stiffening_damper_begin(&world->plan.body[body], before_J, pal_world_component_energy_J(world, body));
     /* constants are functions of the material, so putting the old one back puts everything back */
     if (err) (void)apply_material(world, body, &was, NULL);
     pal_world_find_limit(world, 0);
     return err;
 }
 
-bool pal_world_gives(const pal_world *world, int body, pal_field field)
+bool pal_world_has_field(const pal_world *world, int body, pal_field field)
 {
-    return pal_field_given(&world->plan, body, field);
+    return pal_field_components_given(&world->plan, body, field);
 }
 
-pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_note *note)
+pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_diagnostic *diag)
 {
     pal_step step = {.dt_s = 0};
-    if (body >= 0 && body < world->plan.n_body) step = pal_world_step_of(world, body);
-    if (wanted) return pal_field_add(&world->fields, &world->plan, body, field, &step, note);
-    pal_field_drop(&world->fields, &world->plan, body, field);
+    if (body >= 0 && body < world->plan.n_body) step = pal_world_body_step(world, body);
+    if (wanted) return pal_field_components_add(&world->fields, &world->plan, body, field, &step, diag);
+    pal_field_components_remove(&world->fields, &world->plan, body, field);
     return PAL_ERR_OK;
 }
 
-pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_note *note)
+pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag)
 {
     if (body >= 0 && body < world->plan.n_body && brush && brush->kind != PAL_BRUSH_NONE)
         world->plan.body[body].asleep = false;
-    return pal_brush_rows_set(&world->brushes, &world->plan, body, slot, brush, note);
+    return pal_brush_components_set(&world->brushes, &world->plan, body, slot, brush, diag);
 }
 
-pal_err pal_world_switch_row(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
-                             pal_note *note)
+pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+                                   pal_diagnostic *diag)
 {
     bool changed = false;
     const pal_material *now = body >= 0 && body < PAL_BODY_MAX ? &world->material[body] : NULL;
-    PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, note, &changed));
+    PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, diag, &changed));
     if (!changed) return PAL_ERR_OK;
     /* what the solver knows of its limit is of the rows before */
-    pal_world_moved(world, body);
-    pal_err err = pal_world_check_budget(world, note);
+    pal_world_invalidate_limits(world, body);
+    pal_err err = pal_world_check_budget(world, diag);
     if (err) {
         /* it was within the budget without the row */
         (void)pal_plan_switch(&world->plan, scene, body, row, false, now, NULL, &changed);
-        pal_world_moved(world, body);
+        pal_world_invalidate_limits(world, body);
         (void)pal_world_check_budget(world, NULL);
     }
-    pal_world_moved(world, body);
+    pal_world_invalidate_limits(world, body);
     return err;
 }
 
@@ -155,39 +157,39 @@ void pal_world_wake(pal_world *world)
 
 void pal_world_watch(pal_world *world, bool watched)
 {
-    world->unwatched = !watched;
+    world->unobserved = !watched;
     for (int b = 0; b < world->plan.n_body && watched; b++)
         if (world->plan.body[b].stale && pal_body_finite(&world->plan.body[b])) pal_world_show(world, b);
 }
 
-pal_err pal_world_ease(pal_world *world, int body, const double *force_N)
+pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N)
 {
     if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
     world->plan.body[body].asleep = false;
-    return pal_ease_rows_set(&world->eases, &world->plan, body, force_N);
+    return pal_blend_components_set(&world->blends, &world->plan, body, force_N);
 }
 
-pal_err pal_world_lag(pal_world *world, int body, const float *lag_m)
+pal_err pal_world_blend_display(pal_world *world, int body, const float *display_offset_m)
 {
     if (body < 0 || body >= world->plan.n_body) return PAL_ERR_REFUSED;
     world->plan.body[body].asleep = false;
-    PAL_TRY(pal_ease_rows_lag(&world->eases, &world->plan, body, lag_m));
+    PAL_TRY(pal_blend_components_set_display(&world->blends, &world->plan, body, display_offset_m));
     pal_world_show(world, body);
     return PAL_ERR_OK;
 }
 
-void pal_world_tidy(pal_world *world)
+void pal_world_remove_idle(pal_world *world)
 {
-    pal_brush_rows_tidy(&world->brushes, &world->plan);
-    pal_ease_rows_tidy(&world->eases, &world->plan);
+    pal_brush_components_remove_idle(&world->brushes, &world->plan);
+    pal_blend_components_remove_idle(&world->blends, &world->plan);
 }
 
-void pal_world_moved(pal_world *world, int body)
+void pal_world_invalidate_limits(pal_world *world, int body)
 {
-    const pal_row *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    const pal_component *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
     world->plan.body[body].asleep = false;
     world->plan.body[body].stale = true;
-    pal_body_place(&world->plan.body[body]);
+    pal_body_update_nodes(&world->plan.body[body]);
     if (solve->effect->reset) solve->effect->reset(solve->self, &world->plan.body[body]);
     pal_world_find_limit(world, 0);
 }

@@ -1,8 +1,8 @@
 /* Lasting loads on nodes, and how much of a load nodes bear. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/surface/shell.h"
-#include "server/sim/world/world_parts.h"
+#include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world_core.h"
 
 #include <string.h>
 
@@ -10,28 +10,29 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
-    if (node < 0 || node >= b->n_node || (b->shell && !pal_shell_has(b->shell, node))) return PAL_ERR_REFUSED;
-    if (!b->outer) b->outer = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
-    if (!b->outer) return PAL_ERR_MEMORY;
-    pal_copy3(b->outer + 3 * node, force_N);
+    if (node < 0 || node >= b->n_node || (b->adaptive && !pal_adaptive_has(b->adaptive, node))) return PAL_ERR_REFUSED;
+    if (!b->external_force) b->external_force = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
+    if (!b->external_force) return PAL_ERR_MEMORY;
+    pal_copy3(b->external_force + 3 * node, force_N);
     b->asleep = false;
     return PAL_ERR_OK;
 }
 
-/* loads anew: the lasting ones. Nodes out of use have none (shell.h) and keep theirs in `outer` until they return */
+/* loads anew: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
+ * return */
 void pal_body_begin_loads(pal_body *body)
 {
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
     for (int k = 0; k < body->n_active && body->active; k++) {
         double *load = body->load + 3 * (size_t)body->active[k];
-        if (body->outer)
-            pal_copy3(load, body->outer + 3 * (size_t)body->active[k]);
+        if (body->external_force)
+            pal_copy3(load, body->external_force + 3 * (size_t)body->active[k]);
         else
             pal_set3(load, 0, 0, 0);
     }
     if (body->active) return;
-    if (body->outer)
-        memcpy(body->load, body->outer, n_byte);
+    if (body->external_force)
+        memcpy(body->load, body->external_force, n_byte);
     else
         memset(body->load, 0, n_byte);
 }
@@ -44,9 +45,9 @@ static const double least_share = 0.01;
  * to least_share at 4 S. What nothing holds, or what is led, may be anywhere */
 static bool stays(const pal_body *body)
 {
-    bool held = false, led = false;
-    for (int i = 0; i < body->n_dof; i++) held |= body->held[i] == 1, led |= body->held[i] == 2;
-    return held && !led;
+    bool fixed = false, led = false;
+    for (int i = 0; i < body->n_dof; i++) fixed |= body->fixed[i] == 1, led |= body->fixed[i] == 2;
+    return fixed && !led;
 }
 
 static double share_far_S(double far_S)
@@ -54,23 +55,23 @@ static double share_far_S(double far_S)
     return far_S > 2 ? fmax(least_share, 0.5 * (4 - far_S)) : 1;
 }
 
-void pal_body_cap_loads(pal_body *body, bool lasting)
+void pal_body_cap_loads(pal_body *body, bool body_arena)
 {
     int staying = -1; /* not looked for yet */
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 == 0) continue;
-        double cap = lasting ? pal_body_bears_N(body, i) : body->load_cap_N;
-        if (lasting && load2 > least_share * least_share * cap * cap) {
-            double far_S = pal_dist3(body->d + 3 * i, body->node_rest + 3 * i) / body->size_m;
+        double cap = body_arena ? pal_body_node_load_cap_N(body, i) : body->load_cap_N;
+        if (body_arena && load2 > least_share * least_share * cap * cap) {
+            double far_S = pal_dist3(body->d + 3 * i, body->node_rest + 3 * i) / body->length_scale_m;
             if (far_S > 2 && staying < 0) staying = stays(body);
             if (staying > 0) cap *= share_far_S(far_S);
         }
         if (load2 <= cap * cap) continue;
         uint64_t before = pal_clock_ns();
         pal_scale3(load, cap / sqrt(load2), load);
-        body->rescue.n_capped++;
-        body->rescue.ns += pal_clock_ns() - before;
+        body->safeguards.n_capped++;
+        body->safeguards.ns += pal_clock_ns() - before;
     }
 }

@@ -1,8 +1,8 @@
 /* What a world shows of itself: frames, hash, rows, surfaces. */
-#include "server/sim/world/world_parts.h"
+#include "server/sim/world/world_core.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -20,20 +20,20 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
 }
 
 /* what of the table of triangles has changed since this frame was filled last, or all of it */
-static void copy_slots(const pal_shell *shell, pal_frame_part *to)
+static void copy_slots(const pal_adaptive_surface *adaptive, pal_frame_part *to)
 {
     size_t one = 3 * sizeof *to->slot;
-    if (to->slot_log > shell->n_log || shell->n_log - to->slot_log > (uint64_t)shell->n_log_room) {
-        memcpy(to->slot, shell->slot, one * (size_t)shell->n_slot);
+    if (to->slot_log > adaptive->n_log || adaptive->n_log - to->slot_log > (uint64_t)adaptive->n_log_room) {
+        memcpy(to->slot, adaptive->slot, one * (size_t)adaptive->n_slot);
     } else {
-        for (uint64_t i = to->slot_log; i < shell->n_log; i++) {
-            size_t place = 3 * (size_t)shell->log[i % (uint64_t)shell->n_log_room];
-            memcpy(to->slot + place, shell->slot + place, one);
+        for (uint64_t i = to->slot_log; i < adaptive->n_log; i++) {
+            size_t place = 3 * (size_t)adaptive->log[i % (uint64_t)adaptive->n_log_room];
+            memcpy(to->slot + place, adaptive->slot + place, one);
         }
     }
-    to->slot_log = shell->n_log;
-    to->n_active = shell->n_node;
-    to->n_spring = shell->n_spring;
+    to->slot_log = adaptive->n_log;
+    to->n_active = adaptive->n_node;
+    to->n_spring = adaptive->n_spring;
 }
 
 static void copy_part(const pal_body *body, pal_frame_part *to)
@@ -42,16 +42,16 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     const double *o = body->offset_m;
     to->revision = body->revision;
     to->frozen = body->frozen;
-    memcpy(to->why, body->why, sizeof to->why);
-    to->rescue = body->rescue;
-    to->n_rescue = pal_rescues_sum(&body->rescue);
-    to->rescue_ns = body->rescue.ns;
+    memcpy(to->reason, body->reason, sizeof to->reason);
+    to->safeguards = body->safeguards;
+    to->n_rescue = pal_safeguards_sum(&body->safeguards);
+    to->rescue_ns = body->safeguards.ns;
     to->asleep = body->asleep;
     bool same = to->n_output == body->n_output; /* these are the positions that it has */
     to->n_output = body->n_output;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
-        copy_slots(body->shell, to);
+        copy_slots(body->adaptive, to);
         for (int k = 0; k < body->n_active && !same; k++) {
             size_t i = 3 * (size_t)body->active[k];
             for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->shown[i + c] + o[c]);
@@ -77,11 +77,11 @@ static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
     to->radius_m = tool->radius_m;
     to->n_patch = tool->n_patch;
     memcpy(to->patch, tool->patch, sizeof to->patch);
-    to->has_grip = tool->has_grip;
-    pal_copy3(to->grip_x0_m, tool->grip_x0_m);
-    pal_copy3(to->grip_f0_N, tool->grip_f0_N);
-    memcpy(to->grip_k_N_m, tool->grip_k_N_m, sizeof to->grip_k_N_m);
-    to->grip_b_Ns_m = tool->grip_b_Ns_m;
+    to->has_grasp = tool->has_grasp;
+    pal_copy3(to->grasp_x0_m, tool->grasp_x0_m);
+    pal_copy3(to->grasp_f0_N, tool->grasp_f0_N);
+    memcpy(to->grasp_k_N_m, tool->grasp_k_N_m, sizeof to->grasp_k_N_m);
+    to->grasp_b_Ns_m = tool->grasp_b_Ns_m;
 }
 
 void pal_world_frame(const pal_world *world, pal_frame *out)
@@ -92,16 +92,16 @@ void pal_world_frame(const pal_world *world, pal_frame *out)
     out->end_ns = w->end_ns;
     out->step_ns = w->step_ns;
     out->n_substep = w->n_substep;
-    out->watched = !w->unwatched;
+    out->watched = !w->unobserved;
     for (int b = 0; b < out->n_part; b++) copy_part(&w->plan.body[b], &out->part[b]);
     out->n_tool = w->tools.n_tool;
     for (int t = 0; t < w->tools.n_tool; t++) copy_tool(w, t, &out->tool[t]);
-    out->n_row = w->plan.n_row < PAL_FRAME_ROWS ? w->plan.n_row : PAL_FRAME_ROWS;
+    out->n_row = w->plan.n_row < PAL_FRAME_COMPONENT_MAX ? w->plan.n_row : PAL_FRAME_COMPONENT_MAX;
     for (int i = 0; i < out->n_row; i++) {
         uint64_t ns = w->plan.row[i].spent_ns;
-        out->row_name[i] = w->plan.row[i].effect->name;
-        out->row_body[i] = w->plan.row_body[i];
-        out->row_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
+        out->component_name[i] = w->plan.row[i].effect->name;
+        out->component_body[i] = w->plan.component_body[i];
+        out->component_ns[i] = ns < UINT32_MAX ? (uint32_t)ns : UINT32_MAX;
     }
 }
 
@@ -119,8 +119,8 @@ uint64_t pal_world_hash(const pal_world *world)
         const pal_body *body = &world->plan.body[b];
         hash = hash_bytes(hash, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
         hash = hash_bytes(hash, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
-        const pal_levels *levels = body->shell ? &body->shell->levels : NULL;
-        if (levels) hash = hash_bytes(hash, body->shell->face_state, (size_t)levels->first_face[levels->n_level]);
+        const pal_levels *levels = body->adaptive ? &body->adaptive->levels : NULL;
+        if (levels) hash = hash_bytes(hash, body->adaptive->face_state, (size_t)levels->first_face[levels->n_level]);
     }
     return hash;
 }
@@ -135,17 +135,17 @@ double pal_world_time_s(const pal_world *world)
     return world->time_s;
 }
 
-const pal_body *pal_world_look(const pal_world *world, int body)
+const pal_body *pal_world_view_body(const pal_world *world, int body)
 {
     return &world->plan.body[body];
 }
 
-void pal_world_material_now(const pal_world *world, int body, pal_material *out)
+void pal_world_current_material(const pal_world *world, int body, pal_material *out)
 {
     *out = world->material[body];
 }
 
-void pal_world_name_limit(const pal_world *world, char *text, size_t n_byte)
+void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte)
 {
     const pal_world *w = world;
     double most = 0;
@@ -153,16 +153,16 @@ void pal_world_name_limit(const pal_world *world, char *text, size_t n_byte)
     for (int b = 0; b < w->plan.n_body; b++) {
         const pal_body *body = &w->plan.body[b];
         const size_t room = sizeof(double) * (size_t)body->n_dof;
-        if (body->embed || body->implicit) continue;
+        if (body->interpolation || body->implicit) continue;
         memset(body->g, 0, room);
         for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
-            const pal_row *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
+            const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
             if (row->effect->stiffness) row->effect->stiffness(row->self, body, body->g);
         }
         for (int k = 0; k < body->n_active; k++) {
             int i = pal_body_point(body, k);
             const double *x = body->x_rest + 3 * (size_t)i, *o = body->offset_m;
-            if (body->held[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
+            if (body->fixed[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
             most = body->g[i] / body->mass_kg[i];
             snprintf(text, n_byte, ", node %d at (%.4g, %.4g, %.4g) mm sets it", i, 1e3 * (x[0] + o[0]),
                      1e3 * (x[1] + o[1]), 1e3 * (x[2] + o[2]));
@@ -171,30 +171,30 @@ void pal_world_name_limit(const pal_world *world, char *text, size_t n_byte)
     }
 }
 
-int pal_world_rows(const pal_world *world)
+int pal_world_component_count(const pal_world *world)
 {
     return world->plan.n_row;
 }
 
-const pal_row *pal_world_effect(const pal_world *world, int row)
+const pal_component *pal_world_component(const pal_world *world, int row)
 {
     return &world->plan.row[row];
 }
 
-void pal_world_row(const pal_world *world, int row, pal_row_info *out)
+void pal_world_component_info(const pal_world *world, int row, pal_component_info *out)
 {
-    const pal_row *r = &world->plan.row[row];
-    *out = (pal_row_info){.name = r->effect->name,
-                          .body = world->plan.body[world->plan.row_body[row]].name,
-                          .stage = pal_stage_name(r->effect->stage),
-                          .n_byte = r->n_byte,
-                          .spent_ns = r->spent_ns,
-                          .n_run = r->n_run,
-                          .why = r->why ? r->why : "",
-                          .fixed = pal_plan_keeps(&world->plan, row)};
+    const pal_component *r = &world->plan.row[row];
+    *out = (pal_component_info){.name = r->effect->name,
+                                .body = world->plan.body[world->plan.component_body[row]].name,
+                                .stage = pal_stage_name(r->effect->stage),
+                                .n_byte = r->n_byte,
+                                .spent_ns = r->spent_ns,
+                                .n_run = r->n_run,
+                                .reason = r->reason ? r->reason : "",
+                                .fixed = pal_plan_requires(&world->plan, row)};
 }
 
-int pal_world_parts(const pal_world *world)
+int pal_world_part_count(const pal_world *world)
 {
     return world->plan.n_body;
 }
@@ -210,8 +210,8 @@ void pal_world_shown(const pal_world *world, int index, pal_shown *out)
                        .tri = p->tri,
                        .face = body->shown_face,
                        .revision = body->revision};
-    if (!body->shell || p->n_vertex == 0) return;
-    const pal_levels *levels = &body->shell->levels;
+    if (!body->adaptive || p->n_vertex == 0) return;
+    const pal_levels *levels = &body->adaptive->levels;
     out->adapts = true;
     out->n_coarse = levels->n_vertex[0];
     out->parent = p->parent;

@@ -15,7 +15,7 @@ static void dividing_a_cell_keeps_the_volume_and_its_neighbours_whole(void)
     double before = pal_cells_volume(&c, NULL);
     for (int32_t i = 0; i < c.n_edge; i++) c.edge[i].sharp = i == solid_edge(&c, 21, 22) ? 2 : 0;
     pal_cells_edit e;
-    REQUIRE(!pal_cells_divide_near(&c, 13, 0, &e, &note));
+    REQUIRE(!pal_cells_divide_near(&c, 13, 0, &e, &diag));
     check_carrying(&e, &c);
     /* 12 halves more and 24 + 6 inside; 24 - 6 quads more and 12 inside */
     check_counts(&e.cells, 64 + 19, 144 + 12 + 24 + 6, 108 + 18 + 12, 27 + 7);
@@ -55,7 +55,7 @@ static void parts_of_any_polyhedron_fill_it(void)
         for (int32_t i = c.n_cell; i > 0; i -= (c.n_cell + 2) / 3) {
             c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = i - 1});
             CHECK_NEAR(pal_cells_volume(&c, NULL), volume, 1e-12 * volume);
-            CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+            CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
         }
         pal_cells_free(&c);
     }
@@ -100,7 +100,7 @@ static void dividing_every_cell_is_a_level_of_subdivision(void)
                                       : solid_tube(5, 2, 2);
         pal_subdivision s = {0};
         const pal_subdivision_options o = {.n_level = 1};
-        REQUIRE(!pal_subdivision_make(&from, &o, &s, &note));
+        REQUIRE(!pal_subdivision_make(&from, &o, &s, &diag));
         int32_t list[64], n = from.n_cell;
         for (int32_t i = 0; i < n; i++) list[i] = i;
         for (int32_t i = n - 1; i > 0; i--) {
@@ -108,7 +108,7 @@ static void dividing_every_cell_is_a_level_of_subdivision(void)
             list[i] = list[k], list[k] = t;
         }
         pal_cells_edit e;
-        REQUIRE(!pal_cells_divide(&from, n, list, &e, &note));
+        REQUIRE(!pal_cells_divide(&from, n, list, &e, &diag));
         check_carrying(&e, &from);
         check_counts(&e.cells, s.cells.n_vertex, s.cells.n_edge, s.cells.n_face, s.cells.n_cell);
         CHECK_INT(e.cells.n_edge_use, s.cells.n_edge_use);
@@ -130,26 +130,26 @@ static void rings_take_the_neighbours_along(void)
 {
     pal_cells c = solid_block(5, 3, 3);
     pal_cells_edit e;
-    REQUIRE(!pal_cells_divide_near(&c, cell_near(&c, 0, 0, 0), 1, &e, &note));
+    REQUIRE(!pal_cells_divide_near(&c, cell_near(&c, 0, 0, 0), 1, &e, &diag));
     CHECK_INT(e.cells.n_cell, 18 + 27 * 8);
     check_carrying(&e, &c);
     for (int level = 1; level <= 2; level++) CHECK_INT(quality(&e.cells, level, PAL_SUBDIVISION_MACCRACKEN_JOY), 2);
     pal_cells_edit_free(&e);
-    REQUIRE(!pal_cells_divide_near(&c, 0, 99, &e, &note));
+    REQUIRE(!pal_cells_divide_near(&c, 0, 99, &e, &diag));
     check_counts(&e.cells, 11 * 7 * 7, 10 * 49 + 2 * 11 * 6 * 7, 11 * 36 + 2 * 10 * 42, 360);
     pal_cells_edit_free(&e);
-    CHECK_INT(pal_cells_divide_near(&c, 0, -1, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "divide cell 0: -1 rings, must be 0 to 1000");
+    CHECK_INT(pal_cells_divide_near(&c, 0, -1, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "divide cell 0: -1 rings, must be 0 to 1000");
     const int32_t twice[2] = {4, 4};
-    CHECK_INT(pal_cells_divide(&c, 2, twice, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "divide: cell 4 is given twice");
-    CHECK_INT(pal_cells_divide(&c, 0, twice, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "divide: 0 cells, must be 1 to 45");
+    CHECK_INT(pal_cells_divide(&c, 2, twice, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "divide: cell 4 is given twice");
+    CHECK_INT(pal_cells_divide(&c, 0, twice, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "divide: 0 cells, must be 1 to 45");
     CHECK(!e.cells.x && !e.rows.start && !e.offset);
     pal_cells_free(&c);
     c = solid_block(9, 8, 8);
-    CHECK_INT(pal_cells_divide_near(&c, 0, 99, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "divide: 576 cells, must be 1 to 512");
+    CHECK_INT(pal_cells_divide_near(&c, 0, 99, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "divide: 576 cells, must be 1 to 512");
     pal_cells_free(&c);
 }
 
@@ -267,17 +267,17 @@ static void thousands_of_edits_leave_whole_solids(void)
         pal_cells_command k = invent(&c, &d);
         pal_cells_edit e;
         int32_t n_vertex = c.n_vertex, n_cell = c.n_cell;
-        note.text[0] = 0;
+        diag.text[0] = 0;
         asked[k.kind]++;
-        pal_err err = pal_cells_apply(&c, &k, &e, &note);
+        pal_err err = pal_cells_apply(&c, &k, &e, &diag);
         if (err) {
-            if (err != PAL_ERR_REFUSED || !note.text[0] || e.cells.x || e.rows.start || c.n_vertex != n_vertex ||
+            if (err != PAL_ERR_REFUSED || !diag.text[0] || e.cells.x || e.rows.start || c.n_vertex != n_vertex ||
                 c.n_cell != n_cell)
-                CHECK_FAIL("edit %d: %s: %s", i, pal_err_name(err), note.text);
+                CHECK_FAIL("edit %d: %s: %s", i, pal_err_name(err), diag.text);
             continue;
         }
         taken[k.kind]++;
-        if (pal_cells_check(&e.cells, NULL, &note)) CHECK_FAIL("edit %d: %s", i, note.text);
+        if (pal_cells_check(&e.cells, NULL, &diag)) CHECK_FAIL("edit %d: %s", i, diag.text);
         if (!(pal_cells_volume(&e.cells, NULL) > 0)) CHECK_FAIL("edit %d: no volume", i);
         if (n_taken % 7 == 0) check_carrying(&e, &c);
         pal_cells_free(&c);

@@ -23,34 +23,34 @@ static void what_is_left_after_a_deletion_knows_where_it_comes_from(void)
 {
     pal_cells c = solid_block(3, 1, 1);
     pal_cells_edit e;
-    REQUIRE(!pal_cells_delete(&c, 1, &e, &note));
+    REQUIRE(!pal_cells_delete(&c, 1, &e, &diag));
     check_carrying(&e, &c);
     check_counts(&e.cells, 16, 24, 12, 2);
     check_holes(&e.cells, 2, 0, 0);
     CHECK(e.cell_from[0] == 0 && e.cell_from[1] == 2 && e.face == -1);
     pal_cells_edit_free(&e);
-    REQUIRE(!pal_cells_delete(&c, 0, &e, &note));
+    REQUIRE(!pal_cells_delete(&c, 0, &e, &diag));
     CHECK_INT(e.cells.n_vertex, 12);
     CHECK(e.cell_from[0] == 1 && e.cell_from[1] == 2);
     pal_cells_edit_free(&e);
     pal_cells_free(&c);
     c = solid_block(1, 1, 1);
-    CHECK_INT(pal_cells_delete(&c, 0, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "delete cell 0: it is the last one, a solid needs a cell");
+    CHECK_INT(pal_cells_delete(&c, 0, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "delete cell 0: it is the last one, a solid needs a cell");
     pal_cells_free(&c);
 }
 
 static void an_extruded_cube_has_twice_the_volume_and_grows_on(void)
 {
     pal_cells c = solid_block(1, 1, 1);
-    c.edge[0].sharp = 3, c.face[2].sharp = 2, c.vertex_sharp[5] = 1;
+    c.edge[0].sharp = 3, c.face[2].sharp = 2, c.vertex_sharpness[5] = 1;
     pal_cells_edit e;
     for (int32_t f = 0; f < 6; f++) {
-        REQUIRE(!pal_cells_extrude(&c, f, 1, 1, &e, &note));
+        REQUIRE(!pal_cells_extrude(&c, f, 1, 1, &e, &diag));
         CHECK_NEAR(pal_cells_volume(&e.cells, NULL), 2, 1e-12);
         check_counts(&e.cells, 12, 20, 11, 2);
         check_carrying(&e, &c);
-        CHECK(e.cell_from[1] == 0 && e.turned_face == f);
+        CHECK(e.cell_from[1] == 0 && e.rotated_face == f);
         /* the face to go on with lies opposite, a metre out */
         double o[3], p[3], n[3];
         pal_cells_face_centre(&c, NULL, f, o);
@@ -58,8 +58,8 @@ static void an_extruded_cube_has_twice_the_volume_and_grows_on(void)
         pal_cells_face_area(&e.cells, NULL, e.face, n);
         CHECK(pal_cells_face_boundary(&e.cells, e.face));
         for (int a = 0; a < 3; a++) CHECK_NEAR(p[a] - o[a], n[a], 1e-15);
-        for (int32_t v = 8; v < 12; v++) CHECK(e.cells.vertex_sharp[v] == 0);
-        CHECK(e.cells.vertex_sharp[5] == 1);
+        for (int32_t v = 8; v < 12; v++) CHECK(e.cells.vertex_sharpness[v] == 0);
+        CHECK(e.cells.vertex_sharpness[5] == 1);
         float edge = 0, face = 0;
         for (int32_t i = 0; i < e.cells.n_edge; i++) edge += e.cells.edge[i].sharp;
         for (int32_t i = 0; i < e.cells.n_face; i++) face += e.cells.face[i].sharp;
@@ -76,7 +76,7 @@ static void an_extrusion_is_scaled_about_the_middle_of_its_face(void)
         pal_cells c = solid_prism(n);
         double area = n / 2. * sin(6.283185307179586 / n), s = .25 * n;
         pal_cells_edit e;
-        REQUIRE(!pal_cells_extrude(&c, face_near(&c, 0, 0, 1), .5, s, &e, &note));
+        REQUIRE(!pal_cells_extrude(&c, face_near(&c, 0, 0, 1), .5, s, &e, &diag));
         CHECK_NEAR(pal_cells_volume(&e.cells, NULL), area * (1 + .5 * (1 + s + s * s) / 3), 1e-12);
         check_counts(&e.cells, 3 * n, 5 * n, 3 + 2 * n, 2);
         check_carrying(&e, &c);
@@ -93,12 +93,12 @@ static void an_extrusion_of_a_turned_body_is_the_turned_extrusion(void)
     pal_cells_edit e;
     double x[36], to[48], worst = 0;
     const double r[9] = {2. / 3, -1. / 3, 2. / 3, 2. / 3, 2. / 3, -1. / 3, -1. / 3, 2. / 3, 2. / 3};
-    REQUIRE(c.n_vertex == 12 && !pal_cells_extrude(&c, face_near(&c, -.5, 0, .5), .7, .8, &e, &note));
+    REQUIRE(c.n_vertex == 12 && !pal_cells_extrude(&c, face_near(&c, -.5, 0, .5), .7, .8, &e, &diag));
     for (int i = 0; i < 36; i++) {
         const double *p = c.x + i / 3 * 3, *row = r + i % 3 * 3;
         x[i] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + 5;
     }
-    pal_cells_edit_place(&e, &c, x, to);
+    pal_cells_edit_positions(&e, &c, x, to);
     for (int i = 0; i < 48; i++) {
         const double *p = e.cells.x + i / 3 * 3, *row = r + i % 3 * 3;
         worst = fmax(worst, fabs(to[i] - 5 - (row[0] * p[0] + row[1] * p[1] + row[2] * p[2])));
@@ -112,7 +112,7 @@ static void an_extrusion_of_a_turned_body_is_the_turned_extrusion(void)
 static pal_cells open_ring(double *whole, int32_t face[2])
 {
     pal_cells c = {0};
-    if (pal_cells_ring(8, 1, .3, &c, &note)) abort();
+    if (pal_cells_ring(8, 1, .3, &c, &diag)) abort();
     *whole = pal_cells_volume(&c, NULL);
     c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = 0});
     /* the ends are the two faces that have no neighbour over any edge in a plane through the axis */
@@ -138,8 +138,8 @@ static void merging_the_ends_of_a_bent_bar_makes_a_handle(void)
     check_counts(&c, 32, 60, 36, 7);
     int32_t first, corner;
     pal_cells_face_loop(&c, face[1], &first);
-    corner = c.edge_use[first].vertex, c.vertex_sharp[corner] = 2, c.edge[c.edge_use[first].edge].sharp = 3;
-    REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &note));
+    corner = c.edge_use[first].vertex, c.vertex_sharpness[corner] = 2, c.edge[c.edge_use[first].edge].sharp = 3;
+    REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &diag));
     check_carrying(&e, &c);
     check_holes(&e.cells, 1, 0, 1);
     check_counts(&e.cells, 28, 56, 35, 7);
@@ -149,17 +149,17 @@ static void merging_the_ends_of_a_bent_bar_makes_a_handle(void)
     CHECK_NEAR(moved, 4, 0);
     /* a joined corner and edge are as sharp as the sharper of the two */
     float vertex = 0, edge = 0;
-    for (int32_t i = 0; i < e.cells.n_vertex; i++) vertex += e.cells.vertex_sharp[i];
+    for (int32_t i = 0; i < e.cells.n_vertex; i++) vertex += e.cells.vertex_sharpness[i];
     for (int32_t i = 0; i < e.cells.n_edge; i++) edge += e.cells.edge[i].sharp;
     CHECK(vertex == 2 && edge == 3);
     pal_cells_edit_free(&e);
     /* smooth again: joined to elements that are not turned */
-    c.vertex_sharp[corner] = 0, c.edge[c.edge_use[first].edge].sharp = 0;
-    REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &note));
+    c.vertex_sharpness[corner] = 0, c.edge[c.edge_use[first].edge].sharp = 0;
+    REQUIRE(!pal_cells_merge(&c, face[0], face[1], &e, &diag));
     CHECK_INT(quality(&e.cells, 2, PAL_SUBDIVISION_MACCRACKEN_JOY), 2);
     pal_cells_edit_free(&e);
     /* a bridge is the cell that went */
-    REQUIRE(!pal_cells_bridge(&c, face[1], face[0], &e, &note));
+    REQUIRE(!pal_cells_bridge(&c, face[1], face[0], &e, &diag));
     check_carrying(&e, &c);
     check_holes(&e.cells, 1, 0, 1);
     check_counts(&e.cells, 32, 64, 40, 8);
@@ -186,7 +186,7 @@ static void two_pieces_become_one_and_a_hollow_is_filled(void)
     check_holes(&c, 1, 0, 0);
     check_counts(&c, 64, 144, 108, 27);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 27, 1e-12);
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
     pal_cells_free(&c);
 }
 
@@ -195,18 +195,18 @@ static void sharpening_sets_one_number_and_nothing_else(void)
     pal_cells c = solid_block(2, 2, 1), same;
     pal_cells_edit e;
     REQUIRE(!pal_cells_copy(&c, &same));
-    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_VERTEX, 17, 1.5f, &e, &note));
-    CHECK(e.cells.vertex_sharp[17] == 1.5f);
+    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_VERTEX, 17, 1.5f, &e, &diag));
+    CHECK(e.cells.vertex_sharpness[17] == 1.5f);
     check_carrying(&e, &c);
-    e.cells.vertex_sharp[17] = 0;
+    e.cells.vertex_sharpness[17] = 0;
     CHECK(pal_cells_equal(&e.cells, &same));
     pal_cells_edit_free(&e);
-    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_EDGE, 3, PAL_SHARP_EVER, &e, &note));
-    CHECK(e.cells.edge[3].sharp == PAL_SHARP_EVER);
+    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_EDGE, 3, PAL_SHARPNESS_MAX, &e, &diag));
+    CHECK(e.cells.edge[3].sharp == PAL_SHARPNESS_MAX);
     e.cells.edge[3].sharp = 0;
     CHECK(pal_cells_equal(&e.cells, &same));
     pal_cells_edit_free(&e);
-    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_FACE, 5, .25f, &e, &note));
+    REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_FACE, 5, .25f, &e, &diag));
     CHECK(e.cells.face[5].sharp == .25f);
     e.cells.face[5].sharp = 0;
     CHECK(pal_cells_equal(&e.cells, &same) && pal_cells_equal(&c, &same));
@@ -221,19 +221,19 @@ static void moving_vertices_moves_them_and_a_fold_is_refused(void)
     pal_cells_edit e;
     const int32_t vertex[2] = {13, 0};
     double x[6] = {.1, .2, -.1, -1.5, -1, -1};
-    REQUIRE(!pal_cells_move(&c, 2, vertex, x, &e, &note));
+    REQUIRE(!pal_cells_move(&c, 2, vertex, x, &e, &diag));
     check_carrying(&e, &c);
     CHECK(!memcmp(e.cells.x + 39, x, 24) && !memcmp(e.cells.x, x + 3, 24));
     CHECK_NEAR(e.offset[0], -.5, 1e-15);
     /* moving the middle changes no volume; the corner, by 1/2 along x, takes 1/4 of each cut: a pyramid's share */
-    CHECK_INT(pal_cells_check(&e.cells, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&e.cells, NULL, &diag), PAL_ERR_OK);
     pal_cells_edit_free(&e);
     /* the middle beyond a face: cells behind it still have volume, but not all their faces are seen from inside */
     x[0] = .95, x[1] = .95, x[2] = .95;
-    CHECK_INT(pal_cells_move(&c, 1, vertex, x, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "move: cell 3 folds: a face of it faces its centroid");
+    CHECK_INT(pal_cells_move(&c, 1, vertex, x, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "move: cell 3 folds: a face of it faces its centroid");
     x[0] = 1.3;
-    CHECK_INT(pal_cells_move(&c, 1, vertex, x, &e, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_move(&c, 1, vertex, x, &e, &diag), PAL_ERR_REFUSED);
     pal_cells_free(&c);
 }
 
@@ -246,8 +246,8 @@ static void refused(const pal_cells *c, pal_cells_command k, const char *words)
     memset(&e, 0x5a, sizeof e);
     memset(&zero, 0, sizeof zero);
     REQUIRE(!pal_cells_copy(c, &same));
-    CHECK_INT(pal_cells_apply(c, &k, &e, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, words)) CHECK_TEXT(note.text, words);
+    CHECK_INT(pal_cells_apply(c, &k, &e, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, words)) CHECK_TEXT(diag.text, words);
     CHECK(!memcmp(&e, &zero, sizeof e));
     CHECK(pal_cells_equal(c, &same) && !memcmp(c->x, same.x, 24 * (size_t)c->n_vertex));
     CHECK_INT(pal_cells_apply(c, &k, &e, NULL), PAL_ERR_REFUSED);
@@ -314,9 +314,9 @@ static void what_cannot_be_done_is_refused_in_a_sentence(void)
     const double x[6] = {0};
     pal_cells_edit e;
     c = solid_block(1, 1, 1);
-    CHECK_INT(pal_cells_move(&c, 2, twice, x, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "move: vertex 1 is given twice");
-    CHECK_INT(pal_cells_move(&c, 9, twice, x, &e, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_move(&c, 2, twice, x, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "move: vertex 1 is given twice");
+    CHECK_INT(pal_cells_move(&c, 9, twice, x, &e, &diag), PAL_ERR_REFUSED);
     pal_cells_free(&c);
 }
 

@@ -9,8 +9,8 @@
 static pal_cell_elements of(const pal_cells *c)
 {
     pal_cell_elements e = {0};
-    pal_note note = {"no note"};
-    if (pal_cell_elements_make(c, &e, &note)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {"no note"};
+    if (pal_cell_elements_make(c, &e, &diag)) CHECK_FAIL("%s", diag.text);
     return e;
 }
 
@@ -18,9 +18,9 @@ static pal_cell_elements of(const pal_cells *c)
 static pal_subdivision refined(pal_cells c, int n_level)
 {
     pal_subdivision s = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     const pal_subdivision_options o = {.n_level = n_level};
-    if (pal_subdivision_make(&c, &o, &s, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_subdivision_make(&c, &o, &s, &diag)) CHECK_FAIL("%s", diag.text);
     pal_cells_free(&c);
     return s;
 }
@@ -54,7 +54,7 @@ static pal_cells shuffled(pal_cells from, uint64_t seed)
 {
     pal_cells out = {0};
     pal_cell_loops l = {0}, t = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     uint64_t draw = 0;
     if (pal_cells_loops(&from, &l) || pal_cells_loops(&from, &t)) CHECK_FAIL("%s", "no loops");
     int32_t *order = malloc((size_t)(l.n_vertex + l.n_cell) * sizeof *order), *cell = order + l.n_vertex;
@@ -77,7 +77,7 @@ static pal_cells shuffled(pal_cells from, uint64_t seed)
             for (int k = 0; k < 4; k++) t.corner[n++] = order[loop[(k + begin) % 4]];
         }
     }
-    if (pal_cells_make(&t, &out, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_cells_make(&t, &out, &diag)) CHECK_FAIL("%s", diag.text);
     free(order);
     pal_cell_loops_free(&l);
     pal_cell_loops_free(&t);
@@ -230,12 +230,12 @@ static double volume_of(const pal_cell_elements *e, const double *x, double *lea
 
 static double *places(const pal_cell_elements *e, const pal_subdivision *s, const double *p)
 {
-    pal_point_rows rows = {0};
+    pal_interpolation rows = {0};
     double *d = malloc((size_t)(e->n_vertex + e->n_virtual) * 3 * sizeof *d);
-    if (!d || pal_cell_elements_rows(e, &s->rows, &rows)) abort();
+    if (!d || pal_cell_elements_interpolation(e, &s->rows, &rows)) abort();
     CHECK_INT(rows.n_row, e->n_vertex + e->n_virtual);
-    pal_point_rows_place(&rows, p, d);
-    pal_point_rows_free(&rows);
+    pal_interpolation_apply(&rows, p, d);
+    pal_interpolation_free(&rows);
     return d;
 }
 
@@ -298,8 +298,8 @@ static void rows_of_all_nodes_sum_to_one(void)
 {
     pal_subdivision s = refined(solid_pyramids(), 2);
     pal_cell_elements e = of(&s.cells);
-    pal_point_rows rows = {0};
-    REQUIRE(pal_cell_elements_rows(&e, &s.rows, &rows) == PAL_ERR_OK);
+    pal_interpolation rows = {0};
+    REQUIRE(pal_cell_elements_interpolation(&e, &s.rows, &rows) == PAL_ERR_OK);
     CHECK_INT(rows.n_point, 9);
     double worst = 0;
     for (int32_t i = 0; i < rows.n_row; i++) {
@@ -308,7 +308,7 @@ static void rows_of_all_nodes_sum_to_one(void)
         worst = fmax(worst, fabs(sum - 1));
     }
     CHECK_LE(worst, 1e-12);
-    pal_point_rows_free(&rows);
+    pal_interpolation_free(&rows);
     pal_cell_elements_free(&e);
     pal_subdivision_free(&s);
 }
@@ -395,9 +395,9 @@ static void a_cell_with_other_faces_than_quads_is_refused(void)
 {
     pal_cells c = solid_prism(5);
     pal_cell_elements e = {0};
-    pal_note note = {""};
-    CHECK_INT(pal_cell_elements_make(&c, &e, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "elements: cell 0 is no hexahedron and its face 0 has 5 corners: subdivide once");
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_cell_elements_make(&c, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "elements: cell 0 is no hexahedron and its face 0 has 5 corners: subdivide once");
     CHECK(!e.virtual_cell && !e.node[PAL_CELL_HEX]);
     pal_cells_free(&c);
     c = solid_prism(4);

@@ -7,12 +7,12 @@
 
 #include <locale.h>
 
-static pal_note note;
+static pal_diagnostic diag;
 static char path[64];
 
 static pal_err parse(const char *text, pal_cells *c)
 {
-    return pal_cell_file_parse("a", (const uint8_t *)text, strlen(text), c, &note);
+    return pal_cell_file_parse("a", (const uint8_t *)text, strlen(text), c, &diag);
 }
 
 /* odd positions, and sharpnesses of every kind */
@@ -20,16 +20,16 @@ static pal_cells odd_torus(void)
 {
     pal_cells c;
     uint32_t state = 3;
-    if (pal_cells_torus(7, 2, 1, .4, &c, &note)) abort();
+    if (pal_cells_torus(7, 2, 1, .4, &c, &diag)) abort();
     for (int i = 0; i < 3 * c.n_vertex; i++) {
         state = state * 1664525u + 1013904223u;
         c.x[i] += (double)state * 1e-12 + (i % 5 == 0) * 5e-324;
     }
     c.x[1] = -0.0;
-    for (int v = 0; v < c.n_vertex; v += 3) c.vertex_sharp[v] = (float)v / 7;
+    for (int v = 0; v < c.n_vertex; v += 3) c.vertex_sharpness[v] = (float)v / 7;
     for (int e = 0; e < c.n_edge; e += 4) c.edge[e].sharp = 1 / (float)(1 + e);
     for (int f = 0; f < c.n_face; f += 5) c.face[f].sharp = (float)f * 0.3f;
-    c.edge[0].sharp = PAL_SHARP_EVER, c.face[0].sharp = 1e-45f;
+    c.edge[0].sharp = PAL_SHARPNESS_MAX, c.face[0].sharp = 1e-45f;
     return c;
 }
 
@@ -38,14 +38,14 @@ static void our_text_gives_every_bit_back(void)
     pal_cells c = odd_torus(), back;
     snprintf(path, sizeof path, "/tmp/palpate_test_cells_%d.palcells", (int)getpid());
     setlocale(LC_NUMERIC, "de_DE.UTF-8"); /* where there is one: the point stays a point */
-    REQUIRE(!pal_cell_file_save(&c, path, &note));
-    REQUIRE(!pal_cell_file_load(path, &back, &note));
+    REQUIRE(!pal_cell_file_save(&c, path, &diag));
+    REQUIRE(!pal_cell_file_load(path, &back, &diag));
     setlocale(LC_NUMERIC, "C");
     CHECK(pal_cells_equal(&c, &back));
     CHECK(!memcmp(c.x, back.x, (size_t)c.n_vertex * 24));
     CHECK(!memcmp(c.edge_use, back.edge_use, (size_t)c.n_edge_use * sizeof *c.edge_use));
-    CHECK(back.face[0].sharp == 1e-45f && back.edge[0].sharp == PAL_SHARP_EVER);
-    CHECK_INT(pal_cells_check(&back, NULL, &note), PAL_ERR_OK);
+    CHECK(back.face[0].sharp == 1e-45f && back.edge[0].sharp == PAL_SHARPNESS_MAX);
+    CHECK_INT(pal_cells_check(&back, NULL, &diag), PAL_ERR_OK);
     pal_cells_free(&c);
     pal_cells_free(&back);
 }
@@ -89,16 +89,16 @@ static void vtk_gives_the_same_cells_back(void)
     pal_cells c, back, ours;
     REQUIRE(!parse(zoo, &c));
     CHECK_INT(c.n_cell, 5);
-    CHECK(c.vertex_sharp[2] == .5f && c.vertex_sharp[0] == 0);
+    CHECK(c.vertex_sharpness[2] == .5f && c.vertex_sharpness[0] == 0);
     CHECK(c.face[c.face_use[c.cell_use[1]].face].sharp == 1);
     snprintf(path, sizeof path, "/tmp/palpate_test_cells_%d.vtk", (int)getpid());
-    REQUIRE(!pal_cell_file_save(&c, path, &note));
-    REQUIRE(!pal_cell_file_load(path, &back, &note));
+    REQUIRE(!pal_cell_file_save(&c, path, &diag));
+    REQUIRE(!pal_cell_file_load(path, &back, &diag));
     CHECK_INT(back.n_face, c.n_face);
     CHECK_INT(back.n_edge, c.n_edge);
     CHECK_INT(back.n_boundary_face, c.n_boundary_face);
     CHECK(!memcmp(c.x, back.x, (size_t)c.n_vertex * 24));
-    CHECK(!memcmp(c.vertex_sharp, back.vertex_sharp, (size_t)c.n_vertex * 4));
+    CHECK(!memcmp(c.vertex_sharpness, back.vertex_sharpness, (size_t)c.n_vertex * 4));
     for (int i = 0; i < c.n_cell; i++) CHECK(same_cell(&c, &back, i));
     uint8_t *bytes;
     size_t n;
@@ -114,12 +114,12 @@ static void vtk_gives_the_same_cells_back(void)
 
     c = odd_torus();
     REQUIRE(!pal_cell_file_bytes(&c, true, &bytes, &n));
-    REQUIRE(!pal_cell_file_parse("t", bytes, n, &back, &note));
+    REQUIRE(!pal_cell_file_parse("t", bytes, n, &back, &diag));
     CHECK(!memcmp(c.x, back.x, (size_t)c.n_vertex * 24));
     for (int i = 0; i < c.n_cell; i++) CHECK(same_cell(&c, &back, i));
     free(bytes);
     REQUIRE(!pal_cell_file_bytes(&back, false, &bytes, &n));
-    REQUIRE(!pal_cell_file_parse("t", bytes, n, &ours, &note));
+    REQUIRE(!pal_cell_file_parse("t", bytes, n, &ours, &diag));
     CHECK(pal_cells_equal(&back, &ours));
     free(bytes);
     pal_cells_free(&c);
@@ -146,14 +146,14 @@ static void vtk_by_hand_is_turned_over_and_freed_of_loose_points(void)
                        &c));
     CHECK_INT(c.n_vertex, 4);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 1. / 6, 1e-15);
-    CHECK(c.vertex_sharp[0] == 0);
+    CHECK(c.vertex_sharpness[0] == 0);
     pal_cells_free(&c);
     REQUIRE(!parse_vtk(FOUR "CELLS 1 18\n17 4 3 0 1 2 3 0 3 1 3 1 3 2 3 0 2 3\nCELL_TYPES 1\n42\nPOINT_DATA 5\n"
                             "VECTORS v float\n1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\nSCALARS sharp float 1\n"
                             "LOOKUP_TABLE default\n0 1 2 3 4\n",
                        &c));
     CHECK_NEAR(pal_cells_volume(&c, NULL), 1. / 6, 1e-15);
-    CHECK(c.vertex_sharp[1] == 1 && c.vertex_sharp[3] == 3);
+    CHECK(c.vertex_sharpness[1] == 1 && c.vertex_sharpness[3] == 3);
     pal_cells_free(&c);
 }
 
@@ -162,7 +162,7 @@ static void refused(const char *text, const char *sentence)
     pal_cells c = {.n_vertex = -7};
     CHECK_INT(parse(text, &c), PAL_ERR_REFUSED);
     CHECK_INT(c.n_vertex, -7);
-    if (strncmp(note.text, sentence, strlen(sentence))) CHECK_TEXT(note.text, sentence);
+    if (strncmp(diag.text, sentence, strlen(sentence))) CHECK_TEXT(diag.text, sentence);
 }
 
 static void refused_vtk(const char *body, const char *sentence)
@@ -221,10 +221,10 @@ static void refusals_name_the_line(void)
 static void files_that_cannot_be_are_refused(void)
 {
     pal_cells c = odd_torus(), back;
-    CHECK_INT(pal_cell_file_save(&c, "/tmp/a.obj", &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "/tmp/a.obj: cells are written to .palcells or .vtk files");
-    CHECK_INT(pal_cell_file_save(&c, "/nonexistent/a.vtk", &note), PAL_ERR_IO);
-    CHECK_INT(pal_cell_file_load("/nonexistent/a.vtk", &back, &note), PAL_ERR_IO);
+    CHECK_INT(pal_cell_file_save(&c, "/tmp/a.obj", &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "/tmp/a.obj: cells are written to .palcells or .vtk files");
+    CHECK_INT(pal_cell_file_save(&c, "/nonexistent/a.vtk", &diag), PAL_ERR_IO);
+    CHECK_INT(pal_cell_file_load("/nonexistent/a.vtk", &back, &diag), PAL_ERR_IO);
     pal_cells_free(&c);
 }
 
@@ -233,11 +233,11 @@ static void every_file_cut_short_is_refused_or_good(void)
     pal_cells c;
     size_t n = strlen(zoo);
     for (size_t cut = 0; cut < n; cut += (size_t)CHECK_REPEATS(1, 7))
-        if (!pal_cell_file_parse("a", (const uint8_t *)zoo, cut, &c, &note)) {
-            CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+        if (!pal_cell_file_parse("a", (const uint8_t *)zoo, cut, &c, &diag)) {
+            CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
             pal_cells_free(&c);
         } else {
-            CHECK(!strncmp(note.text, "a: ", 3));
+            CHECK(!strncmp(diag.text, "a: ", 3));
         }
 }
 

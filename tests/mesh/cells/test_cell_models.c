@@ -24,18 +24,18 @@ static const known list[PAL_CELL_MODELS] = {
 static pal_cells of(const char *name)
 {
     pal_cells c = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     const pal_cell_model *model = pal_cell_model_find(name);
-    if (!model || pal_cell_model_make(model, &c, &note)) CHECK_FAIL("%s: %s", name, note.text);
+    if (!model || pal_cell_model_make(model, &c, &diag)) CHECK_FAIL("%s: %s", name, diag.text);
     return c;
 }
 
 static pal_subdivision refined(const pal_cells *c, int n_level, pal_subdivision_rule rule)
 {
     pal_subdivision s = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     const pal_subdivision_options o = {.n_level = n_level, .rule = rule};
-    if (pal_subdivision_make(c, &o, &s, &note)) CHECK_FAIL("%d levels of %d cells: %s", n_level, c->n_cell, note.text);
+    if (pal_subdivision_make(c, &o, &s, &diag)) CHECK_FAIL("%d levels of %d cells: %s", n_level, c->n_cell, diag.text);
     return s;
 }
 
@@ -44,12 +44,12 @@ static void control_cells_are_as_many_as_in_table_1(void)
     static const int table[8] = {24, 38, 27, 76, 64, 123, 150, 99};
     for (int k = 0; k < PAL_CELL_MODELS; k++) {
         pal_cells c = of(list[k].name);
-        pal_note note = {"no note"};
+        pal_diagnostic diag = {"no note"};
         CHECK_INT(c.n_cell, list[k].n_cell);
         CHECK_INT(c.n_cell, pal_cell_model_list[k].n_cell);
         CHECK_TEXT(pal_cell_model_list[k].name, list[k].name);
         if (k < 8) CHECK_INT(c.n_cell, table[k]);
-        if (pal_cells_check(&c, NULL, &note)) CHECK_FAIL("%s: %s", list[k].name, note.text);
+        if (pal_cells_check(&c, NULL, &diag)) CHECK_FAIL("%s: %s", list[k].name, diag.text);
         CHECK_INT(c.n_pinched_edge + c.n_pinched_vertex, 0);
         pal_cells_free(&c);
     }
@@ -72,14 +72,15 @@ static void pieces_hollows_and_holes_are_those_of_the_thing(void)
 
 /* gradients of all shape functions at the 64 Gauss points, points innermost */
 typedef struct gradients {
-    double g[PAL_CELL_NODES_MOST][3][PAL_CELL_POINTS], weight[PAL_CELL_POINTS], shrink[PAL_CELL_POINTS];
+    double g[PAL_CELL_MAX_NODES][3][PAL_CELL_GAUSS_POINTS], weight[PAL_CELL_GAUSS_POINTS],
+        shrink[PAL_CELL_GAUSS_POINTS];
 } gradients;
 
 static void fill(gradients *to, int n_node)
 {
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
-        double at[3], g[PAL_CELL_NODES_MOST][3];
-        to->weight[p] = pal_cell_point(p, at);
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+        double at[3], g[PAL_CELL_MAX_NODES][3];
+        to->weight[p] = pal_cell_gauss_point(p, at);
         pal_cell_shape(n_node, at, NULL, g);
         for (int m = 0; m < n_node; m++)
             for (int b = 0; b < 3; b++) to->g[m][b][p] = g[m][b];
@@ -91,12 +92,12 @@ static void fill(gradients *to, int n_node)
 /* volume of an element; its least det J against the mean */
 static double element_volume(const gradients *to, const double *x, const int32_t *node, int n, double *least)
 {
-    double J[3][3][PAL_CELL_POINTS] = {{{0}}}, volume = 0, low = DBL_MAX;
+    double J[3][3][PAL_CELL_GAUSS_POINTS] = {{{0}}}, volume = 0, low = DBL_MAX;
     for (int m = 0; m < n; m++)
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
-                for (int p = 0; p < PAL_CELL_POINTS; p++) J[a][b][p] += x[3 * node[m] + a] * to->g[m][b][p];
-    for (int p = 0; p < PAL_CELL_POINTS; p++) {
+                for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) J[a][b][p] += x[3 * node[m] + a] * to->g[m][b][p];
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
         double d = J[0][0][p] * (J[1][1][p] * J[2][2][p] - J[1][2][p] * J[2][1][p]) -
                    J[0][1][p] * (J[1][0][p] * J[2][2][p] - J[1][2][p] * J[2][0][p]) +
                    J[0][2][p] * (J[1][0][p] * J[2][1][p] - J[1][1][p] * J[2][0][p]);
@@ -173,11 +174,11 @@ static void elements_are_as_many_as_their_cells_make(void)
 
 static double *places(const pal_cell_elements *e, const pal_subdivision *s, const double *p)
 {
-    pal_point_rows rows = {0};
+    pal_interpolation rows = {0};
     double *d = malloc((size_t)(e->n_vertex + e->n_virtual) * 3 * sizeof *d);
-    if (!d || pal_cell_elements_rows(e, &s->rows, &rows)) abort();
-    pal_point_rows_place(&rows, p, d);
-    pal_point_rows_free(&rows);
+    if (!d || pal_cell_elements_interpolation(e, &s->rows, &rows)) abort();
+    pal_interpolation_apply(&rows, p, d);
+    pal_interpolation_free(&rows);
     return d;
 }
 
@@ -186,10 +187,10 @@ static void sound_with(const char *name, int n_level, pal_subdivision_rule rule)
     pal_cells c = of(name);
     pal_subdivision s = refined(&c, n_level, rule);
     pal_cell_elements e = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     double low;
     REQUIRE(s.cells.n_cell > 0);
-    if (pal_cell_elements_make(&s.cells, &e, &note)) CHECK_FAIL("%s: %s", name, note.text);
+    if (pal_cell_elements_make(&s.cells, &e, &diag)) CHECK_FAIL("%s: %s", name, diag.text);
     double *x = places(&e, &s, c.x);
     double volume = quadrature(&e, x, &low);
     if (!(low > 0)) CHECK_FAIL("%s at level %d: det J is %g of the element's mean", name, n_level, low);
@@ -223,8 +224,8 @@ static void letters_of_a_lattice_are_bricks_pyramids_and_wedges(void)
         const char text[2] = {*at, 0}, *const row[1] = {text};
         const pal_cell_lattice lattice = {{1, 1, 1}, false, row, place_as_it_is};
         pal_cells c = {0};
-        pal_note note = {"no note"};
-        if (pal_cell_lattice_make(&lattice, &c, &note)) CHECK_FAIL("%c: %s", *at, note.text);
+        pal_diagnostic diag = {"no note"};
+        if (pal_cell_lattice_make(&lattice, &c, &diag)) CHECK_FAIL("%c: %s", *at, diag.text);
         double want = *at == '#' || *at == 'X' ? 1 : *at >= 'a' ? 1.0 / 2 : 1.0 / 3;
         CHECK_NEAR(pal_cells_volume(&c, NULL), want, 1e-15);
         CHECK_INT(c.n_cell, *at == 'X' ? 6 : 1);
@@ -251,9 +252,9 @@ static void letters_of_a_lattice_are_bricks_pyramids_and_wedges(void)
     const char *const bad[1] = {"#?"};
     const pal_cell_lattice lattice = {{2, 1, 1}, false, bad, place_as_it_is};
     pal_cells c = {0};
-    pal_note note = {""};
-    CHECK_INT(pal_cell_lattice_make(&lattice, &c, &note), PAL_ERR_INTERNAL);
-    CHECK_TEXT(note.text, "cells: a lattice has the letter \"?\"");
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_cell_lattice_make(&lattice, &c, &diag), PAL_ERR_INTERNAL);
+    CHECK_TEXT(diag.text, "cells: a lattice has the letter \"?\"");
 }
 
 /* V - E + F of a closed surface is 2 - 2 genus; files give positions back as their numbers allow */
@@ -285,9 +286,9 @@ static void boundaries_read_back_closed_with_their_genus(void)
         pal_surface_free(&out);
         pal_cells_free(&c);
     }
-    pal_note note = {""};
-    CHECK_INT(pal_mesh_file_write("chair.off", &(pal_surface){0}, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "chair.off: surfaces are written to .ply, .obj or .stl files");
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_mesh_file_write("chair.off", &(pal_surface){0}, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "chair.off: surfaces are written to .ply, .obj or .stl files");
 }
 
 int main(void)

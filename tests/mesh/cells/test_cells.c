@@ -5,14 +5,14 @@
 #include "tests/check.h"
 #include "tests/stability/hard_case.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 
 static pal_cells block(int x, int y, int z)
 {
     pal_cells c = {0};
     const int32_t n[3] = {x, y, z};
     const double size[3] = {x, y, z};
-    if (pal_cells_block(n, size, &c, &note)) abort();
+    if (pal_cells_block(n, size, &c, &diag)) abort();
     return c;
 }
 
@@ -24,7 +24,7 @@ static pal_cells cubes(int n, bool (*keep)(int, int, int), pal_err *err)
     bool flag[1000];
     for (int i = 0; i < n * n * n; i++) flag[i] = keep(i % n, i / n % n, i / n / n);
     if (pal_cells_loops(&whole, &loops) || pal_cell_loops_keep(&loops, flag, NULL)) abort();
-    *err = pal_cells_make(&loops, &c, &note);
+    *err = pal_cells_make(&loops, &c, &diag);
     pal_cell_loops_free(&loops);
     pal_cells_free(&whole);
     return c;
@@ -40,7 +40,7 @@ static void a_block_has_the_counts_of_a_grid(void)
     CHECK_INT(c.n_boundary_face, 2 * (6 + 8 + 12));
     CHECK_INT(c.cell_vertex.start[24], 8 * 24);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 24, 1e-12);
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
     int inner = 0;
     for (int v = 0; v < c.n_vertex; v++) {
         if (c.vertex_boundary[v]) continue;
@@ -56,7 +56,7 @@ static void a_block_has_the_counts_of_a_grid(void)
 static void radial_mate_radial_mate_visits_every_cell_round_an_edge_once(void)
 {
     pal_cells c;
-    REQUIRE(!pal_cells_torus(5, 2, 1, .4, &c, &note));
+    REQUIRE(!pal_cells_torus(5, 2, 1, .4, &c, &diag));
     int n_inner = 0, n_extraordinary = 0;
     for (int first = 0; first < c.n_edge_use; first++) {
         int e = c.edge_use[first].edge, n = c.edge_cell.start[e + 1] - c.edge_cell.start[e], seen[64], n_seen = 0;
@@ -84,9 +84,9 @@ static void turning_round_a_corner_meets_its_faces_counter_clockwise(void)
         double way[3][3] = {{0}};
         do {
             REQUIRE(n < 3 && c.edge_use[at].vertex == v);
-            for (int a = 0; a < 3; a++) way[n][a] = c.x[3 * pal_cells_far(&c, at) + a] - c.x[3 * v + a];
+            for (int a = 0; a < 3; a++) way[n][a] = c.x[3 * pal_cells_end_vertex(&c, at) + a] - c.x[3 * v + a];
             n++;
-            at = pal_cells_turn(&c, at);
+            at = pal_cells_next_around(&c, at);
         } while (at != u);
         CHECK_INT(n, 3);
         /* seen from outside counter-clockwise: the three ways into the cube are a left-handed set */
@@ -104,12 +104,12 @@ static void next_and_prev_undo_each_other_and_over_walks_the_boundary(void)
     int n_over = 0;
     for (int u = 0; u < c.n_edge_use; u++) {
         CHECK_INT(pal_cells_next(&c, pal_cells_prev(&c, u)), u);
-        CHECK_INT(pal_cells_far(&c, u), c.edge_use[pal_cells_next(&c, u)].vertex);
+        CHECK_INT(pal_cells_end_vertex(&c, u), c.edge_use[pal_cells_next(&c, u)].vertex);
         if (c.edge_use[u].mate >= 0) continue;
-        int over = pal_cells_over(&c, u);
+        int over = pal_cells_across_edge(&c, u);
         n_over++;
-        CHECK_INT(pal_cells_over(&c, over), u);
-        CHECK_INT(c.edge_use[over].vertex, pal_cells_far(&c, u));
+        CHECK_INT(pal_cells_across_edge(&c, over), u);
+        CHECK_INT(c.edge_use[over].vertex, pal_cells_end_vertex(&c, u));
         CHECK(c.edge_use[over].mate < 0 && over != u);
     }
     CHECK_INT(n_over, 4 * c.n_boundary_face);
@@ -164,7 +164,7 @@ static void holes_and_hollows_are_counted(void)
     REQUIRE(!err);
     check_genus(&c, 1, 2, 0);
     pal_cells_free(&c);
-    REQUIRE(!pal_cells_ring(8, 1, .2, &c, &note));
+    REQUIRE(!pal_cells_ring(8, 1, .2, &c, &diag));
     CHECK_INT(c.n_cell, 8);
     check_genus(&c, 1, 1, 1);
     pal_cells_free(&c);
@@ -190,7 +190,7 @@ static void cells_that_touch_in_an_edge_or_a_corner_are_marked(void)
     REQUIRE(!err);
     CHECK_INT(c.n_pinched_edge, 1);
     CHECK_INT(c.n_pinched_vertex, 2);
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
     check_genus(&c, 2, 2, 0);
     pal_cells_free(&c);
     c = cubes(2, two_by_a_corner, &err);
@@ -211,9 +211,9 @@ static void the_boundary_is_closed_and_outward(void)
     pal_cells shape[4];
     const int32_t n[3] = {7, 2, 3};
     shape[0] = block(2, 3, 2);
-    REQUIRE(!pal_cells_ring(6, 1, .3, &shape[1], &note));
-    REQUIRE(!pal_cells_tube(n, .5, .8, 2, &shape[2], &note));
-    REQUIRE(!pal_cells_torus(9, 2, 1, .4, &shape[3], &note));
+    REQUIRE(!pal_cells_ring(6, 1, .3, &shape[1], &diag));
+    REQUIRE(!pal_cells_tube(n, .5, .8, 2, &shape[2], &diag));
+    REQUIRE(!pal_cells_torus(9, 2, 1, .4, &shape[3], &diag));
     for (int k = 0; k < 4; k++) {
         pal_surface s;
         pal_surface_topology t;
@@ -245,44 +245,44 @@ static void shapes_have_the_volume_and_the_size_they_should(void)
     const int32_t n[3] = {200, 1, 1};
     /* a regular polygon of n corners has the area n/2 sin(2 pi / n) of its circle's square */
     double polygon = 100 * sin(2 * pi / 200);
-    REQUIRE(!pal_cells_tube(n, 1, 2, 5, &c, &note));
+    REQUIRE(!pal_cells_tube(n, 1, 2, 5, &c, &diag));
     CHECK_NEAR(pal_cells_volume(&c, NULL), polygon * 3 * 5, 1e-9);
     pal_cells_free(&c);
     /* Pappus: n sections of area A whose middle goes round a polygon; the section is one of 12 corners */
-    REQUIRE(!pal_cells_torus(200, 3, 2, .5, &c, &note));
+    REQUIRE(!pal_cells_torus(200, 3, 2, .5, &c, &diag));
     CHECK_INT(c.n_cell, 200 * 45);
     CHECK_NEAR(pal_cells_volume(&c, NULL), polygon * 2 * 2 * (6 * sin(pi / 6) * .25), 1e-9);
     check_genus(&c, 1, 1, 1);
     pal_cells_free(&c);
-    REQUIRE(!pal_cells_ring(3, 1, .2, &c, &note));
+    REQUIRE(!pal_cells_ring(3, 1, .2, &c, &diag));
     CHECK_INT(c.n_vertex, 12);
     pal_cells_free(&c);
     const int32_t none[3] = {2, 0, 2}, many[3] = {1000, 1000, 2};
     const double size[3] = {1, 1, 1}, flat[3] = {1, 1, 0};
-    CHECK_INT(pal_cells_block(none, size, &c, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "cells: number of cells along y is 0, must be 1 to 1000000");
-    CHECK_INT(pal_cells_block(many, size, &c, &note), PAL_ERR_BUDGET);
-    CHECK_INT(pal_cells_block(n, flat, &c, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "cells: size along z is 0 m, must be above 0 and at most 1e8");
-    CHECK_INT(pal_cells_ring(2, 1, .2, &c, &note), PAL_ERR_REFUSED);
-    CHECK_INT(pal_cells_ring(8, .1, .2, &c, &note), PAL_ERR_REFUSED);
-    CHECK_INT(pal_cells_torus(8, 1, .2, .2, &c, &note), PAL_ERR_REFUSED);
-    CHECK_INT(pal_cells_torus(INT32_MAX, INT32_MAX, 1, .2, &c, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_cells_block(none, size, &c, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "cells: number of cells along y is 0, must be 1 to 1000000");
+    CHECK_INT(pal_cells_block(many, size, &c, &diag), PAL_ERR_BUDGET);
+    CHECK_INT(pal_cells_block(n, flat, &c, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "cells: size along z is 0 m, must be above 0 and at most 1e8");
+    CHECK_INT(pal_cells_ring(2, 1, .2, &c, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_ring(8, .1, .2, &c, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_torus(8, 1, .2, .2, &c, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_torus(INT32_MAX, INT32_MAX, 1, .2, &c, &diag), PAL_ERR_BUDGET);
 }
 
 static void loops_give_the_same_complex_again(void)
 {
     pal_cells c = block(2, 2, 1), again, copy;
     pal_cell_loops loops;
-    c.vertex_sharp[3] = 2, c.edge[5].sharp = .5f, c.face[7].sharp = PAL_SHARP_EVER;
+    c.vertex_sharpness[3] = 2, c.edge[5].sharp = .5f, c.face[7].sharp = PAL_SHARPNESS_MAX;
     c.x[4] = nextafter(c.x[4], 9);
     REQUIRE(!pal_cells_loops(&c, &loops));
-    REQUIRE(!pal_cells_make(&loops, &again, &note));
+    REQUIRE(!pal_cells_make(&loops, &again, &diag));
     CHECK(pal_cells_equal(&c, &again));
-    CHECK(again.edge[5].sharp == .5f && again.face[7].sharp == PAL_SHARP_EVER && again.vertex_sharp[3] == 2);
+    CHECK(again.edge[5].sharp == .5f && again.face[7].sharp == PAL_SHARPNESS_MAX && again.vertex_sharpness[3] == 2);
     REQUIRE(!pal_cells_copy(&again, &copy));
     CHECK(pal_cells_equal(&copy, &again));
-    CHECK_INT(pal_cells_check(&copy, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&copy, NULL, &diag), PAL_ERR_OK);
     copy.x[0] = nextafter(copy.x[0], 9);
     CHECK(!pal_cells_equal(&copy, &again));
     again.edge[1].sharp = .25f;
@@ -299,18 +299,18 @@ static void deleting_cells_keeps_what_is_left_as_it_was(void)
     pal_cell_loops loops;
     bool keep[3] = {false, true, true};
     int32_t kept[16];
-    for (int v = 0; v < c.n_vertex; v++) c.vertex_sharp[v] = (float)v;
+    for (int v = 0; v < c.n_vertex; v++) c.vertex_sharpness[v] = (float)v;
     for (int e = 0; e < c.n_edge; e++) c.edge[e].sharp = (float)(1 + e);
     for (int f = 0; f < c.n_face; f++) c.face[f].sharp = (float)(1 + f);
     REQUIRE(!pal_cells_loops(&c, &loops));
     REQUIRE(!pal_cell_loops_keep(&loops, keep, kept));
-    REQUIRE(!pal_cells_make(&loops, &left, &note));
+    REQUIRE(!pal_cells_make(&loops, &left, &diag));
     CHECK_INT(left.n_cell, 2);
     CHECK_INT(left.n_vertex, 12);
     CHECK_NEAR(pal_cells_volume(&left, NULL), 2, 1e-12);
     for (int v = 0; v < left.n_vertex; v++) {
         CHECK(left.x[3 * v] == c.x[3 * kept[v]]);
-        CHECK(left.vertex_sharp[v] == (float)kept[v]);
+        CHECK(left.vertex_sharpness[v] == (float)kept[v]);
     }
     /* sharpnesses are numbers of the old edges and faces: compare their places */
     for (int e = 0; e < left.n_edge; e++) {
@@ -360,12 +360,12 @@ static void any_polyhedra_go_together(void)
     loop[l] = n;
     pal_cell_loops loops = {.n_vertex = 2 * N + 1, .n_cell = 2, .x = x, .cell = cell, .loop = loop, .corner = corner};
     pal_cells c;
-    REQUIRE(!pal_cells_make(&loops, &c, &note));
+    REQUIRE(!pal_cells_make(&loops, &c, &diag));
     double area = N / 2. * sin(2 * 3.14159265358979323846 / N);
     CHECK_NEAR(pal_cells_volume(&c, NULL), area * (1 + 1. / 3), 1e-12);
     CHECK_INT(c.n_face, 2 * N + 2);
     CHECK_INT(c.n_boundary_face, 2 * N + 1);
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
     check_genus(&c, 1, 1, 0);
     pal_surface s;
     REQUIRE(!pal_cells_boundary(&c, &s, NULL, NULL));
@@ -395,12 +395,12 @@ static void reverse_loop(pal_cell_loops *l, int k)
 static void refused(pal_cell_loops l, const char *words)
 {
     pal_cells c = {.n_vertex = -7};
-    CHECK_INT(pal_cells_make(&l, &c, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_make(&l, &c, &diag), PAL_ERR_REFUSED);
     CHECK_INT(c.n_vertex, -7);
-    if (!strstr(note.text, words)) CHECK_TEXT(note.text, words);
+    if (!strstr(diag.text, words)) CHECK_TEXT(diag.text, words);
     HARD_CASE_ALL("broken_surface", "subdivision_fem", "no complex of cells, flat, NaN: refused by number",
-                  strstr(note.text, words) != NULL, 1);
-    CHECK(!strchr(note.text, '\n'));
+                  strstr(diag.text, words) != NULL, 1);
+    CHECK(!strchr(diag.text, '\n'));
     CHECK_INT(pal_cells_make(&l, &c, NULL), PAL_ERR_REFUSED);
     pal_cell_loops_free(&l);
 }
@@ -444,7 +444,7 @@ static void what_is_no_complex_is_refused_in_a_sentence(void)
     l.loop[2] = 6;
     refused(l, "cells: cell 0, face 1: 2 corners, must be 3 to 256");
     l = open_block(1, 1, 1);
-    l.vertex_sharp[4] = -1;
+    l.vertex_sharpness[4] = -1;
     refused(l, "cells: vertex 4 has sharpness -1, must be 0 to 1e+06");
     pal_cell_tag tag = {0, 7, 1};
     l = open_block(1, 1, 1);
@@ -469,7 +469,7 @@ static pal_err make_tets(const double *x, int n_vertex, const int32_t *corner, i
     for (int f = 0; f <= 4 * n_tet; f++) loop[f] = 3 * f;
     for (int i = 0; i < 12 * n_tet; i++) list[i] = corner[i / 12 * 4 + FACE[i % 12 / 3][i % 3]];
     pal_cell_loops l = {.n_vertex = n_vertex, .n_cell = n_tet, .x = copy, .cell = cell, .loop = loop, .corner = list};
-    return pal_cells_make(&l, c, &note);
+    return pal_cells_make(&l, c, &diag);
 }
 
 static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
@@ -478,7 +478,7 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
     static const int32_t three[12] = {0, 1, 2, 3, 0, 2, 1, 4, 0, 1, 2, 5};
     pal_cells c;
     CHECK_INT(make_tets(x, 6, three, 3, &c), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "cells: cell 2, face 0: is a face of cells 0 and 1 already, a face has two cells at most");
+    CHECK_TEXT(diag.text, "cells: cell 2, face 0: is a face of cells 0 and 1 already, a face has two cells at most");
     CHECK_INT(make_tets(x, 5, three, 2, &c), PAL_ERR_OK);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 1. / 3, 1e-15);
     pal_cells_free(&c);
@@ -487,7 +487,7 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
                                     -.5, -.8, 0,  1.1, 0, 0, -.6, .9, 0, -.6, -.9, 0};
     static const int32_t twice[24] = {0, 2, 3, 1, 0, 3, 4, 1, 0, 4, 2, 1, 0, 5, 6, 1, 0, 6, 7, 1, 0, 7, 5, 1};
     CHECK_INT(make_tets(ring, 8, twice, 6, &c), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "more than once round the edge of vertices"));
+    CHECK(strstr(diag.text, "more than once round the edge of vertices"));
     CHECK_INT(make_tets(ring, 5, twice, 3, &c), PAL_ERR_OK);
     CHECK_INT(c.n_face - c.n_boundary_face, 3);
     pal_cells_free(&c);
@@ -499,7 +499,7 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
     refused(l, "cells: cell 0 is in pieces");
     /* a cell that is a ring: three bricks in a circle as one, their common faces left out */
     pal_cells ring3;
-    REQUIRE(!pal_cells_ring(3, 1, .3, &ring3, &note));
+    REQUIRE(!pal_cells_ring(3, 1, .3, &ring3, &diag));
     REQUIRE(!pal_cells_loops(&ring3, &l));
     int n = 0, n_corner = 0;
     for (int f = 0; f < ring3.n_face_use; f++) {
@@ -535,23 +535,23 @@ static void every_broken_index_is_found_by_the_check(void)
             int32_t was = list[k].at[i], step = (int32_t)((state = state * 1664525u + 1013904223u) >> 28) + 1;
             list[k].at[i] = was + step;
             n_try++;
-            n_found += pal_cells_check(&c, NULL, &note) == PAL_ERR_REFUSED;
+            n_found += pal_cells_check(&c, NULL, &diag) == PAL_ERR_REFUSED;
             /* another edge use of the same corner is as good */
-            if (list[k].at == c.corner_use && pal_cells_check(&c, NULL, &note) == PAL_ERR_OK) n_found++;
+            if (list[k].at == c.corner_use && pal_cells_check(&c, NULL, &diag) == PAL_ERR_OK) n_found++;
             list[k].at[i] = was;
         }
     CHECK(n_try > 300);
     CHECK_INT(n_found, n_try);
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_OK);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
     c.edge[3].boundary = !c.edge[3].boundary;
-    CHECK_INT(pal_cells_check(&c, NULL, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_REFUSED);
     c.edge[3].boundary = !c.edge[3].boundary;
     double *x = malloc((size_t)c.n_vertex * 24);
     REQUIRE(x);
     memcpy(x, c.x, (size_t)c.n_vertex * 24);
     x[3 * 13] += 5; /* the inner vertex */
-    CHECK_INT(pal_cells_check(&c, x, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "has no positive volume"));
+    CHECK_INT(pal_cells_check(&c, x, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "has no positive volume"));
     free(x);
     pal_cells_free(&c);
 }

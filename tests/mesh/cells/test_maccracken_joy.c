@@ -10,13 +10,13 @@
 static pal_subdivision of(const pal_cells *c, int n_level, pal_subdivision_rule rule)
 {
     pal_subdivision s = {0};
-    pal_note note = {"no note"};
+    pal_diagnostic diag = {"no note"};
     const pal_subdivision_options o = {.n_level = n_level, .rule = rule};
-    if (pal_subdivision_make(c, &o, &s, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_subdivision_make(c, &o, &s, &diag)) CHECK_FAIL("%s", diag.text);
     return s;
 }
 
-static double weight_of(const pal_point_rows *r, int32_t row, int32_t point)
+static double weight_of(const pal_interpolation *r, int32_t row, int32_t point)
 {
     for (int32_t k = r->start[row]; k < r->start[row + 1]; k++)
         if (r->point[k] == point) return r->weight[k];
@@ -24,7 +24,7 @@ static double weight_of(const pal_point_rows *r, int32_t row, int32_t point)
 }
 
 /* control vertices of new vertex i, which stands in the mean of them before anything is smoothed */
-static int origin_of(const pal_cells *c, int32_t i, int32_t out[PAL_CELL_LOOP_MOST], bool *boundary)
+static int origin_of(const pal_cells *c, int32_t i, int32_t out[PAL_CELL_LOOP_MAX], bool *boundary)
 {
     int32_t first, n;
     *boundary = false;
@@ -68,7 +68,7 @@ static void lattice_place(int32_t v, int out[3])
 }
 
 /* largest difference of a row from the product of masks along the axes that are true */
-static double row_error(const pal_point_rows *rows, int32_t row, const int32_t *old, int n_old, const bool axis[3],
+static double row_error(const pal_interpolation *rows, int32_t row, const int32_t *old, int n_old, const bool axis[3],
                         int *most)
 {
     int place[3] = {0, 0, 0}, at[3], wanted = 0;
@@ -109,23 +109,23 @@ static void masks_of(pal_subdivision_rule rule)
 {
     pal_cells c = solid_block(SIDE, SIDE, SIDE);
     pal_subdivision s = of(&c, 1, rule);
-    int most_inner = 0, most_face = 0, n_inner = 0, n_face = 0;
+    int most_inner = 0, max_face = 0, n_inner = 0, n_face = 0;
     double inner = 0, face = 0;
     for (int32_t i = 0; i < s.rows.n_row; i++) {
-        int32_t old[PAL_CELL_LOOP_MOST];
+        int32_t old[PAL_CELL_LOOP_MAX];
         bool boundary, axis[3];
         int n = origin_of(&c, i, old, &boundary);
         if (!spans(old, n, axis)) continue;
         CHECK(boundary == !(axis[0] && axis[1] && axis[2]));
         if (boundary)
-            face = fmax(face, row_error(&s.rows, i, old, n, axis, &most_face)), n_face++;
+            face = fmax(face, row_error(&s.rows, i, old, n, axis, &max_face)), n_face++;
         else
             inner = fmax(inner, row_error(&s.rows, i, old, n, axis, &most_inner)), n_inner++;
     }
     CHECK_LE(inner, 1e-12);
     CHECK_LE(face, 1e-12);
     CHECK_INT(most_inner, 27);
-    CHECK_INT(most_face, 9);
+    CHECK_INT(max_face, 9);
     /* 11^3 new vertices, 9^3 of them inside, 6 9^2 inside the block's faces */
     CHECK_INT(s.rows.n_row, 1331);
     CHECK_INT(n_inner, 729);
@@ -167,16 +167,16 @@ static pal_cells sort(int which)
 /* some of everything, more or less; inner edges and vertices are left out, whose neighbours may fold over */
 static void sharpen(pal_cells *c, uint64_t seed)
 {
-    static const float sharp[5] = {0.3f, 1, 1.6f, 3, PAL_SHARP_EVER};
+    static const float sharp[5] = {0.3f, 1, 1.6f, 3, PAL_SHARPNESS_MAX};
     for (int32_t v = 0; v < c->n_vertex; v++)
-        if (c->vertex_boundary[v] && pal_random_bits(seed, (uint64_t)v) % 7 == 0) c->vertex_sharp[v] = sharp[v % 5];
+        if (c->vertex_boundary[v] && pal_random_bits(seed, (uint64_t)v) % 7 == 0) c->vertex_sharpness[v] = sharp[v % 5];
     for (int32_t e = 0; e < c->n_edge; e++)
         if (c->edge[e].boundary && pal_random_bits(seed + 1, (uint64_t)e) % 3 == 0) c->edge[e].sharp = sharp[e % 5];
     for (int32_t f = 0; f < c->n_face; f++)
         if (pal_random_bits(seed + 2, (uint64_t)f) % 5 == 0) c->face[f].sharp = sharp[f % 5];
 }
 
-static double worst_row(const pal_point_rows *r)
+static double worst_row(const pal_interpolation *r)
 {
     double worst = 0;
     for (int32_t i = 0; i < r->n_row; i++) {
@@ -203,8 +203,8 @@ static void rows_sum_to_one_whatever_is_subdivided(void)
                 CHECK_INT(s.rows.n_point, c.n_vertex);
                 CHECK_INT(s.rows.n_row, s.cells.n_vertex);
                 CHECK_LE(worst_row(&s.rows), 1e-12);
-                pal_note note = {"no note"};
-                if (pal_cells_check(&s.cells, NULL, &note)) CHECK_FAIL("%s", note.text);
+                pal_diagnostic diag = {"no note"};
+                if (pal_cells_check(&s.cells, NULL, &diag)) CHECK_FAIL("%s", diag.text);
                 pal_subdivision_free(&s);
                 pal_cells_free(&c);
             }
@@ -219,7 +219,7 @@ static void positions_are_the_rows_of_the_control_points_and_follow_affine_maps(
         pal_subdivision s = of(&c, 2, which & 1 ? PAL_SUBDIVISION_AVERAGING : PAL_SUBDIVISION_MACCRACKEN_JOY);
         double *d = malloc((size_t)s.cells.n_vertex * 3 * sizeof *d), worst = 0;
         REQUIRE(d && s.n_level == 2);
-        pal_point_rows_place(&s.rows, c.x, d);
+        pal_interpolation_apply(&s.rows, c.x, d);
         CHECK(memcmp(d, s.cells.x, (size_t)s.cells.n_vertex * 3 * sizeof *d) == 0);
         for (int32_t v = 0; v < c.n_vertex; v++) {
             double y[3], *x = c.x + 3 * v;
@@ -227,7 +227,7 @@ static void positions_are_the_rows_of_the_control_points_and_follow_affine_maps(
                 y[a] = map[3 * a] * x[0] + map[3 * a + 1] * x[1] + map[3 * a + 2] * x[2] + shift[a];
             memcpy(x, y, sizeof y);
         }
-        pal_point_rows_place(&s.rows, c.x, d);
+        pal_interpolation_apply(&s.rows, c.x, d);
         for (int32_t i = 0; i < s.cells.n_vertex; i++)
             for (int a = 0; a < 3; a++) {
                 const double *x = s.cells.x + 3 * i;
@@ -289,7 +289,7 @@ static void the_boundary_is_a_catmull_clark_surface_level_after_level(void)
             double worst = 0, inner = 0;
             int step = level ? 3 : 1, n = 0;
             for (int32_t i = 0; i < then.cells.n_vertex; i += step) {
-                int32_t old[PAL_CELL_LOOP_MOST];
+                int32_t old[PAL_CELL_LOOP_MAX];
                 bool boundary;
                 double want[3];
                 int n_old = origin_of(&now.cells, i, old, &boundary);
@@ -374,7 +374,7 @@ static void a_level_has_the_cells_that_it_should(void)
         CHECK_INT(s.cells.n_edge_use, 8 * c.n_edge_use);
         for (int32_t i = 0; i < c.cell_vertex.start[c.n_cell]; i++) {
             int32_t use = c.corner_use[i], n = 0;
-            do n++, use = pal_cells_turn(&c, use);
+            do n++, use = pal_cells_next_around(&c, use);
             while (use != c.corner_use[i]);
             CHECK_INT(s.cells.cell_use[i + 1] - s.cells.cell_use[i], 2 * n);
             CHECK_INT(s.cells.cell_vertex.item[s.cells.cell_vertex.start[i]], c.cell_vertex.item[i]);
@@ -388,7 +388,7 @@ static void a_level_has_the_cells_that_it_should(void)
 static void every_cell_and_face_knows_where_it_came_from(void)
 {
     pal_cells c = solid_block(2, 3, 2);
-    for (int32_t e = 0; e < c.n_edge; e++) c.edge[e].sharp = c.edge[e].boundary ? PAL_SHARP_EVER : 0;
+    for (int32_t e = 0; e < c.n_edge; e++) c.edge[e].sharp = c.edge[e].boundary ? PAL_SHARPNESS_MAX : 0;
     pal_subdivision s = of(&c, 2, PAL_SUBDIVISION_MACCRACKEN_JOY);
     int n_cell[12] = {0}, n_face[64] = {0}, inside = 0;
     REQUIRE(s.n_level == 2 && c.n_cell == 12 && c.n_face <= 64);
@@ -456,7 +456,7 @@ static void a_cube_with_sharp_edges_stays_a_cube(void)
             const double *p = c.x + 3 * c.edge[e].vertex[0], *q = c.x + 3 * c.edge[e].vertex[1];
             int on = 0;
             for (int a = 0; a < 3; a++) on += fabs(p[a]) == 1 && p[a] == q[a];
-            c.edge[e].sharp = on == 2 ? PAL_SHARP_EVER : 0;
+            c.edge[e].sharp = on == 2 ? PAL_SHARPNESS_MAX : 0;
         }
         pal_subdivision s = of(&c, 3, (pal_subdivision_rule)rule);
         REQUIRE(s.n_level == 3);
@@ -493,9 +493,9 @@ static void a_crease_is_a_curve_of_its_own_and_straight_when_it_was(void)
         for (int k = 0; k < N; k++) {
             int32_t e = solid_edge(&c, first + k, first + k + 1);
             REQUIRE(e >= 0);
-            c.edge[e].sharp = PAL_SHARP_EVER;
+            c.edge[e].sharp = PAL_SHARPNESS_MAX;
         }
-        c.vertex_sharp[first] = c.vertex_sharp[first + N] = PAL_SHARP_EVER;
+        c.vertex_sharpness[first] = c.vertex_sharpness[first + N] = PAL_SHARPNESS_MAX;
         pal_subdivision s = of(&c, 1, PAL_SUBDIVISION_MACCRACKEN_JOY), t = of(&c, 3, PAL_SUBDIVISION_AVERAGING);
         REQUIRE(s.n_level == 1 && t.n_level == 3);
         for (int k = 0; k <= N; k++)
@@ -509,7 +509,7 @@ static void a_crease_is_a_curve_of_its_own_and_straight_when_it_was(void)
             }
         int n_edge = 0;
         for (int32_t e = 0; e < t.cells.n_edge; e++) {
-            if (t.cells.edge[e].sharp < PAL_SHARP_EVER) continue;
+            if (t.cells.edge[e].sharp < PAL_SHARPNESS_MAX) continue;
             n_edge++;
             const double *x = t.cells.x + 3 * t.cells.edge[e].vertex[0];
             if (!bent) CHECK_LE(fabs(x[1] + 1) + fabs(x[2] - 1), 1e-13);
@@ -531,10 +531,10 @@ static void semi_sharp_blends_and_wears_off(void)
     for (int32_t f = 0; f < c.n_face; f++)
         if (!pal_cells_face_boundary(&c, f)) face = f;
     REQUIRE(inner >= 0 && rim >= 0 && face >= 0 && !c.edge[inner].boundary && c.edge[rim].boundary);
-    const float sharp[5] = {0, 1, 0.3f, 1.5f, PAL_SHARP_EVER};
+    const float sharp[5] = {0, 1, 0.3f, 1.5f, PAL_SHARPNESS_MAX};
     pal_subdivision s[5];
     for (int k = 0; k < 5; k++) {
-        c.edge[inner].sharp = c.edge[rim].sharp = c.face[face].sharp = c.vertex_sharp[vertex] = sharp[k];
+        c.edge[inner].sharp = c.edge[rim].sharp = c.face[face].sharp = c.vertex_sharpness[vertex] = sharp[k];
         s[k] = of(&c, 1, PAL_SUBDIVISION_MACCRACKEN_JOY);
         REQUIRE(s[k].n_level == 1);
         CHECK_LE(worst_row(&s[k].rows), 1e-14);
@@ -554,13 +554,13 @@ static void semi_sharp_blends_and_wears_off(void)
     }
     for (int a = 0; a < 3; a++) CHECK_NEAR(s[1].cells.x[3 * vertex + a], c.x[3 * vertex + a], 0);
     /* one level less of each */
-    const float left[5] = {0, 0, 0, 0.5f, PAL_SHARP_EVER};
+    const float left[5] = {0, 0, 0, 0.5f, PAL_SHARPNESS_MAX};
     for (int k = 0; k < 5; k++) {
         const pal_cells *t = &s[k].cells;
         int32_t half = solid_edge(t, c.edge[rim].vertex[0], c.n_vertex + rim);
         REQUIRE(half >= 0);
         CHECK_NEAR(t->edge[half].sharp, left[k], 0);
-        CHECK_NEAR(t->vertex_sharp[vertex], left[k], 0);
+        CHECK_NEAR(t->vertex_sharpness[vertex], left[k], 0);
         int n = 0;
         for (int32_t f = 0; f < t->n_face; f++) {
             CHECK_NEAR(t->face[f].sharp, s[k].face_origin[f] == face ? left[k] : 0, 0);
@@ -637,23 +637,23 @@ static void what_is_too_much_or_folds_over_is_refused_by_name(void)
 {
     pal_cells c = solid_block(4, 4, 4);
     pal_subdivision s = {0};
-    pal_note note = {""};
-    pal_subdivision_options o = {.n_level = PAL_SUBDIVISION_MOST + 1};
-    CHECK_INT(pal_subdivision_make(&c, &o, &s, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "subdivision: 9 levels asked for, 0 to 8 are made");
+    pal_diagnostic diag = {""};
+    pal_subdivision_options o = {.n_level = PAL_SUBDIVISION_MAX + 1};
+    CHECK_INT(pal_subdivision_make(&c, &o, &s, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "subdivision: 9 levels asked for, 0 to 8 are made");
     o.n_level = -1;
-    CHECK_INT(pal_subdivision_make(&c, &o, &s, &note), PAL_ERR_REFUSED);
-    o.n_level = PAL_SUBDIVISION_MOST;
-    CHECK_INT(pal_subdivision_make(&c, &o, &s, &note), PAL_ERR_BUDGET);
-    CHECK(strstr(note.text, "subdivision: level ") == note.text && strstr(note.text, "the budget is 512 MiB"));
+    CHECK_INT(pal_subdivision_make(&c, &o, &s, &diag), PAL_ERR_REFUSED);
+    o.n_level = PAL_SUBDIVISION_MAX;
+    CHECK_INT(pal_subdivision_make(&c, &o, &s, &diag), PAL_ERR_BUDGET);
+    CHECK(strstr(diag.text, "subdivision: level ") == diag.text && strstr(diag.text, "the budget is 512 MiB"));
     for (size_t kib = 4; kib <= 4096; kib *= 4) {
         o = (pal_subdivision_options){.n_level = 2, .budget_byte = kib << 10};
-        pal_err err = pal_subdivision_make(&c, &o, &s, &note);
-        CHECK(err == PAL_ERR_BUDGET && strstr(note.text, "MiB"));
+        pal_err err = pal_subdivision_make(&c, &o, &s, &diag);
+        CHECK(err == PAL_ERR_BUDGET && strstr(diag.text, "MiB"));
         CHECK(!s.rows.start && !s.cells.x);
     }
     o.budget_byte = (size_t)32 << 20;
-    CHECK_INT(pal_subdivision_make(&c, &o, &s, &note), PAL_ERR_OK);
+    CHECK_INT(pal_subdivision_make(&c, &o, &s, &diag), PAL_ERR_OK);
     CHECK_LE((double)s.n_byte, (double)o.budget_byte);
     pal_subdivision_free(&s);
     pal_cells_free(&c);
@@ -666,9 +666,9 @@ static void what_is_too_much_or_folds_over_is_refused_by_name(void)
     const int32_t *list[1] = {cell};
     c = solid_of(16, x, 1, list);
     o = (pal_subdivision_options){.n_level = 1};
-    note.text[0] = 0;
-    CHECK_INT(pal_subdivision_make(&c, &o, &s, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "subdivision: level 1: ") == note.text && strstr(note.text, "volume"));
+    diag.text[0] = 0;
+    CHECK_INT(pal_subdivision_make(&c, &o, &s, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "subdivision: level 1: ") == diag.text && strstr(diag.text, "volume"));
     CHECK(!s.rows.start && !s.cells.x);
     pal_cells_free(&c);
 }

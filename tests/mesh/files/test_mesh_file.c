@@ -10,13 +10,13 @@
 static const pal_mesh_file_options metres = {1, 0};
 
 static pal_err parse(const char *name, const void *bytes, size_t n, pal_surface *s, pal_surface_report *r,
-                     pal_note *note)
+                     pal_diagnostic *diag)
 {
     /* a heap copy of exactly this size lets the address sanitizer see every read beyond it */
     uint8_t *copy = malloc(n ? n : 1);
     if (!copy) return PAL_ERR_MEMORY;
     if (n) memcpy(copy, bytes, n);
-    pal_err err = pal_mesh_file_parse(name, copy, n, &metres, s, r, NULL, NULL, note);
+    pal_err err = pal_mesh_file_parse(name, copy, n, &metres, s, r, NULL, NULL, diag);
     free(copy);
     return err;
 }
@@ -26,11 +26,11 @@ static void check_tetrahedron(const char *name, const void *bytes, size_t n, con
 {
     pal_surface s = {0};
     pal_surface_report r = {0};
-    pal_note note = {{0}};
-    pal_err err = parse(name, bytes, n, &s, &r, &note);
+    pal_diagnostic diag = {{0}};
+    pal_err err = parse(name, bytes, n, &s, &r, &diag);
     check_count++;
     if (err) {
-        CHECK_FAIL("%s: %s", name, note.text);
+        CHECK_FAIL("%s: %s", name, diag.text);
         return;
     }
     CHECK_TEXT(r.format, format);
@@ -301,19 +301,19 @@ static int n_hostile;
 static void check_refused(const char *name, const void *bytes, size_t n)
 {
     pal_surface s = {0};
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     largest_request = 0;
-    pal_err err = parse(name, bytes, n, &s, NULL, &note);
+    pal_err err = parse(name, bytes, n, &s, NULL, &diag);
     check_count++;
     n_hostile++;
     if (err == PAL_ERR_OK) CHECK_FAIL("%s kind %d was accepted", name, n_hostile);
     size_t n_name = strlen(name);
-    const char *rest = note.text + n_name + 2;
+    const char *rest = diag.text + n_name + 2;
     char unit[8];
     long long at;
-    bool placed = strncmp(note.text, name, n_name) == 0 && sscanf(rest, "%7s %lld:", unit, &at) == 2 &&
+    bool placed = strncmp(diag.text, name, n_name) == 0 && sscanf(rest, "%7s %lld:", unit, &at) == 2 &&
                   (!strcmp(unit, "line") || !strcmp(unit, "byte")) && at >= 0 && at <= (long long)n + 1;
-    if (!placed || strchr(note.text, '\n')) CHECK_FAIL("%s kind %d: \"%s\"", name, n_hostile, note.text);
+    if (!placed || strchr(diag.text, '\n')) CHECK_FAIL("%s kind %d: \"%s\"", name, n_hostile, diag.text);
     CHECK_LE((double)largest_request, 64.0 * (double)n + 65536);
     CHECK(s.x == NULL && s.tri == NULL);
 }
@@ -360,12 +360,12 @@ static void hostile_obj_is_refused_with_its_line(void)
         "\\\n\\\n\\\n",
         "v 0 0 0\\"};
     check_all_refused("bad.obj", text, sizeof text / sizeof *text);
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     pal_surface s = {0};
-    parse("bad.obj", text[0], strlen(text[0]), &s, NULL, &note);
-    CHECK_TEXT(note.text, "bad.obj: line 4: a face uses vertex index 3 (from 0) of only 3 vertices");
-    parse("bad.obj", text[6], strlen(text[6]), &s, NULL, &note);
-    CHECK_TEXT(note.text, "bad.obj: line 3: a position needs three numbers, found 'zero'");
+    parse("bad.obj", text[0], strlen(text[0]), &s, NULL, &diag);
+    CHECK_TEXT(diag.text, "bad.obj: line 4: a face uses vertex index 3 (from 0) of only 3 vertices");
+    parse("bad.obj", text[6], strlen(text[6]), &s, NULL, &diag);
+    CHECK_TEXT(diag.text, "bad.obj: line 3: a position needs three numbers, found 'zero'");
 }
 
 static void hostile_off_is_refused_with_its_line(void)
@@ -439,15 +439,15 @@ static void hostile_ply_is_refused_with_its_place(void)
         "y\n"
         "property float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n"};
     check_all_refused("bad.ply", text, sizeof text / sizeof *text);
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     pal_surface s = {0};
     const char *cut = PLY_HEAD(LITTLE, "1", "1") "0123456789ab\x03"
                                                  "0123"
                                                  "0123";
-    parse("cut.ply", cut, strlen(cut), &s, NULL, &note);
+    parse("cut.ply", cut, strlen(cut), &s, NULL, &diag);
     char wanted[100];
     snprintf(wanted, sizeof wanted, "cut.ply: byte %zu: a list of 3 entries, but only 8 bytes follow", strlen(cut) - 9);
-    CHECK_TEXT(note.text, wanted);
+    CHECK_TEXT(diag.text, wanted);
 }
 
 static void hostile_stl_is_refused_with_its_place(void)
@@ -492,18 +492,18 @@ static void hostile_stl_is_refused_with_its_place(void)
 static void missing_files_folders_and_long_names_are_refused(void)
 {
     pal_surface s = {0};
-    pal_note note = {{0}};
-    CHECK_INT(pal_mesh_file_read("/nonexistent/a.obj", NULL, &s, NULL, NULL, NULL, &note), PAL_ERR_IO);
-    CHECK_TEXT(note.text, "/nonexistent/a.obj: No such file or directory");
-    CHECK_INT(pal_mesh_file_read("/", NULL, &s, NULL, NULL, NULL, &note), PAL_ERR_IO);
-    CHECK_TEXT(note.text, "/: not a file");
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_mesh_file_read("/nonexistent/a.obj", NULL, &s, NULL, NULL, NULL, &diag), PAL_ERR_IO);
+    CHECK_TEXT(diag.text, "/nonexistent/a.obj: No such file or directory");
+    CHECK_INT(pal_mesh_file_read("/", NULL, &s, NULL, NULL, NULL, &diag), PAL_ERR_IO);
+    CHECK_TEXT(diag.text, "/: not a file");
     char name[3000];
     memset(name, 'x', sizeof name);
     memcpy(name, "a\nb", 3);
     strcpy(name + sizeof name - 5, ".obj");
-    CHECK_INT(pal_mesh_file_parse(name, (const uint8_t *)"v 0 0", 5, NULL, &s, NULL, NULL, NULL, &note),
+    CHECK_INT(pal_mesh_file_parse(name, (const uint8_t *)"v 0 0", 5, NULL, &s, NULL, NULL, NULL, &diag),
               PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "line 1: ") != NULL && strchr(note.text, '\n') == NULL && strlen(note.text) < 300);
+    CHECK(strstr(diag.text, "line 1: ") != NULL && strchr(diag.text, '\n') == NULL && strlen(diag.text) < 300);
 }
 
 static void ply_and_tetgen_files_come_back_as_they_were(void)
@@ -532,7 +532,7 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
                      .face = s.tri,
                      .on_surface = mark,
                      .origin_m = {0, 0, 2},
-                     .h_m = 1e-3};
+                     .edge_m = 1e-3};
     snprintf(path, sizeof path, "%s/t", folder);
     REQUIRE(pal_mesh_file_write_tetgen(path, &tets, NULL) == PAL_ERR_OK);
     static const char *const wanted[3] = {
@@ -555,7 +555,7 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
         unlink(name);
     }
     /* a body of less than a micrometre keeps its digits */
-    tets.h_m = 1e-7;
+    tets.edge_m = 1e-7;
     x[3] = 1.0 / 3 * 1e-7;
     REQUIRE(pal_mesh_file_write_tetgen(path, &tets, NULL) == PAL_ERR_OK);
     for (int k = 0; k < 3; k++) {
@@ -570,8 +570,8 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
         unlink(name);
     }
     /* a file that cannot be written leaves nothing behind */
-    pal_note note = {{0}};
-    CHECK_INT(pal_mesh_file_write_ply("/nonexistent/t.ply", &s, &note), PAL_ERR_IO);
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_mesh_file_write_ply("/nonexistent/t.ply", &s, &diag), PAL_ERR_IO);
     CHECK(rmdir(folder) == 0);
     pal_surface_free(&s);
     pal_surface_free(&back);
@@ -635,7 +635,7 @@ static void shared_models_have_their_known_counts_and_volumes(void)
         CHECK_INT(r.n_unused, shared[k].n_unused);
         CHECK_INT(topology.n_open_edge, shared[k].n_open);
         CHECK_INT(r.n_duplicate, shared[k].n_duplicate);
-        if (shared[k].n_crowded >= 0) CHECK_INT(topology.n_crowded_edge, shared[k].n_crowded);
+        if (shared[k].n_crowded >= 0) CHECK_INT(topology.n_nonmanifold_edge, shared[k].n_crowded);
         if (shared[k].n_component >= 0) CHECK_INT(n_component, shared[k].n_component);
         /* stated with four digits, and for the dragons before the doubled triangles are dropped */
         if (shared[k].volume > 0)

@@ -19,9 +19,9 @@ static bool open_words(words *w)
 {
     uint8_t *bytes;
     size_t n;
-    pal_note note;
+    pal_diagnostic diag;
     memset(w, 0, sizeof *w);
-    if (pal_file_read(path, 1 << 24, &bytes, &n, &note)) return false;
+    if (pal_file_read(path, 1 << 24, &bytes, &n, &diag)) return false;
     w->text = realloc(bytes, n + 1);
     if (!w->text) abort();
     w->text[n] = 0;
@@ -71,9 +71,9 @@ static void hexahedra_and_fields_read_back_equal(void)
     pal_voxel_report report;
     pal_tets tets;
     pal_hexes hexes;
-    pal_note note;
-    REQUIRE(!pal_voxels_fill(&ball, &options, &voxels, &report, &note) && !pal_voxels_split(&voxels, &tets));
-    REQUIRE(!pal_hexes_find(&tets, &hexes, &note) && !pal_hexes_fill(&hexes, &tets, &ball, 0, &note));
+    pal_diagnostic diag;
+    REQUIRE(!pal_voxels_fill(&ball, &options, &voxels, &report, &diag) && !pal_voxels_split(&voxels, &tets));
+    REQUIRE(!pal_hexes_find(&tets, &hexes, &diag) && !pal_hexes_fill(&hexes, &tets, &ball, 0, &diag));
     double *u = malloc((size_t)tets.n_node * 24), *fill = malloc((size_t)hexes.n_hex * 8);
     uint64_t state = 4;
     for (int i = 0; i < 3 * tets.n_node; i++) u[i] = shape_uniform(&state) * pow(10, i % 20 - 10);
@@ -91,7 +91,7 @@ static void hexahedra_and_fields_read_back_equal(void)
                          .point = point,
                          .cell = &cell};
     setlocale(LC_NUMERIC, "de_DE.UTF-8"); /* where there is one: the point stays a point */
-    REQUIRE(!pal_mesh_write_vtk(path, &grid, &note));
+    REQUIRE(!pal_mesh_write_vtk(path, &grid, &diag));
     setlocale(LC_NUMERIC, "C");
 
     words w;
@@ -108,7 +108,7 @@ static void hexahedra_and_fields_read_back_equal(void)
     REQUIRE(skip_to(&w, "\nCELLS "));
     CHECK_INT(number(&w), hexes.n_hex);
     CHECK_INT(number(&w), 9 * hexes.n_hex);
-    double worst = 0, h3 = pow(tets.h_m, 3);
+    double worst = 0, h3 = pow(tets.edge_m, 3);
     for (int e = 0; e < hexes.n_hex; e++) {
         int node[8];
         CHECK_INT(number(&w), 8);
@@ -154,10 +154,10 @@ static void tetrahedra_keep_their_order(void)
                                  .5, .5, 0, 0, .5, 0, 0, 0, .5, .5, 0, .5, 0,  .5, .5};
     static const int32_t node[10] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
     static const int type[11] = {[4] = 10, [10] = 24};
-    pal_note note;
+    pal_diagnostic diag;
     for (int n_corner = 4; n_corner <= 10; n_corner += 6) {
         pal_vtk_grid grid = {.n_node = 10, .n_element = 1, .n_corner = n_corner, .x = x, .node = node};
-        REQUIRE(!pal_mesh_write_vtk(path, &grid, &note));
+        REQUIRE(!pal_mesh_write_vtk(path, &grid, &diag));
         words w;
         REQUIRE(open_words(&w));
         REQUIRE(skip_to(&w, "\nCELLS 1 "));
@@ -175,22 +175,22 @@ static void what_cannot_be_written_leaves_nothing_behind(void)
 {
     static const double x[12] = {0};
     static const int32_t node[4] = {0, 1, 2, 3};
-    pal_note note;
+    pal_diagnostic diag;
     pal_vtk_grid grid = {.n_node = 4, .n_element = 1, .n_corner = 5, .x = x, .node = node};
     unlink(path);
-    CHECK_INT(pal_mesh_write_vtk(path, &grid, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "elements of 5 corners"));
+    CHECK_INT(pal_mesh_write_vtk(path, &grid, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "elements of 5 corners"));
     pal_vtk_field field = {"stress", 6, x};
     grid.n_corner = 4, grid.point = &field, grid.n_point = 1;
-    CHECK_INT(pal_mesh_write_vtk(path, &grid, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "stress has 6 components"));
+    CHECK_INT(pal_mesh_write_vtk(path, &grid, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "stress has 6 components"));
     CHECK(access(path, F_OK) != 0);
     field.n_component = 1;
-    CHECK_INT(pal_mesh_write_vtk("/nonexistent/a.vtk", &grid, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/nonexistent/a.vtk"));
+    CHECK_INT(pal_mesh_write_vtk("/nonexistent/a.vtk", &grid, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/nonexistent/a.vtk"));
     /* a folder in the file's place: the file is written whole, cannot take its name and goes */
     mkdir(path, 0700);
-    CHECK_INT(pal_mesh_write_vtk(path, &grid, &note), PAL_ERR_IO);
+    CHECK_INT(pal_mesh_write_vtk(path, &grid, &diag), PAL_ERR_IO);
     CHECK_INT(rmdir(path), 0);
     char listing[128];
     snprintf(listing, sizeof listing, "ls %s.* 2>/dev/null | wc -l", path);

@@ -9,9 +9,9 @@
 static pal_levels levels_of(pal_surface s, int n_level)
 {
     pal_levels l = {0};
-    pal_note note = {.text = "no note"};
+    pal_diagnostic diag = {.text = "no note"};
     pal_levels_options options = {.n_level = n_level};
-    if (pal_levels_make(&s, &options, &l, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_levels_make(&s, &options, &l, &diag)) CHECK_FAIL("%s", diag.text);
     pal_surface_free(&s);
     return l;
 }
@@ -20,8 +20,8 @@ static pal_levels levels_of(pal_surface s, int n_level)
 static int32_t midpoint_between(const pal_levels *l, int32_t a, int32_t b)
 {
     int32_t e = pal_levels_spoke(l, 0, a), first = e;
-    while (pal_wing_far(l->edge, e, a) != b) {
-        e = pal_wing_turn(l->edge, e, a);
+    while (pal_wing_other_end(l->edge, e, a) != b) {
+        e = pal_wing_next_around(l->edge, e, a);
         if (e == first) return -1;
     }
     return pal_levels_edge_midpoint(l, e);
@@ -126,10 +126,10 @@ static void ring_and_rim_rules_find_the_midpoint_of_a_flat_wheel(void)
     }
     for (int k = 2; k <= 12; k++)
         for (int i = 1; i < k; i++) {
-            double x = 0, y = 0, sum = pal_butterfly_rim(k, i, -1);
+            double x = 0, y = 0, sum = pal_butterfly_boundary(k, i, -1);
             for (int j = 0; j <= k; j++) {
-                double w = pal_butterfly_rim(k, i, j);
-                CHECK_NEAR(w, pal_butterfly_rim(k, k - i, k - j), 1e-14);
+                double w = pal_butterfly_boundary(k, i, j);
+                CHECK_NEAR(w, pal_butterfly_boundary(k, k - i, k - j), 1e-14);
                 sum += w, x += w * cos(SHAPE_PI * j / k), y += w * sin(SHAPE_PI * j / k);
             }
             CHECK_NEAR(sum, 1, 1e-14);
@@ -191,8 +191,8 @@ static double stencil_error(const pal_levels *l, int32_t e, const double *want, 
 static void want_ring(const pal_levels *l, int32_t e, int32_t v, int K, double share, double *want)
 {
     want[v] += 0.75 * share;
-    for (int i = 0; i < K; i++, e = pal_wing_turn(l->edge, e, v))
-        want[pal_wing_far(l->edge, e, v)] += share * pal_butterfly_ring(K, i);
+    for (int i = 0; i < K; i++, e = pal_wing_next_around(l->edge, e, v))
+        want[pal_wing_other_end(l->edge, e, v)] += share * pal_butterfly_ring(K, i);
 }
 
 static void irregular_vertices_take_their_own_ring(void)
@@ -203,14 +203,14 @@ static void irregular_vertices_take_their_own_ring(void)
         double want[256];
         CHECK_LE(worst_sum(&l), 1e-14);
         /* both ends irregular: the rim's vertices have five faces each */
-        int32_t e = pal_levels_spoke(&l, 0, 0), rim = pal_wing_far(l.edge, e, 0);
+        int32_t e = pal_levels_spoke(&l, 0, 0), rim = pal_wing_other_end(l.edge, e, 0);
         memset(want, 0, sizeof want);
         want_ring(&l, e, 0, K, 0.5, want);
         want_ring(&l, e, rim, 5, 0.5, want);
         CHECK_LE(stencil_error(&l, e, want, l.n_vertex[0]), 1e-15);
         /* a level on, the hub's neighbours are regular */
         e = pal_levels_spoke(&l, 1, 0);
-        for (int k = 0; k < K; k++, e = pal_wing_turn(l.edge, e, 0)) {
+        for (int k = 0; k < K; k++, e = pal_wing_next_around(l.edge, e, 0)) {
             memset(want, 0, sizeof want);
             want_ring(&l, e, 0, K, 1, want);
             CHECK_LE(stencil_error(&l, e, want, l.n_vertex[1]), 1e-15);
@@ -227,12 +227,13 @@ static void irregular_boundary_vertices_take_the_crease_weights(void)
         pal_levels l = levels_of(wheel(k, true, 0.1), 3);
         CHECK_INT(l.corner[0], 0);
         int32_t e = pal_levels_spoke(&l, 1, 0), around[16];
-        for (int j = 0; j <= k; j++, e = pal_wing_turn(l.edge, e, 0)) around[j] = e;
+        for (int j = 0; j <= k; j++, e = pal_wing_next_around(l.edge, e, 0)) around[j] = e;
         CHECK_INT(e, around[0]);
         for (int i = 1; i < k; i++) {
             double want[512] = {0};
-            want[0] = pal_butterfly_rim(k, i, -1);
-            for (int j = 0; j <= k; j++) want[pal_wing_far(l.edge, around[j], 0)] = pal_butterfly_rim(k, i, j);
+            want[0] = pal_butterfly_boundary(k, i, -1);
+            for (int j = 0; j <= k; j++)
+                want[pal_wing_other_end(l.edge, around[j], 0)] = pal_butterfly_boundary(k, i, j);
             REQUIRE(l.n_vertex[1] <= 512);
             CHECK_LE(stencil_error(&l, around[i], want, l.n_vertex[1]), 1e-15);
             /* two faces: plainly the middle */
@@ -338,14 +339,14 @@ static void boundaries_depend_on_boundaries_only(void)
     int n_rim = 0, n_coarse = 0;
     CHECK(!l.closed);
     for (int32_t v = l.n_vertex[0]; v < l.n_vertex[3]; v++) {
-        if (!pal_levels_on_rim(&l, v)) continue;
+        if (!pal_levels_on_boundary(&l, v)) continue;
         int32_t row = v - l.n_vertex[0];
         n_rim++;
         CHECK_LE(l.stencil_start[row + 1] - l.stencil_start[row], 4);
         for (int32_t k = l.stencil_start[row]; k < l.stencil_start[row + 1]; k++)
-            CHECK(pal_levels_on_rim(&l, l.stencil_vertex[k]));
+            CHECK(pal_levels_on_boundary(&l, l.stencil_vertex[k]));
     }
-    for (int32_t v = 0; v < l.n_vertex[0]; v++) n_coarse += pal_levels_on_rim(&l, v);
+    for (int32_t v = 0; v < l.n_vertex[0]; v++) n_coarse += pal_levels_on_boundary(&l, v);
     CHECK_INT(n_rim, n_coarse * 7);
     CHECK(n_coarse >= 12);
     CHECK_LE(worst_sum(&l), 1e-14);
@@ -378,7 +379,7 @@ static double normal_spread(const pal_levels *l, int level, int32_t v)
     int32_t e = pal_levels_spoke(l, level, v), first = e;
     do {
         int32_t f = pal_wing_face(l->edge, e, v);
-        e = pal_wing_turn(l->edge, e, v);
+        e = pal_wing_next_around(l->edge, e, v);
         if (f < 0) continue;
         const double *p[3];
         double a[3], b[3];

@@ -50,9 +50,9 @@ static void check_closed(const pal_surface *s, int euler)
     pal_surface_topology t;
     REQUIRE(pal_surface_check(s, &t) == PAL_ERR_OK);
     CHECK_INT(t.n_open_edge, 0);
-    CHECK_INT(t.n_crowded_edge, 0);
-    CHECK_INT(t.n_crowded_vertex, 0);
-    CHECK_INT(t.n_flipped_edge, 0);
+    CHECK_INT(t.n_nonmanifold_edge, 0);
+    CHECK_INT(t.n_nonmanifold_vertex, 0);
+    CHECK_INT(t.n_misoriented_edge, 0);
     CHECK_INT(s->n_vertex - s->n_tri / 2, euler);
 }
 
@@ -128,15 +128,15 @@ static void any_sign_pattern_gives_a_closed_manifold(void)
 static void empty_and_oversized_contours_are_refused(void)
 {
     pal_surface s;
-    pal_note note;
-    CHECK_INT(pal_contour(zero, NULL, &ball_box, &s, &note), PAL_ERR_REFUSED);
+    pal_diagnostic diag;
+    CHECK_INT(pal_contour(zero, NULL, &ball_box, &s, &diag), PAL_ERR_REFUSED);
     pal_contour_box box = ball_box;
     box.spacing_m = 1e-6;
-    CHECK_INT(pal_contour(ball, NULL, &box, &s, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_contour(ball, NULL, &box, &s, &diag), PAL_ERR_BUDGET);
     box.spacing_m = 0;
-    CHECK_INT(pal_contour(ball, NULL, &box, &s, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_contour(ball, NULL, &box, &s, &diag), PAL_ERR_BUDGET);
     box.spacing_m = (double)NAN;
-    CHECK_INT(pal_contour(ball, NULL, &box, &s, &note), PAL_ERR_BUDGET);
+    CHECK_INT(pal_contour(ball, NULL, &box, &s, &diag), PAL_ERR_BUDGET);
 }
 
 static void smoothing_removes_roughness_and_keeps_volume(void)
@@ -234,7 +234,7 @@ static void decimation_leaves_open_and_crowded_edges_alone(void)
     REQUIRE(pal_surface_decimate(&s, s.n_tri / 4) == PAL_ERR_OK);
     REQUIRE(pal_surface_check(&s, &after) == PAL_ERR_OK);
     CHECK_INT(after.n_open_edge, before.n_open_edge);
-    CHECK_INT(after.n_crowded_edge, before.n_crowded_edge);
+    CHECK_INT(after.n_nonmanifold_edge, before.n_nonmanifold_edge);
     pal_surface_free(&s);
 }
 

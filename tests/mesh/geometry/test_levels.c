@@ -11,9 +11,9 @@
 static pal_levels levels_of(pal_surface s, int n_level)
 {
     pal_levels l = {0};
-    pal_note note = {.text = "no note"};
+    pal_diagnostic diag = {.text = "no note"};
     pal_levels_options options = {.n_level = n_level};
-    if (pal_levels_make(&s, &options, &l, &note)) CHECK_FAIL("%s", note.text);
+    if (pal_levels_make(&s, &options, &l, &diag)) CHECK_FAIL("%s", diag.text);
     pal_surface_free(&s);
     return l;
 }
@@ -104,13 +104,13 @@ static void counts_are_the_papers(void)
                   {NULL, 188, 558, 746, 2232}};
     for (int k = 0; k < 4; k++) {
         pal_surface s;
-        pal_note note = {.text = "no note"};
+        pal_diagnostic diag = {.text = "no note"};
         if (wanted[k].path) {
             const char *path = check_shared(wanted[k].path);
             if (!path) continue;
             pal_mesh_file_options in = {.unit_m = 0.001, .weld = PAL_MESH_WELD};
-            if (pal_mesh_file_read(path, &in, &s, NULL, NULL, NULL, &note)) {
-                CHECK_FAIL("%s", note.text);
+            if (pal_mesh_file_read(path, &in, &s, NULL, NULL, NULL, &diag)) {
+                CHECK_FAIL("%s", diag.text);
                 continue;
             }
         } else if (k == 2)
@@ -218,9 +218,10 @@ static void spokes_reach_every_face_of_a_vertex(void)
                     faults += l.edge[e].vertex[0] != v && l.edge[e].vertex[1] != v;
                     faults += f >= 0 && (f < f0 || f >= f1);
                     n_face += f >= 0, n_edge++, last_hole = f < 0;
-                    e = pal_wing_turn(l.edge, e, v);
+                    e = pal_wing_next_around(l.edge, e, v);
                 } while (e != first && n_edge < 100);
-                faults += n_face != count[v] || last_hole != pal_levels_on_rim(&l, v) || n_edge != n_face + last_hole;
+                faults +=
+                    n_face != count[v] || last_hole != pal_levels_on_boundary(&l, v) || n_edge != n_face + last_hole;
                 /* what subdivision adds is regular */
                 if (l.vertex_level[v] > 0) faults += n_face != (last_hole ? 3 : 6);
             }
@@ -395,12 +396,12 @@ static void memory_is_as_stated(void)
     pal_levels_free(&l);
 }
 
-static pal_err make_with(const pal_surface *s, int n_level, size_t budget, pal_note *note)
+static pal_err make_with(const pal_surface *s, int n_level, size_t budget, pal_diagnostic *diag)
 {
     pal_levels l = {0};
     pal_levels_options options = {.n_level = n_level, .budget_byte = budget};
-    snprintf(note->text, sizeof note->text, "none");
-    pal_err err = pal_levels_make(s, &options, &l, note);
+    snprintf(diag->text, sizeof diag->text, "none");
+    pal_err err = pal_levels_make(s, &options, &l, diag);
     if (!err) pal_levels_free(&l);
     return err;
 }
@@ -408,32 +409,32 @@ static pal_err make_with(const pal_surface *s, int n_level, size_t budget, pal_n
 static void a_budget_is_kept(void)
 {
     pal_surface s = stomach(), hub;
-    pal_note note;
-    CHECK_INT(make_with(&s, 3, 1000, &note), PAL_ERR_BUDGET);
-    CHECK(strstr(note.text, "3 levels need") && strstr(note.text, "MiB"));
-    CHECK_INT(make_with(&s, 3, (size_t)4 << 20, &note), PAL_ERR_OK);
-    CHECK_INT(make_with(&s, 10, 0, &note), PAL_ERR_BUDGET);
-    CHECK(strstr(note.text, "10 levels need") && strstr(note.text, "the budget is 512 MiB"));
-    printf("  %s\n", note.text);
-    CHECK_INT(make_with(&s, 11, 0, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "11 levels"));
-    CHECK_INT(make_with(&s, 0, 0, &note), PAL_ERR_REFUSED);
-    CHECK_INT(make_with(&s, -3, 0, &note), PAL_ERR_REFUSED);
+    pal_diagnostic diag;
+    CHECK_INT(make_with(&s, 3, 1000, &diag), PAL_ERR_BUDGET);
+    CHECK(strstr(diag.text, "3 levels need") && strstr(diag.text, "MiB"));
+    CHECK_INT(make_with(&s, 3, (size_t)4 << 20, &diag), PAL_ERR_OK);
+    CHECK_INT(make_with(&s, 10, 0, &diag), PAL_ERR_BUDGET);
+    CHECK(strstr(diag.text, "10 levels need") && strstr(diag.text, "the budget is 512 MiB"));
+    printf("  %s\n", diag.text);
+    CHECK_INT(make_with(&s, 11, 0, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "11 levels"));
+    CHECK_INT(make_with(&s, 0, 0, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(make_with(&s, -3, 0, &diag), PAL_ERR_REFUSED);
     pal_surface_free(&s);
     /* a hub of 20 000 faces would have stencils of 20 000 squared entries */
     hub = shape_ball(1, 20000, 2, 0);
-    CHECK_INT(make_with(&hub, 2, 0, &note), PAL_ERR_BUDGET);
-    CHECK_INT(make_with(&hub, 1, 0, &note), PAL_ERR_OK);
+    CHECK_INT(make_with(&hub, 2, 0, &diag), PAL_ERR_BUDGET);
+    CHECK_INT(make_with(&hub, 1, 0, &diag), PAL_ERR_OK);
     pal_surface_free(&hub);
 }
 
 static void refused(pal_surface s, const char *word)
 {
-    pal_note note;
-    const bool named = make_with(&s, 3, 0, &note) == PAL_ERR_REFUSED && strstr(note.text, word);
+    pal_diagnostic diag;
+    const bool named = make_with(&s, 3, 0, &diag) == PAL_ERR_REFUSED && strstr(diag.text, word);
     HARD_CASE_ALL("broken_surface", "adaptive_springs", "no manifold, turned over, flat, NaN: refused by number", named,
                   1);
-    if (!named) printf("  \"%s\" lacks \"%s\"\n", note.text, word);
+    if (!named) printf("  \"%s\" lacks \"%s\"\n", diag.text, word);
     pal_surface_free(&s);
 }
 
@@ -546,12 +547,12 @@ static void any_input_is_answered(void)
             }
         }
         pal_levels l = {0};
-        pal_note note = {.text = ""};
+        pal_diagnostic diag = {.text = ""};
         pal_levels_options options = {.n_level = 3};
-        pal_err err = pal_levels_make(&s, &options, &l, &note);
+        pal_err err = pal_levels_make(&s, &options, &l, &diag);
         if (err) {
             n_refused++;
-            CHECK(err == PAL_ERR_REFUSED && !strncmp(note.text, "levels: ", 8) && l.x == NULL);
+            CHECK(err == PAL_ERR_REFUSED && !strncmp(diag.text, "levels: ", 8) && l.x == NULL);
         } else {
             n_ok++;
             CHECK_INT(wing_faults(&l, 2), 0);

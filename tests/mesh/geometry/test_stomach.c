@@ -201,9 +201,9 @@ static void sheet_is_flat_and_faces_up(void)
                {20001, 2, 1, 1, "20001"}, {9999, 9999, 1, 1, "9999"}, {3, 3, 0, 1, "size of 0 x"},
                {3, 3, 1, NAN, "nan"},     {3, 3, INFINITY, 1, "inf"}, {3, 3, 1, -2, "x -2 m"}};
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
-        pal_note note = {.text = ""};
-        CHECK_INT(pal_sheet_make(bad[k].n, bad[k].m, bad[k].width, bad[k].height, &s, &note), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, bad[k].word) != NULL);
+        pal_diagnostic diag = {.text = ""};
+        CHECK_INT(pal_sheet_make(bad[k].n, bad[k].m, bad[k].width, bad[k].height, &s, &diag), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, bad[k].word) != NULL);
     }
 }
 

@@ -72,7 +72,7 @@ static void cube_is_closed_manifold_and_oriented(void)
     int32_t swap = s.tri[0];
     s.tri[0] = s.tri[1], s.tri[1] = swap;
     REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
-    CHECK_INT(topology.n_flipped_edge, 3);
+    CHECK_INT(topology.n_misoriented_edge, 3);
     CHECK(topology.closed && !topology.oriented);
     pal_surface_free(&s);
 }
@@ -93,8 +93,8 @@ static void shared_edge_and_shared_vertex_are_not_manifold(void)
             add_tri(&s, other[cube_tri[3 * t]], other[cube_tri[3 * t + 1]], other[cube_tri[3 * t + 2]]);
         pal_surface_topology topology;
         REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
-        CHECK_INT(topology.n_crowded_edge, shared == 2);
-        CHECK_INT(topology.n_crowded_vertex, shared == 1);
+        CHECK_INT(topology.n_nonmanifold_edge, shared == 2);
+        CHECK_INT(topology.n_nonmanifold_vertex, shared == 1);
         CHECK(topology.closed && !topology.manifold);
         int32_t label[24];
         int n;
@@ -247,7 +247,7 @@ static void flat_triangles_are_mended_without_a_slit(void)
     REQUIRE(pal_surface_clean(&s, 0, &report, NULL) == PAL_ERR_OK);
     REQUIRE(pal_surface_check(&s, &topology) == PAL_ERR_OK);
     CHECK(topology.closed && topology.oriented && topology.manifold);
-    CHECK_INT(report.n_mended, 2);
+    CHECK_INT(report.n_repaired, 2);
     CHECK_INT(report.n_degenerate, 0);
     CHECK_INT(s.n_tri, 16);
     CHECK_NEAR(pal_surface_volume(&s), 1, 1e-14);
@@ -260,9 +260,9 @@ static void nothing_left_is_refused_with_counts(void)
     pal_surface s = cube();
     s.n_tri = 1;
     s.tri[1] = s.tri[0];
-    pal_note note = {{0}};
-    CHECK_INT(pal_surface_clean(&s, 0, NULL, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "no triangle is left: 1 without area, 0 doubled, 0 not finite");
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_surface_clean(&s, 0, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "no triangle is left: 1 without area, 0 doubled, 0 not finite");
     pal_surface_free(&s);
 }
 

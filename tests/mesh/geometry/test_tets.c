@@ -4,7 +4,7 @@
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 
 /* one voxel split into five */
 static const double CUBE[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
@@ -13,7 +13,7 @@ static const int32_t FIVE[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6,
 
 static pal_tets make(int n_node, const double (*x)[3], int n_tet, const int32_t (*tet)[4])
 {
-    pal_tets t = {.n_node = n_node, .n_tet = n_tet, .h_m = 1};
+    pal_tets t = {.n_node = n_node, .n_tet = n_tet, .edge_m = 1};
     t.x = malloc((size_t)n_node * sizeof *x);
     t.tet = malloc((size_t)n_tet * sizeof *tet);
     if (!t.x || !t.tet) abort();
@@ -43,7 +43,7 @@ static void five_of_a_cube_have_18_edges_16_faces_12_outside(void)
     CHECK_INT(n_part, 1);
     pal_surface hull = {.n_vertex = 8, .n_tri = 12, .x = t.x, .tri = t.face};
     CHECK_NEAR(pal_surface_volume(&hull), 1, 1e-15);
-    CHECK_INT(pal_tets_check(&t, &note), PAL_ERR_OK);
+    CHECK_INT(pal_tets_check(&t, &diag), PAL_ERR_OK);
     free(edge);
     free(face);
     pal_tets_free(&t);
@@ -54,7 +54,7 @@ static bool torus_mesh(pal_tets *out)
     pal_surface s = shape_torus(0.1, 0.04, 40, 20);
     pal_voxel_options options = {.resolution = 24, .border = true};
     pal_voxels v;
-    bool ok = !pal_voxels_fill(&s, &options, &v, NULL, &note);
+    bool ok = !pal_voxels_fill(&s, &options, &v, NULL, &diag);
     if (ok) {
         ok = !pal_voxels_split(&v, out);
         pal_voxels_free(&v);
@@ -104,9 +104,9 @@ static void separate_pieces_are_labelled_in_order(void)
 
 static void expect_fault(pal_tets *t, const char *words)
 {
-    note.text[0] = 0;
-    CHECK_INT(pal_tets_check(t, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, words)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, words);
+    diag.text[0] = 0;
+    CHECK_INT(pal_tets_check(t, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, words)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, words);
     pal_tets_free(t);
 }
 
@@ -146,7 +146,7 @@ static void nothing_is_fine(void)
     pal_tets t = {0};
     int32_t *edge;
     int n;
-    CHECK_INT(pal_tets_check(&t, &note), PAL_ERR_OK);
+    CHECK_INT(pal_tets_check(&t, &diag), PAL_ERR_OK);
     CHECK_NEAR(pal_tets_volume(&t), 0, 0);
     REQUIRE(!pal_tets_find_boundary(&t));
     CHECK_INT(t.n_face, 0);
@@ -160,7 +160,7 @@ static void nothing_is_fine(void)
 static void a_fan_around_one_edge_is_sorted(void)
 {
     enum { N = 3000 };
-    pal_tets t = {.n_node = N + 2, .n_tet = N, .h_m = 1};
+    pal_tets t = {.n_node = N + 2, .n_tet = N, .edge_m = 1};
     t.x = calloc((size_t)t.n_node * 3, sizeof *t.x);
     t.tet = malloc((size_t)N * 4 * sizeof *t.tet);
     REQUIRE(t.x && t.tet);
@@ -173,7 +173,7 @@ static void a_fan_around_one_edge_is_sorted(void)
     }
     REQUIRE(!pal_tets_find_boundary(&t));
     CHECK_INT(t.n_face, 2 * N);
-    CHECK_INT(pal_tets_check(&t, &note), PAL_ERR_OK);
+    CHECK_INT(pal_tets_check(&t, &diag), PAL_ERR_OK);
     int32_t *edge;
     int n;
     REQUIRE(!pal_tets_edges(&t, &edge, &n));

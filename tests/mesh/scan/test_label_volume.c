@@ -111,12 +111,12 @@ static bytes pack(const bytes *from)
 }
 
 /* parses a heap copy of exactly n bytes */
-static pal_err parse(const char *name, const uint8_t *from, size_t n, pal_label_volume *v, pal_note *note)
+static pal_err parse(const char *name, const uint8_t *from, size_t n, pal_label_volume *v, pal_diagnostic *diag)
 {
     uint8_t *copy = malloc(n ? n : 1);
     if (!copy) return PAL_ERR_MEMORY;
     if (n) memcpy(copy, from, n);
-    pal_err err = pal_label_volume_parse(name, copy, n, v, note);
+    pal_err err = pal_label_volume_parse(name, copy, n, v, diag);
     free(copy);
     return err;
 }
@@ -124,11 +124,11 @@ static pal_err parse(const char *name, const uint8_t *from, size_t n, pal_label_
 static void check_ball(const bytes *b, const char *format)
 {
     pal_label_volume v = {0};
-    pal_note note = {{0}};
-    pal_err err = parse("ball", b->at, b->n, &v, &note);
+    pal_diagnostic diag = {{0}};
+    pal_err err = parse("ball", b->at, b->n, &v, &diag);
     check_count++;
     if (err) {
-        CHECK_FAIL("%s", note.text);
+        CHECK_FAIL("%s", diag.text);
         return;
     }
     CHECK_TEXT(v.format, format);
@@ -190,9 +190,9 @@ static void lists_labels_by_size(void)
     CHECK_NEAR((double)list[0].n_voxel * 2.5e-9, list[0].volume_m3, 1e-15);
     CHECK_INT(pal_label_volume_list(&v, list, 1), 1);
     pal_surface s = {0};
-    pal_note note = {{0}};
-    CHECK_INT(pal_label_volume_surface(&v, 4, NULL, &s, &note), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "label 4 is not in the scan, the largest there are 3 (25.1 ml), 9 (0.105 ml)");
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_label_volume_surface(&v, 4, NULL, &s, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "label 4 is not in the scan, the largest there are 3 (25.1 ml), 9 (0.105 ml)");
     CHECK_INT(pal_label_volume_surface(&v, 0, NULL, &s, NULL), PAL_ERR_REFUSED);
     pal_label_volume_free(&v);
     free(b.at);
@@ -300,12 +300,12 @@ static int n_hostile;
 static void check_refused(const uint8_t *from, size_t n, const char *wanted)
 {
     pal_label_volume v = {0};
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     n_hostile++;
     check_count++;
-    if (!parse("bad.scan", from, n, &v, &note)) CHECK_FAIL("kind %d was accepted", n_hostile);
-    bool placed = strncmp(note.text, "bad.scan: byte ", 15) == 0 || strncmp(note.text, "bad.scan: line ", 15) == 0;
-    if (!placed || !strstr(note.text, wanted)) CHECK_FAIL("kind %d: \"%s\"", n_hostile, note.text);
+    if (!parse("bad.scan", from, n, &v, &diag)) CHECK_FAIL("kind %d was accepted", n_hostile);
+    bool placed = strncmp(diag.text, "bad.scan: byte ", 15) == 0 || strncmp(diag.text, "bad.scan: line ", 15) == 0;
+    if (!placed || !strstr(diag.text, wanted)) CHECK_FAIL("kind %d: \"%s\"", n_hostile, diag.text);
     CHECK(v.label == NULL);
 }
 
@@ -350,9 +350,9 @@ static void hostile_nifti_is_refused_with_its_byte(void)
     packed.at[packed.n / 2] ^= 0x55;
     packed.at[packed.n / 2 + 1] ^= 0xAA;
     pal_label_volume v = {0};
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     /* damage may inflate to other voxels (the checksum is behind them); it must not do more */
-    parse("bad.scan", packed.at, packed.n, &v, &note);
+    parse("bad.scan", packed.at, packed.n, &v, &diag);
     pal_label_volume_free(&v);
     CHECK(n_hostile >= 13);
     free(b.at);
@@ -508,9 +508,9 @@ static void voxels_like_needles_are_refused_before_they_cost_memory(void)
     /* 1 x 1 x 1000 voxels of 1 um x 1 um x 1 m */
     pal_label_volume v = {.n = {1, 1, N}, .to_m = {1e-6, 0, 0, 0, 0, 1e-6, 0, 0, 0, 0, 1, 0}, .label = label};
     pal_surface s = {0};
-    pal_note note = {{0}};
-    CHECK_INT(pal_label_volume_surface(&v, 1, NULL, &s, &note), PAL_ERR_BUDGET);
-    CHECK(s.x == NULL && note.text[0] != 0);
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_label_volume_surface(&v, 1, NULL, &s, &diag), PAL_ERR_BUDGET);
+    CHECK(s.x == NULL && diag.text[0] != 0);
 }
 
 static void files_are_told_apart_by_name_or_content(void)

@@ -1,7 +1,7 @@
 /* Points and surfaces located in the elements of a mesh. */
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/volume/locate.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
 
@@ -12,24 +12,24 @@ typedef struct body {
     pal_locate *in_hexes, *in_tets;
 } body;
 
-/* takes the surface; cut voxels kept when they hold at least least_fill, 0: a whole layer of border */
-static bool make_body(pal_surface surface, int resolution, double least_fill, body *out)
+/* takes the surface; cut voxels kept when they hold at least min_fill, 0: a whole layer of border */
+static bool make_body(pal_surface surface, int resolution, double min_fill, body *out)
 {
-    pal_note note = {.text = "memory"};
+    pal_diagnostic diag = {.text = "memory"};
     pal_voxels voxels;
     pal_voxel_report report;
-    pal_voxel_options options = {.resolution = resolution, .border = true, .least_fill = least_fill};
+    pal_voxel_options options = {.resolution = resolution, .border = true, .min_fill = min_fill};
     memset(out, 0, sizeof *out);
     out->surface = surface;
-    pal_err err = pal_voxels_fill(&surface, &options, &voxels, &report, &note);
+    pal_err err = pal_voxels_fill(&surface, &options, &voxels, &report, &diag);
     if (!err) {
         err = pal_voxels_split(&voxels, &out->tets);
         pal_voxels_free(&voxels);
     }
-    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, &note);
+    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, &diag);
     if (!err) err = pal_locate_create(&out->tets, &out->hexes, &out->in_hexes);
     if (!err) err = pal_locate_create(&out->tets, NULL, &out->in_tets);
-    if (err) CHECK_FAIL("%s", note.text);
+    if (err) CHECK_FAIL("%s", diag.text);
     return !err;
 }
 
@@ -133,7 +133,7 @@ static void points_outside_go_to_the_nearest_element(void)
     uint64_t state = 9;
     body b;
     REQUIRE(make_body(shape_torus(0.1, 0.03, 32, 16), 20, 0, &b));
-    double h = b.tets.h_m;
+    double h = b.tets.edge_m;
     int n_out = 0;
     for (int i = 0; i < 600; i++) {
         double x[3], local[4], outside, outside_tet, best = INFINITY, far = i % 50 == 0 ? 20 : 0.2;
@@ -160,7 +160,7 @@ static void points_outside_go_to_the_nearest_element(void)
     free_body(&b);
 }
 
-static double total(const pal_piece *piece, int n)
+static double total(const pal_quadrature_point *piece, int n)
 {
     double sum = 0;
     for (int i = 0; i < n; i++) sum += piece[i].area_m2;
@@ -168,7 +168,7 @@ static double total(const pal_piece *piece, int n)
 }
 
 /* nodal forces of traction 1 along x */
-static double *spread(const body *b, bool hex, const pal_piece *piece, int n_piece)
+static double *spread(const body *b, bool hex, const pal_quadrature_point *piece, int n_piece)
 {
     double *f = calloc((size_t)b->tets.n_node, sizeof *f);
     if (!f) abort();
@@ -191,7 +191,7 @@ static void uniform_traction_gives_the_exact_nodal_forces(void)
     REQUIRE(make_body(shape_box(low, high), 16, 0.01, &b));
     CHECK_INT(b.tets.n_node, 425);
     for (int hex = 0; hex < 2; hex++) {
-        pal_piece *piece;
+        pal_quadrature_point *piece;
         int n;
         REQUIRE(!pal_locate_surface(hex ? b.in_hexes : b.in_tets, &b.surface, from, to, normal, &piece, &n));
         CHECK_NEAR(total(piece, n) / 0.0025, 1, 1e-12);
@@ -228,7 +228,7 @@ static void slanted_faces_are_cut_by_the_elements(void)
     body b;
     REQUIRE(make_body(s, 9, 0.05, &b));
     for (int hex = 0; hex < 2; hex++) {
-        pal_piece *piece;
+        pal_quadrature_point *piece;
         int n;
         pal_surface one = b.surface;
         one.n_tri = 1;
@@ -279,7 +279,7 @@ static void a_triangle_within_is_integrated_exactly(void)
     body b;
     REQUIRE(make_body(shape_box(low, high), 4, 0.01, &b));
     for (int hex = 0; hex < 2; hex++) {
-        pal_piece *piece;
+        pal_quadrature_point *piece;
         int n;
         const pal_locate *locate = hex ? b.in_hexes : b.in_tets;
         REQUIRE(!pal_locate_surface(locate, &s, none, all, NULL, &piece, &n));
@@ -316,7 +316,7 @@ static void the_box_and_the_normal_choose_what_is_loaded(void)
 {
     double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
     body b;
-    pal_piece *piece = NULL;
+    pal_quadrature_point *piece = NULL;
     int n = -1;
     REQUIRE(make_body(shape_box(low, high), 5, 0.01, &b));
     b.surface.origin_m[2] = b.tets.origin_m[2] = 4;
@@ -372,19 +372,18 @@ static void loaded_areas_of_the_reference_problems(void)
     };
     for (int k = 0; k < 4; k++) {
         const char *path = check_shared(wanted[k].path);
-        CHECK(true);
         if (!path) continue;
-        pal_note note;
+        pal_diagnostic diag;
         pal_surface s;
         pal_mesh_file_options in = {.unit_m = 1, .weld = PAL_MESH_WELD};
-        REQUIRE(!pal_mesh_file_read(path, &in, &s, NULL, NULL, NULL, &note));
+        REQUIRE(!pal_mesh_file_read(path, &in, &s, NULL, NULL, NULL, &diag));
         body b;
         REQUIRE(make_body(s, wanted[k].resolution, 0.02, &b));
         double low[3], high[3];
         for (int d = 0; d < 3; d++) low[d] = wanted[k].low[d] - b.tets.origin_m[d];
         for (int d = 0; d < 3; d++) high[d] = wanted[k].high[d] - b.tets.origin_m[d];
         for (int hex = 0; hex < 2; hex++) {
-            pal_piece *piece;
+            pal_quadrature_point *piece;
             int n;
             REQUIRE(
                 !pal_locate_surface(hex ? b.in_hexes : b.in_tets, &b.surface, low, high, wanted[k].normal, &piece, &n));

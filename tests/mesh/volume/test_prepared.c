@@ -9,10 +9,10 @@ static bool make_ball(pal_prepared *p, pal_prepare_report *report)
     pal_surface ball = shape_ball(0.1, 64, 32, 0.2);
     ball.origin_m[1] = 7.5;
     pal_voxel_options options = {.resolution = 12, .border = true, .fill = true};
-    pal_note note;
-    pal_err err = pal_prepared_make(&ball, &options, p, report, &note);
+    pal_diagnostic diag;
+    pal_err err = pal_prepared_make(&ball, &options, p, report, &diag);
     pal_surface_free(&ball);
-    if (err) CHECK_FAIL("%s", note.text);
+    if (err) CHECK_FAIL("%s", diag.text);
     return !err;
 }
 
@@ -21,10 +21,10 @@ static void ball_becomes_a_sound_mesh(void)
     pal_prepared p;
     pal_prepare_report report;
     REQUIRE(make_ball(&p, &report));
-    pal_note note;
-    CHECK_INT(pal_tets_check(&p.tets, &note), PAL_ERR_OK);
+    pal_diagnostic diag;
+    CHECK_INT(pal_tets_check(&p.tets, &diag), PAL_ERR_OK);
     CHECK_INT(p.tets.n_tet, 5 * report.n_voxel);
-    CHECK_NEAR(report.volume_m3, (double)report.n_voxel * pow(p.tets.h_m, 3), 1e-12);
+    CHECK_NEAR(report.volume_m3, (double)report.n_voxel * pow(p.tets.edge_m, 3), 1e-12);
     CHECK_LE(fabs(report.volume_error), 0.05);
     CHECK_NEAR((1 + report.volume_error) * pal_surface_volume(&p.surface) / report.voxel.inside_volume_m3, 1, 1e-4);
     CHECK_TEXT(report.voxel.method, "scanline");
@@ -34,7 +34,7 @@ static void ball_becomes_a_sound_mesh(void)
     double filled = 0;
     for (int e = 0; e < p.hexes.n_hex; e++) filled += (double)p.hexes.fill[e];
     /* less what bulges out of the border layer */
-    CHECK_NEAR(filled * pow(p.tets.h_m, 3) / pal_surface_volume(&p.surface), 1, 2e-3);
+    CHECK_NEAR(filled * pow(p.tets.edge_m, 3) / pal_surface_volume(&p.surface), 1, 2e-3);
     pal_prepared_free(&p);
 }
 
@@ -46,12 +46,12 @@ static bool same(const void *a, const void *b, size_t n)
 static void saved_and_loaded_is_the_same_to_the_bit(void)
 {
     pal_prepared p, q;
-    pal_note note;
+    pal_diagnostic diag;
     char path[64];
     REQUIRE(make_ball(&p, NULL));
     snprintf(path, sizeof path, "/tmp/palpate_test_prepared_%d", (int)getpid());
-    REQUIRE(!pal_prepared_save(&p, path, &note));
-    REQUIRE(!pal_prepared_load(path, &q, &note));
+    REQUIRE(!pal_prepared_save(&p, path, &diag));
+    REQUIRE(!pal_prepared_load(path, &q, &diag));
     unlink(path);
     uint8_t *a, *b;
     size_t n_a, n_b;
@@ -66,7 +66,7 @@ static void saved_and_loaded_is_the_same_to_the_bit(void)
     CHECK(same(q.hexes.node, p.hexes.node, (size_t)p.hexes.n_hex * 32));
     CHECK(same(q.hexes.fill, p.hexes.fill, (size_t)p.hexes.n_hex * 4));
     CHECK(same(q.surface.origin_m, p.surface.origin_m, 24) && same(q.tets.origin_m, p.tets.origin_m, 24));
-    CHECK_NEAR(q.tets.h_m, p.tets.h_m, 0);
+    CHECK_NEAR(q.tets.edge_m, p.tets.edge_m, 0);
     free(a);
     free(b);
     pal_prepared_free(&p);
@@ -77,18 +77,18 @@ static void saved_and_loaded_is_the_same_to_the_bit(void)
 static void damaged_files_are_refused_with_their_place(void)
 {
     pal_prepared p, q;
-    pal_note note;
+    pal_diagnostic diag;
     uint8_t *bytes;
     size_t n;
     REQUIRE(make_ball(&p, NULL));
     REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
     for (size_t cut = 0; cut < n; cut = cut * 2 + 1)
-        CHECK_INT(pal_prepared_parse("cut", bytes, cut, &q, &note), PAL_ERR_REFUSED);
+        CHECK_INT(pal_prepared_parse("cut", bytes, cut, &q, &diag), PAL_ERR_REFUSED);
     bytes[n / 2] ^= 1;
-    CHECK_INT(pal_prepared_parse("flip", bytes, n, &q, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "flip: byte 24: the checksum"));
+    CHECK_INT(pal_prepared_parse("flip", bytes, n, &q, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "flip: byte 24: the checksum"));
     bytes[n / 2] ^= 1;
-    CHECK_INT(pal_prepared_parse("whole", bytes, n, &q, &note), PAL_ERR_OK);
+    CHECK_INT(pal_prepared_parse("whole", bytes, n, &q, &diag), PAL_ERR_OK);
     pal_prepared_free(&q);
 
     uint64_t state = 5;
@@ -101,7 +101,7 @@ static void damaged_files_are_refused_with_their_place(void)
         uint64_t sum = pal_prepared_checksum(bytes, n), before;
         memcpy(&before, bytes + 24, 8);
         if (at < 24 || at >= 32) memcpy(bytes + 24, &sum, 8);
-        if (pal_prepared_parse("change", bytes, n, &q, &note)) {
+        if (pal_prepared_parse("change", bytes, n, &q, &diag)) {
             n_refused++;
         } else {
             n_taken++;
@@ -116,7 +116,7 @@ static void damaged_files_are_refused_with_their_place(void)
 }
 
 /* sets bytes at a place and the checksum right, says what the reader makes of it, and sets them back */
-static pal_err parse_with(uint8_t *bytes, size_t n, size_t at, const void *value, size_t n_value, pal_note *note)
+static pal_err parse_with(uint8_t *bytes, size_t n, size_t at, const void *value, size_t n_value, pal_diagnostic *diag)
 {
     uint8_t old[64], old_sum[8];
     pal_prepared q;
@@ -125,7 +125,7 @@ static pal_err parse_with(uint8_t *bytes, size_t n, size_t at, const void *value
     memcpy(bytes + at, value, n_value);
     uint64_t sum = pal_prepared_checksum(bytes, n);
     memcpy(bytes + 24, &sum, 8);
-    pal_err err = pal_prepared_parse("file", bytes, n, &q, note);
+    pal_err err = pal_prepared_parse("file", bytes, n, &q, diag);
     if (!err) pal_prepared_free(&q);
     memcpy(bytes + at, old, n_value);
     memcpy(bytes + 24, old_sum, 8);
@@ -135,7 +135,7 @@ static pal_err parse_with(uint8_t *bytes, size_t n, size_t at, const void *value
 static void fill_that_does_not_fit_is_refused(void)
 {
     pal_prepared p;
-    pal_note note;
+    pal_diagnostic diag;
     uint8_t *bytes;
     size_t n;
     REQUIRE(make_ball(&p, NULL));
@@ -143,14 +143,14 @@ static void fill_that_does_not_fit_is_refused(void)
     /* the entry of section 15 begins behind eight counts, four doubles and fourteen entries */
     uint64_t at, few = (uint64_t)p.hexes.n_hex - 1, entry = 32 + 64 + 32 + 14 * 24;
     memcpy(&at, bytes + entry + 16, 8);
-    CHECK_INT(parse_with(bytes, n, at, &(float){0.25F}, 4, &note), PAL_ERR_OK);
-    CHECK_INT(parse_with(bytes, n, at, &(float){-0.25F}, 4, &note), PAL_ERR_REFUSED);
-    CHECK_INT(parse_with(bytes, n, at, &(float){1.001F}, 4, &note), PAL_ERR_REFUSED);
-    CHECK_INT(parse_with(bytes, n, at, &(float){NAN}, 4, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "a voxel's fill is not within 0..1"));
+    CHECK_INT(parse_with(bytes, n, at, &(float){0.25F}, 4, &diag), PAL_ERR_OK);
+    CHECK_INT(parse_with(bytes, n, at, &(float){-0.25F}, 4, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(parse_with(bytes, n, at, &(float){1.001F}, 4, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(parse_with(bytes, n, at, &(float){NAN}, 4, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "a voxel's fill is not within 0..1"));
     memcpy(bytes + entry + 8, &few, 8);
-    CHECK_INT(parse_with(bytes, n, 32 + 7 * 8, &few, 8, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "fill of") && strstr(note.text, "voxels, the mesh has"));
+    CHECK_INT(parse_with(bytes, n, 32 + 7 * 8, &few, 8, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "fill of") && strstr(diag.text, "voxels, the mesh has"));
     free(bytes);
     pal_prepared_free(&p);
 
@@ -159,7 +159,7 @@ static void fill_that_does_not_fit_is_refused(void)
     p.hexes.measured = false;
     REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
     pal_prepared q;
-    REQUIRE(!pal_prepared_parse("whole", bytes, n, &q, &note));
+    REQUIRE(!pal_prepared_parse("whole", bytes, n, &q, &diag));
     CHECK_INT(q.hexes.n_hex, p.hexes.n_hex);
     CHECK(!q.hexes.measured && q.hexes.fill[0] == 1.0F);
     free(bytes);
@@ -171,52 +171,52 @@ static void fill_that_does_not_fit_is_refused(void)
 static void a_file_of_version_2_is_read_with_its_hexahedra(void)
 {
     pal_prepared q;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     uint8_t *bytes;
     size_t n;
-    REQUIRE(!pal_file_read("tests/data/fuzz/prepared/cube.mesh", 1 << 20, &bytes, &n, &note));
+    REQUIRE(!pal_file_read("tests/data/fuzz/prepared/cube.mesh", 1 << 20, &bytes, &n, &diag));
     CHECK_INT(bytes[8], 2);
-    REQUIRE(!pal_prepared_parse("cube", bytes, n, &q, &note));
+    REQUIRE(!pal_prepared_parse("cube", bytes, n, &q, &diag));
     CHECK(q.hexes.n_hex > 0);
     CHECK_INT(5 * q.hexes.n_hex, q.tets.n_tet);
     CHECK(!q.hexes.measured);
     for (int e = 0; e < q.hexes.n_hex; e++) CHECK(q.hexes.fill[e] == 1.0F);
     pal_prepared_free(&q);
-    CHECK_INT(parse_with(bytes, n, 8, &(uint32_t){3}, 4, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "version 3 with 14 sections"));
+    CHECK_INT(parse_with(bytes, n, 8, &(uint32_t){3}, 4, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "version 3 with 14 sections"));
     free(bytes);
 }
 
 static void a_file_that_is_not_there_is_an_io_error(void)
 {
     pal_prepared q;
-    pal_note note;
-    CHECK_INT(pal_prepared_load("/nonexistent/mesh", &q, &note), PAL_ERR_IO);
-    CHECK(strstr(note.text, "/nonexistent/mesh"));
+    pal_diagnostic diag;
+    CHECK_INT(pal_prepared_load("/nonexistent/mesh", &q, &diag), PAL_ERR_IO);
+    CHECK(strstr(diag.text, "/nonexistent/mesh"));
 }
 
 static void a_surface_alone_is_saved_and_loaded_to_the_bit(void)
 {
     pal_surface ball = shape_ball(0.1, 16, 8, 0.2);
     pal_prepared p, q;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     uint8_t *a, *b;
     size_t n_a, n_b;
     ball.origin_m[2] = -3.25;
     REQUIRE(!pal_prepared_surface(&ball, &p));
     CHECK_INT(p.tets.n_node + p.tets.n_tet + p.hexes.n_hex + p.skin.n_vertex, 0);
     /* the mean edge of a ball of 16 x 8 fields */
-    CHECK(p.tets.h_m > 0.02 && p.tets.h_m < 0.06);
+    CHECK(p.tets.edge_m > 0.02 && p.tets.edge_m < 0.06);
     REQUIRE(!pal_prepared_bytes(&p, &a, &n_a));
-    if (pal_prepared_parse("alone", a, n_a, &q, &note)) CHECK_FAIL("%s", note.text);
-    REQUIRE(!note.text[0] && !pal_prepared_bytes(&q, &b, &n_b));
+    if (pal_prepared_parse("alone", a, n_a, &q, &diag)) CHECK_FAIL("%s", diag.text);
+    REQUIRE(!diag.text[0] && !pal_prepared_bytes(&q, &b, &n_b));
     CHECK(n_a == n_b && same(a, b, n_a));
     CHECK_INT(q.surface.n_vertex, ball.n_vertex);
     CHECK(same(q.surface.x, ball.x, (size_t)ball.n_vertex * 24));
     CHECK(same(q.surface.tri, ball.tri, (size_t)ball.n_tri * 12));
     CHECK_NEAR(q.surface.origin_m[2], -3.25, 0);
     CHECK_NEAR(q.tets.origin_m[2], -3.25, 0);
-    CHECK_NEAR(q.tets.h_m, p.tets.h_m, 0);
+    CHECK_NEAR(q.tets.edge_m, p.tets.edge_m, 0);
     CHECK_INT(q.tets.n_node + q.tets.n_tet + q.hexes.n_hex + q.skin.n_vertex + q.skin.n_frame, 0);
     pal_prepared_free(&q);
     free(b);
@@ -229,8 +229,8 @@ static void a_surface_alone_is_saved_and_loaded_to_the_bit(void)
         }
     uint64_t sum = pal_prepared_checksum(a, n_a);
     memcpy(a + 24, &sum, 8);
-    CHECK_INT(pal_prepared_parse("alone", a, n_a, &q, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "a triangle's corner is out of range") != NULL);
+    CHECK_INT(pal_prepared_parse("alone", a, n_a, &q, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "a triangle's corner is out of range") != NULL);
     free(a);
     pal_prepared_free(&p);
     pal_surface_free(&ball);

@@ -17,11 +17,11 @@ typedef struct bound {
 
 static bool bind_surface(pal_surface surface, int resolution, bound *b)
 {
-    pal_note note;
+    pal_diagnostic diag;
     pal_voxels v;
     pal_voxel_options options = {.resolution = resolution, .border = true};
     b->surface = surface;
-    if (pal_voxels_fill(&surface, &options, &v, NULL, &note) || pal_voxels_split(&v, &b->tets)) return false;
+    if (pal_voxels_fill(&surface, &options, &v, NULL, &diag) || pal_voxels_split(&v, &b->tets)) return false;
     pal_voxels_free(&v);
     if (pal_skin_bind(&b->tets, surface.x, surface.n_vertex, &b->skin)) return false;
     size_t n = 3 * (size_t)b->tets.n_node;
@@ -185,7 +185,7 @@ static void check_bounded(const bound *b)
         most = fmax(most, least);
     }
     CHECK(finite);
-    CHECK_LE(most, 2 * b->tets.h_m);
+    CHECK_LE(most, 2 * b->tets.edge_m);
 }
 
 static void flat_inverted_and_collapsed_bodies_stay_finite_and_near(void)
@@ -246,7 +246,7 @@ static void pressed_through_itself_or_crumpled_the_surface_does_not_jump(void)
     jump(&b, before, x_before);
     double *way = malloc(3 * (size_t)b.tets.n_node * sizeof *way);
     REQUIRE(way);
-    for (int i = 0; i < 3 * b.tets.n_node; i++) way[i] = 0.02 * b.tets.h_m * shape_uniform(&state);
+    for (int i = 0; i < 3 * b.tets.n_node; i++) way[i] = 0.02 * b.tets.edge_m * shape_uniform(&state);
     for (int step = 0; step < 50; step++) {
         for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += way[i];
         crumpled = fmax(crumpled, jump(&b, before, x_before));
@@ -272,7 +272,7 @@ static void second_edge_gives_the_same_axes_as_the_first(void)
         if (b.skin.frame_edge[2 * f + 1] >= 0) b.skin.frame_rest[3 * f + 1] *= 1000, n_second++;
     CHECK_INT(n_second, b.skin.n_frame);
     show(&b);
-    CHECK_LE(largest_error(&b, b.surface.x), 0.02 * b.tets.h_m);
+    CHECK_LE(largest_error(&b, b.surface.x), 0.02 * b.tets.edge_m);
     unbind(&b);
 }
 
@@ -283,10 +283,10 @@ static void voxels_that_touch_along_an_edge_carry_no_frame_there(void)
     shape_move(&other, 1, 1, 0);
     bound b;
     pal_voxels v;
-    pal_note note;
+    pal_diagnostic diag;
     pal_voxel_options options = {.resolution = 4};
     b.surface = shape_join(a, other);
-    REQUIRE(!pal_voxels_fill(&b.surface, &options, &v, NULL, &note));
+    REQUIRE(!pal_voxels_fill(&b.surface, &options, &v, NULL, &diag));
     REQUIRE(!pal_voxels_split(&v, &b.tets));
     pal_voxels_free(&v);
     REQUIRE(!pal_skin_bind(&b.tets, b.surface.x, b.surface.n_vertex, &b.skin));

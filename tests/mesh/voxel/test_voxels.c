@@ -7,13 +7,13 @@
 
 #include <malloc.h>
 
-static pal_note note;
+static pal_diagnostic diag;
 static pal_voxel_report report;
 
 static pal_err fill(const pal_surface *s, int resolution, const char *method, pal_voxels *out)
 {
     pal_voxel_options options = {.resolution = resolution, .border = true, .method = method};
-    return pal_voxels_fill(s, &options, out, &report, &note);
+    return pal_voxels_fill(s, &options, out, &report, &diag);
 }
 
 /* fills, checks the inside volume and method ("" for any), frees both */
@@ -23,7 +23,7 @@ static void expect_volume(pal_surface s, int resolution, double volume, double t
     pal_err err = fill(&s, resolution, NULL, &v);
     pal_surface_free(&s);
     if (err) {
-        CHECK_FAIL("refused: %s", note.text);
+        CHECK_FAIL("refused: %s", diag.text);
         return;
     }
     CHECK_NEAR(report.inside_volume_m3 / volume, 1, tolerance);
@@ -238,7 +238,7 @@ static void every_component_is_found(void)
     CHECK_INT(v.n_inside, all);
     pal_voxels_free(&v);
     pal_voxel_options options = {.resolution = 60, .border = true, .largest_only = true};
-    REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &note));
+    REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &diag));
     CHECK_NEAR((double)v.n_inside / (double)all, 0.25, 0.01);
     pal_voxels_free(&v);
     pal_surface_free(&s);
@@ -261,7 +261,7 @@ static void pieces_are_counted_with_their_border(void)
         pal_tets_free(&t);
         pal_voxels_free(&v);
         pal_voxel_options options = {.resolution = 8 + gap, .border = true, .largest_only = true};
-        REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &note));
+        REQUIRE(!pal_voxels_fill(&s, &options, &v, &report, &diag));
         CHECK_INT(v.n_inside, 64);
         CHECK_INT(report.n_component, 1);
         pal_voxels_free(&v);
@@ -305,7 +305,7 @@ static void flood_says_that_it_leaks(void)
     s.n_tri--;
     pal_voxels v;
     CHECK_INT(fill(&s, 10, "flood", &v), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "leaks"));
+    CHECK(strstr(diag.text, "leaks"));
     pal_surface_free(&s);
 }
 
@@ -359,7 +359,7 @@ static void thousand_rotations_give_the_convex_shapes_own_voxels(void)
         shape_rotate(&s, &state);
         pal_voxels v;
         if (fill(&s, 12, k % 10 == 0 ? "vote" : NULL, &v)) {
-            CHECK_FAIL("rotation %d: %s", k, note.text);
+            CHECK_FAIL("rotation %d: %s", k, diag.text);
             pal_surface_free(&s);
             continue;
         }
@@ -368,9 +368,9 @@ static void thousand_rotations_give_the_convex_shapes_own_voxels(void)
         for (int z = 0; z < v.n[2]; z++)
             for (int y = 0; y < v.n[1]; y++)
                 for (int x = 0; x < v.n[0]; x++, kind++) {
-                    double p[3] = {v.low_m[0] + v.h_m * (x + 0.5), v.low_m[1] + v.h_m * (y + 0.5),
-                                   v.low_m[2] + v.h_m * (z + 0.5)};
-                    double out = outside_of(&s, p) / v.h_m;
+                    double p[3] = {v.low_m[0] + v.edge_m * (x + 0.5), v.low_m[1] + v.edge_m * (y + 0.5),
+                                   v.low_m[2] + v.edge_m * (z + 0.5)};
+                    double out = outside_of(&s, p) / v.edge_m;
                     if (fabs(out) < 1e-4) continue;
                     wrong += (out < 0) != (*kind == 2);
                 }
@@ -392,7 +392,7 @@ static int64_t count_in_grid(pal_surface s, int n, const char *method)
     pal_voxels v;
     int64_t n_inside = -1;
     if (fill(&both, n, method, &v)) {
-        CHECK_FAIL("%s", note.text);
+        CHECK_FAIL("%s", diag.text);
     } else {
         CHECK_INT(report.n_disagree, 0);
         n_inside = v.n_inside;
@@ -461,12 +461,12 @@ static void refused(pal_surface s, int resolution, const char *words)
     pal_err err = fill(&s, resolution, NULL, &v);
     CHECK_INT(err, PAL_ERR_REFUSED);
     HARD_CASE_ALL("broken_surface", "tet_springs fem", "without a volume, NaN: refused with numbers",
-                  err && strstr(note.text, words), 1);
+                  err && strstr(diag.text, words), 1);
     if (!err) {
         CHECK_FAIL("%lld voxels inside by %s, wanted %s", (long long)v.n_inside, report.method, words);
         pal_voxels_free(&v);
-    } else if (!strstr(note.text, words))
-        CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, words);
+    } else if (!strstr(diag.text, words))
+        CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, words);
     pal_surface_free(&s);
 }
 
@@ -540,9 +540,9 @@ static void options_out_of_range_are_refused(void)
     CHECK_INT(fill(&s, 0, NULL, &v), PAL_ERR_REFUSED);
     CHECK_INT(fill(&s, 1025, NULL, &v), PAL_ERR_REFUSED);
     CHECK_INT(fill(&s, 10, "magic", &v), PAL_ERR_REFUSED);
-    pal_voxel_options options = {.resolution = 50, .most_voxel = 1000};
-    CHECK_INT(pal_voxels_fill(&s, &options, &v, &report, &note), PAL_ERR_BUDGET);
-    CHECK(strstr(note.text, "125000"));
+    pal_voxel_options options = {.resolution = 50, .max_voxel = 1000};
+    CHECK_INT(pal_voxels_fill(&s, &options, &v, &report, &diag), PAL_ERR_BUDGET);
+    CHECK(strstr(diag.text, "125000"));
     CHECK_INT(fill(&s, 1, NULL, &v), PAL_ERR_OK);
     CHECK_INT(v.n_inside, 1);
     CHECK_INT(v.n_border, 6);
@@ -620,11 +620,11 @@ static void split_gives_sound_tetrahedra(void)
         pal_tets t;
         REQUIRE(!fill(&s, 5 + 13 * shape, NULL, &v));
         REQUIRE(!pal_voxels_split(&v, &t));
-        if (pal_tets_check(&t, &note)) CHECK_FAIL("%s", note.text);
+        if (pal_tets_check(&t, &diag)) CHECK_FAIL("%s", diag.text);
         CHECK_INT(t.n_tet, 5 * (v.n_inside + v.n_border));
-        CHECK_NEAR(pal_tets_volume(&t) / ((double)(v.n_inside + v.n_border) * pow(v.h_m, 3)), 1, 1e-9);
+        CHECK_NEAR(pal_tets_volume(&t) / ((double)(v.n_inside + v.n_border) * pow(v.edge_m, 3)), 1, 1e-9);
         /* one inner tetrahedron of a third, four corners of a sixth */
-        double volume = pow(v.h_m, 3);
+        double volume = pow(v.edge_m, 3);
         for (int k = 0; k < t.n_tet; k += 97) {
             pal_tets one = {.n_tet = 1, .x = t.x, .tet = t.tet + 4 * k};
             CHECK_NEAR(pal_tets_volume(&one) / volume, k % 5 == 4 ? 1.0 / 3 : 1.0 / 6, 1e-6);

@@ -16,16 +16,16 @@ enum { STEPS = 6, TIMED = 40 };
 
 static void solver(model_scene *m, const char *name)
 {
-    pal_item_init(&m->def->solver, "bodies[0].solver", name);
+    pal_entry_init(&m->def->solver, "bodies[0].solver", name);
 }
 
 static void bare(model_scene *m)
 {
     m->def->material.damping_1_s = 0;
     m->scene->n_tool = 0;
-    if (m->kind == SPRINGS) pal_item_put_number(&m->def->model, "k_area_J", 0, NULL);
-    if (m->kind == SHELL) pal_item_put_number(&m->def->model, "k_shape_N_m", 0, NULL);
-    if (m->kind == SHELL) pal_item_put_bool(&m->def->model, "refine", false, NULL);
+    if (m->kind == SPRINGS) pal_entry_put_number(&m->def->model, "k_area_J", 0, NULL);
+    if (m->kind == SHELL) pal_entry_put_number(&m->def->model, "k_shape_N_m", 0, NULL);
+    if (m->kind == SHELL) pal_entry_put_bool(&m->def->model, "refine", false, NULL);
 }
 
 /* a box moved by a row that leads part of its lowest nodes */
@@ -33,8 +33,8 @@ static void led(model_scene *m)
 {
     const double shift_m[3] = {0, 0, 1e-3};
     m->def->n_support = 0;
-    pal_item_put_numbers(model_scene_effect(m, "moving_support"), "shift_m", shift_m, 3, NULL);
-    pal_item_put_number(&m->def->effect[m->def->n_effect - 1], "rise_s", 0.05, NULL);
+    pal_entry_put_numbers(model_scene_effect(m, "moving_support"), "shift_m", shift_m, 3, NULL);
+    pal_entry_put_number(&m->def->effect[m->def->n_effect - 1], "rise_s", 0.05, NULL);
 }
 
 static void held_by_springs(model_scene *m)
@@ -42,7 +42,7 @@ static void held_by_springs(model_scene *m)
     m->def->n_support = 0;
     /* a fresh factor would be made beside, with heap calls of its thread */
     solver(m, "implicit_euler");
-    pal_item_put_bool(&m->def->solver, "refresh", false, NULL);
+    pal_entry_put_bool(&m->def->solver, "refresh", false, NULL);
     model_scene_effect(m, "penalty");
     model_scene_effect(m, "gravity");
 }
@@ -50,7 +50,7 @@ static void held_by_springs(model_scene *m)
 static void tets(model_scene *m)
 {
     bare(m);
-    pal_item_put_text(&m->def->model, "element", "tet4", NULL);
+    pal_entry_put_text(&m->def->model, "element", "tet4", NULL);
     solver(m, "sdirk2");
     model_scene_effect(m, "gravity");
 }
@@ -65,13 +65,13 @@ static void still(model_scene *m)
 static void blown_up(model_scene *m)
 {
     bare(m);
-    pal_item_put_number(model_scene_effect(m, "inflate"), "pressure_Pa", 50, NULL);
+    pal_entry_put_number(model_scene_effect(m, "inflate"), "pressure_Pa", 50, NULL);
 }
 
 static void coloured(model_scene *m)
 {
     bare(m);
-    pal_item_put_text(model_scene_effect(m, "field_out"), "field", "displacement", NULL);
+    pal_entry_put_text(model_scene_effect(m, "field_output"), "field", "displacement", NULL);
 }
 
 static void sleepy(model_scene *m)
@@ -86,11 +86,11 @@ static void skinned(model_scene *m)
     const pal_voxel_options options = {.resolution = 4, .border = true};
     pal_prepare_report report;
     box_free(&m->mesh);
-    bool made = small_ball(&ball, 0.05, 8) && !pal_prepared_make(&ball, &options, &m->mesh, &report, &m->note);
+    bool made = small_ball(&ball, 0.05, 8) && !pal_prepared_make(&ball, &options, &m->mesh, &report, &m->diag);
     pal_surface_free(&ball);
     if (!made) abort();
     bare(m);
-    pal_item_init(&m->def->output, "bodies[0].output", "skin_out");
+    pal_entry_init(&m->def->output, "bodies[0].output", "skin_output");
 }
 
 static const struct {
@@ -118,7 +118,7 @@ static bool run(model_scene *m, long *n_create, long *n_step)
 {
     n_heap_call = 0;
     counting = true;
-    pal_err err = pal_world_create(m->scene, &m->note, &m->world);
+    pal_err err = pal_world_create(m->scene, &m->diag, &m->world);
     *n_create = n_heap_call;
     n_heap_call = 0;
     if (!err) m->body = pal_world_body(m->world, 0);
@@ -185,11 +185,11 @@ int main(int argc, char **argv)
         list[i].dress(&m);
         printf("%s:", list[i].name);
         if (!run(&m, &n_create, &n_step)) {
-            printf(" refused: %s\n", m.note.text);
+            printf(" refused: %s\n", m.diag.text);
         } else {
-            for (int r = 0; r < pal_world_rows(m.world); r++) {
-                pal_row_info row;
-                pal_world_row(m.world, r, &row);
+            for (int r = 0; r < pal_world_component_count(m.world); r++) {
+                pal_component_info row;
+                pal_world_component_info(m.world, r, &row);
                 printf(" %s", row.name);
                 n_run += row.n_run;
             }

@@ -45,33 +45,34 @@ static void publishes_the_slope_of_slow_pressing(void)
     for (int tets = 0; tets < 2; tets++) {
         fem_scene f;
         REQUIRE(fem_ball(&f, 10, 1, 0.012, 15));
-        CHECK_INT(pal_item_put_text(&f.s.scene->body[0].model, "element", tets ? "tet4" : "hex8_bbar", NULL), 0);
+        CHECK_INT(pal_entry_put_text(&f.s.scene->body[0].model, "element", tets ? "tet4" : "hex8_bbar", NULL), 0);
         f.s.scene->body[0].material.damping_1_s = 25;
         REQUIRE(tool_scene_open(&f.s));
         enum { N = 18, BEFORE = 3, FROM = 8, HALF = 1 };
-        double force[N], felt[N], step_m = 0.0004, last = 0, first = 0, worst = 0, mean = 0;
+        double force[N], haptic_stiffness[N], step_m = 0.0004, last = 0, first = 0, worst = 0, mean = 0;
         for (int i = 0; i < N; i++) {
             move_tool(&f.s, 0, 0.002, 0.002, 0.062 - step_m * (i - BEFORE), false);
             REQUIRE(step_world(&f.s, 10));
             force[i] = pal_norm3(tool_of(&f.s, 0)->mean_force_N);
             REQUIRE(tool_of(&f.s, 0)->n_patch > 0);
-            felt[i] = tool_of(&f.s, 0)->patch[0].k1_N_m;
-            if (i == BEFORE) first = felt[i];
+            haptic_stiffness[i] = tool_of(&f.s, 0)->patch[0].k1_N_m;
+            if (i == BEFORE) first = haptic_stiffness[i];
             CHECK(force[i] >= last);
             last = force[i];
         }
         for (int i = FROM; i < N - HALF; i++) {
             double slope = (force[i + HALF] - force[i - HALF]) / (2 * HALF * step_m);
-            worst = fmax(worst, fabs(felt[i] / slope - 1));
-            mean += (felt[i] / slope - 1) / (N - HALF - FROM);
+            worst = fmax(worst, fabs(haptic_stiffness[i] / slope - 1));
+            mean += (haptic_stiffness[i] / slope - 1) / (N - HALF - FROM);
         }
         printf("  %s: %.3g N at %.3g mm, k1 before touch %.4g, at last %.4g N/m, %.2g off the slope, worst %.2g\n",
-               tets ? "tets" : "hexahedra", last, 1e3 * step_m * (N - 1 - BEFORE), first, felt[N - 1], mean, worst);
+               tets ? "tets" : "hexahedra", last, 1e3 * step_m * (N - 1 - BEFORE), first, haptic_stiffness[N - 1], mean,
+               worst);
         CHECK(last > 0.25);
         CHECK_LE(fabs(mean), 0.03);
         CHECK_LE(worst, 0.05);
         /* before the touch: what it will be half a millimetre deep and deeper, within a factor of two */
-        CHECK(first > 0.5 * felt[N - 1] && first < 2 * felt[N - 1]);
+        CHECK(first > 0.5 * haptic_stiffness[N - 1] && first < 2 * haptic_stiffness[N - 1]);
         fem_close(&f);
     }
 }
@@ -91,17 +92,17 @@ static void pulls_what_it_grabbed_and_holds_still(void)
     const pal_tool *tool = tool_of(&f.s, 0);
     double force = -tool->mean_force_N[2];
     printf("  %.4g N, felt %.4g %.4g %.4g N/m, F/d %.4g, kinetic %.2g of elastic, %.2g off the static answer\n", force,
-           tool->grip_k_N_m[0], tool->grip_k_N_m[3], tool->grip_k_N_m[5], force / 0.0016, still, error);
-    CHECK(tool->holding && tool->has_grip);
+           tool->grasp_k_N_m[0], tool->grasp_k_N_m[3], tool->grasp_k_N_m[5], force / 0.0016, still, error);
+    CHECK(tool->holding && tool->has_grasp);
     CHECK_LE(still, 1e-6);
     CHECK_LE(error, 0.05);
-    CHECK_NEAR(tool->grip_k_N_m[5], force / 0.0016, 0.05 * force / 0.0016);
+    CHECK_NEAR(tool->grasp_k_N_m[5], force / 0.0016, 0.05 * force / 0.0016);
     /* sideways it is as stiff in both directions, and couples little */
-    CHECK_NEAR(tool->grip_k_N_m[0], tool->grip_k_N_m[3], 0.05 * tool->grip_k_N_m[0]);
-    CHECK(tool->grip_k_N_m[0] > 10 && tool->grip_k_N_m[0] < tool->grip_k_N_m[5]);
+    CHECK_NEAR(tool->grasp_k_N_m[0], tool->grasp_k_N_m[3], 0.05 * tool->grasp_k_N_m[0]);
+    CHECK(tool->grasp_k_N_m[0] > 10 && tool->grasp_k_N_m[0] < tool->grasp_k_N_m[5]);
     move_tool(&f.s, 0, 0.05, 0.05, 0.08, false);
     REQUIRE(step_world(&f.s, 300));
-    CHECK_LE(rms_displacement(f.s.body), 1e-3 * f.s.body->size_m);
+    CHECK_LE(rms_displacement(f.s.body), 1e-3 * f.s.body->length_scale_m);
     fem_close(&f);
 }
 
@@ -127,26 +128,26 @@ static void two_tools_share_a_place(void)
 
 static void keeps_to_its_cap(void)
 {
-    for (int grab = 0; grab < 2; grab++) {
+    for (int grasp = 0; grasp < 2; grasp++) {
         fem_scene f;
         REQUIRE(fem_slab(&f, 10, 10, 5, 0.01, 1, 0.015, 0.3) && tool_scene_open(&f.s));
         double most = 0, load[3];
         for (int i = 0; i <= 400; i++) {
-            double z = 0.066 + (grab ? 0.0003 : -0.0002) * fmin(i, 100);
-            move_tool(&f.s, 0, 0.05, 0.05, z, grab && i > 0);
+            double z = 0.066 + (grasp ? 0.0003 : -0.0002) * fmin(i, 100);
+            move_tool(&f.s, 0, 0.05, 0.05, z, grasp && i > 0);
             REQUIRE(step_world(&f.s, 1));
             most = fmax(most, fmax(pal_norm3(tool_of(&f.s, 0)->force_N), pal_norm3(tool_of(&f.s, 0)->mean_force_N)));
         }
         sum_loads(f.s.body, load);
         double still = tremble(&f.s, 30), error = static_error(&f.s);
         printf("  %s: most %.9g N, on tissue %.4g N, kinetic %.2g of elastic, %.2g off the static answer\n",
-               grab ? "grab" : "push", most, pal_norm3(load), still, error);
+               grasp ? "grab" : "push", most, pal_norm3(load), still, error);
         CHECK_LE(most, 0.3 * (1 + 1e-9));
         CHECK(most > 0.29);
         /* contact itself keeps 2 % below it: the proxy is held back, the spring not stretched farther */
         CHECK_NEAR(pal_norm3(load), 0.98 * 0.3, 1e-4);
         CHECK_LE(still, 1e-5);
-        CHECK_LE(error, grab ? 0.05 : 0.1);
+        CHECK_LE(error, grasp ? 0.05 : 0.1);
         fem_close(&f);
     }
 }
@@ -158,7 +159,7 @@ static void friction_drags_and_slides(void)
     pal_body_def *def = &f.s.scene->body[0];
     for (int i = 0; i < def->n_effect; i++)
         if (!strcmp(def->effect[i].name, "tool_push"))
-            CHECK_INT(pal_item_put_number(&def->effect[i], "friction", 0.3, NULL), 0);
+            CHECK_INT(pal_entry_put_number(&def->effect[i], "friction", 0.3, NULL), 0);
     REQUIRE(tool_scene_open(&f.s));
     for (int i = 0; i <= 40; i++) {
         move_tool(&f.s, 0, 0.03, 0.05, 0.08 - 0.0001 * i, false);

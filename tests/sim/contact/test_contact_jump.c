@@ -3,21 +3,21 @@
 
 static void a_tool_that_jumps_does_not_strike(void)
 {
-    for (int grab = 0; grab < 2; grab++) {
+    for (int grasp = 0; grasp < 2; grasp++) {
         fem_scene f;
         REQUIRE(fem_ball(&f, 8, 1, 0.008, 15) && tool_scene_open(&f.s));
-        double S = f.s.body->size_m, rise = 0, force = 0, most = 15 * 0.02 * S;
+        double S = f.s.body->length_scale_m, rise = 0, force = 0, most = 15 * 0.02 * S;
         move_tool(&f.s, 0, 0, 0, 0.062, false);
         follow(&f.s, 15, &rise, &force);
-        move_tool(&f.s, 0, 0, 0, 0.055, grab);
+        move_tool(&f.s, 0, 0, 0, 0.055, grasp);
         follow(&f.s, 15, &rise, &force);
         /* through the body, out at the side, far away, back */
         const double to[5][3] = {{0, 0, 0.055 - S}, {S, 0, 0}, {0, 0, 3 * S}, {0.01, 0, 0}, {0, 0, 0.055}};
         for (int i = 0; i < 5; i++) {
-            move_tool(&f.s, 0, to[i][0], to[i][1], to[i][2], grab);
+            move_tool(&f.s, 0, to[i][0], to[i][1], to[i][2], grasp);
             follow(&f.s, 12, &rise, &force);
         }
-        printf("  %s: most %.3g N, energy rose %.3g J in a step, %.3g allowed\n", grab ? "grab" : "push", force, rise,
+        printf("  %s: most %.3g N, energy rose %.3g J in a step, %.3g allowed\n", grasp ? "grab" : "push", force, rise,
                most);
         CHECK_LE(rise, most);
         CHECK_LE(force, 15 * (1 + 1e-9));
@@ -33,14 +33,14 @@ static void starts_inside_without_harm(void)
 {
     fem_scene f;
     REQUIRE(fem_ball(&f, 10, 1, 0.008, 15));
-    CHECK_INT(pal_item_put_text(&f.s.scene->body[0].model, "element", "tet4", NULL), 0);
+    CHECK_INT(pal_entry_put_text(&f.s.scene->body[0].model, "element", "tet4", NULL), 0);
     REQUIRE(tool_scene_open(&f.s));
     double rise = 0, force = 0;
     move_tool(&f.s, 0, 0.005, 0, 0.03, false);
     follow(&f.s, 150, &rise, &force);
     double still = tremble(&f.s, 30);
     printf("  %.3g N, energy rose by %.3g J in a step at most, kinetic %.2g of elastic\n", force, rise, still);
-    CHECK_LE(rise, 15 * 0.02 * f.s.body->size_m);
+    CHECK_LE(rise, 15 * 0.02 * f.s.body->length_scale_m);
     CHECK(force > 0.1);
     CHECK_LE(still, 1e-6);
     fem_close(&f);

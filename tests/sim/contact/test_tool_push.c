@@ -79,7 +79,7 @@ static void grows_with_depth_and_publishes_its_slope(void)
         changed += i > 0 && tool->patch[0].id != id;
         id = tool->patch[0].id;
     }
-    const pal_patch *patch = &tool_of(&s, 0)->patch[0];
+    const pal_contact_patch *patch = &tool_of(&s, 0)->patch[0];
     double slope = (force[119] - force[109]) / (10 * depth_step), z = 0.065 - depth_step * 99;
     double plane =
         pal_dot3(patch->point_m, patch->normal) - z * patch->normal[2] - 0.05 * (patch->normal[0] + patch->normal[1]);
@@ -102,7 +102,7 @@ static void tells_the_bridge_where_the_surface_is_before_it_touches(void)
     REQUIRE(step_world(&s, 2));
     const pal_tool *tool = tool_of(&s, 0);
     REQUIRE(tool->n_patch == 1);
-    const pal_patch *patch = &tool->patch[0];
+    const pal_contact_patch *patch = &tool->patch[0];
     CHECK(pal_norm3(tool->mean_force_N) == 0);
     /* the shown ball has flat triangles, 0.2 mm within the sphere */
     CHECK_NEAR(pal_norm3(patch->point_m), 0.058, 4e-4);
@@ -125,11 +125,11 @@ static void keeps_plane_and_stiffness_still_while_the_tool_rests(void)
     }
     /* the ball rocks for a while */
     REQUIRE(step_world(&s, 150));
-    pal_patch first = tool_of(&s, 0)->patch[0];
+    pal_contact_patch first = tool_of(&s, 0)->patch[0];
     double plane = 0, stiff = 0;
     for (int i = 0; i < 120; i++) {
         REQUIRE(step_world(&s, 1));
-        const pal_patch *now = &tool_of(&s, 0)->patch[0];
+        const pal_contact_patch *now = &tool_of(&s, 0)->patch[0];
         CHECK_INT(now->id, first.id);
         plane = fmax(plane, pal_dist3(now->point_m, first.point_m));
         stiff = fmax(stiff, fabs(now->k1_N_m / first.k1_N_m - 1));
@@ -148,12 +148,12 @@ static void lets_the_body_go_back_to_rest(void)
         move_tool(&s, 0, 0.02, 0, 0.055 - 0.0003 * i, false);
         REQUIRE(step_world(&s, 1));
     }
-    CHECK(rms_displacement(s.body) > 1e-3 * s.body->size_m);
+    CHECK(rms_displacement(s.body) > 1e-3 * s.body->length_scale_m);
     pal_world_pose(s.world, 0, NULL);
     /* 5 s are allowed (numerics.md part 3) */
     REQUIRE(step_world(&s, 300));
-    printf("  off by %.3g %% of S\n", 1e2 * rms_displacement(s.body) / s.body->size_m);
-    CHECK_LE(rms_displacement(s.body), 1e-3 * s.body->size_m);
+    printf("  off by %.3g %% of S\n", 1e2 * rms_displacement(s.body) / s.body->length_scale_m);
+    CHECK_LE(rms_displacement(s.body), 1e-3 * s.body->length_scale_m);
     CHECK(pal_norm3(tool_of(&s, 0)->mean_force_N) == 0);
     tool_scene_close(&s);
 }
@@ -273,9 +273,9 @@ static void touches_between_the_vertices_of_a_coarse_surface(void)
     pal_surface surface = {.n_vertex = 8, .n_tri = 12, .x = x, .tri = tri};
     pal_voxel_options options = {.resolution = 8, .border = true};
     pal_prepare_report report;
-    pal_note note = {""};
-    REQUIRE(!pal_prepared_make(&surface, &options, &s.mesh, &report, &note));
-    tool_scene_fill(&s, "skin_out", true, 1, 0.006, 15);
+    pal_diagnostic diag = {""};
+    REQUIRE(!pal_prepared_make(&surface, &options, &s.mesh, &report, &diag));
+    tool_scene_fill(&s, "skin_output", true, 1, 0.006, 15);
     REQUIRE(tool_scene_open(&s));
     /* somewhere within the upper face, far from every vertex */
     for (int i = 0; i < 40; i++) {
@@ -294,7 +294,7 @@ static void drags_tissue_only_with_friction(void)
     for (int k = 0; k < 2; k++) {
         tool_scene s;
         REQUIRE(slab_scene(&s, 8, 8, 4, 0.01, 1, 0.012, 15));
-        if (k) REQUIRE(!pal_item_put_number(&s.scene->body[0].effect[0], "friction", 0.4, NULL));
+        if (k) REQUIRE(!pal_entry_put_number(&s.scene->body[0].effect[0], "friction", 0.4, NULL));
         REQUIRE(tool_scene_open(&s));
         for (int i = 0; i < 60; i++) {
             move_tool(&s, 0, 0.03 + 0.0003 * i, 0.04, 0.04 + 0.012 - fmin(0.003, 0.0002 * i), false);
@@ -332,11 +332,11 @@ static void squeezes_with_two_tools(void)
 static void refuses_keys_it_does_not_know(void)
 {
     tool_scene s;
-    pal_note note = {""};
+    pal_diagnostic diag = {""};
     REQUIRE(slab_scene(&s, 2, 2, 2, 0.01, 1, 0.01, 15));
-    REQUIRE(!pal_item_put_number(&s.scene->body[0].effect[0], "stiffnes", 1, NULL));
-    CHECK_INT(pal_world_create(s.scene, &note, &s.world), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "stiffnes") != NULL);
+    REQUIRE(!pal_entry_put_number(&s.scene->body[0].effect[0], "stiffnes", 1, NULL));
+    CHECK_INT(pal_world_create(s.scene, &diag, &s.world), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "stiffnes") != NULL);
     tool_scene_close(&s);
 }
 

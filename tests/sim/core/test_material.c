@@ -1,5 +1,5 @@
 /* Materials of regions: which number holds where, and what a region must not be. */
-#include "server/sim/core/def.h"
+#include "server/sim/core/definition.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
 
@@ -37,7 +37,7 @@ static void later_boxes_win_and_keep_what_they_do_not_give(void)
     pal_material_at(&def, (double[3]){0.7, 0.5, 0.5}, &m);
     CHECK_NEAR(m.density_kg_m3, 1200, 0);
     CHECK_NEAR(m.poisson, 0.3, 0);
-    pal_material_over(&def, &bare, (double[3]){0.2, 0.5, 0.5}, &m);
+    pal_material_overlay(&def, &bare, (double[3]){0.2, 0.5, 0.5}, &m);
     CHECK(isnan(m.poisson) && m.young_Pa == 1e4);
 }
 
@@ -74,10 +74,10 @@ static void grid_is_trilinear_and_goes_on_beyond_its_border(void)
 
 static void refused(const char *key, const char *number)
 {
-    pal_note note = {{0}};
-    CHECK_INT(pal_region_check(&def, 0, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, "\"liver\" regions[0]") || !strstr(note.text, key) || !strstr(note.text, number))
-        CHECK_FAIL("\"%s\" does not name %s %s", note.text, key, number);
+    pal_diagnostic diag = {{0}};
+    CHECK_INT(pal_region_check(&def, 0, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, "\"liver\" regions[0]") || !strstr(diag.text, key) || !strstr(diag.text, number))
+        CHECK_FAIL("\"%s\" does not name %s %s", diag.text, key, number);
 }
 
 static void refuses_what_is_no_region(void)
@@ -112,16 +112,16 @@ static void refuses_what_is_no_region(void)
 static void scene_check_looks_at_regions(void)
 {
     pal_prepared box;
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     CHECK_INT(box_make(2, 2, 2, 0.1, &box), 0);
     pal_scene *scene = box_scene(&box, true, false);
-    CHECK_INT(pal_scene_check(scene, &note), 0);
+    CHECK_INT(pal_scene_check(scene, &diag), 0);
     scene->body[0].n_region = 1;
     scene->body[0].region[0] = (pal_region){.kind = PAL_REGION_BOX, .young_Pa = 0, .poisson = NAN};
-    CHECK_INT(pal_scene_check(scene, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "regions[0].young_Pa: 0"));
+    CHECK_INT(pal_scene_check(scene, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "regions[0].young_Pa: 0"));
     scene->body[0].n_region = PAL_REGION_MAX + 1;
-    CHECK_INT(pal_scene_check(scene, &note), PAL_ERR_REFUSED);
+    CHECK_INT(pal_scene_check(scene, &diag), PAL_ERR_REFUSED);
     free(scene);
     box_free(&box);
 }

@@ -8,12 +8,12 @@
 /* ---- bodies ---- */
 
 /* a slab of springs (0), of implicit elements (1), a block of control cells (2); 4 x 4 x 2 cm or 4 cm */
-static bool open_body(tool_scene *s, pal_cells *cells, int which, bool held)
+static bool open_body(tool_scene *s, pal_cells *cells, int which, bool fixed)
 {
     if (which < 2) {
         if (!slab_scene(s, 4, 4, 2, 0.01, 2, 0.008, 15)) return false;
-        s->scene->body[0].n_support = held;
-        if (which == 1) pal_item_init(&s->scene->body[0].model, "model", "fem");
+        s->scene->body[0].n_support = fixed;
+        if (which == 1) pal_entry_init(&s->scene->body[0].model, "model", "fem");
         return tool_scene_open(s);
     }
     pal_surface surface = {0};
@@ -28,8 +28,8 @@ static bool open_body(tool_scene *s, pal_cells *cells, int which, bool held)
     pal_tools_default(s->scene, 2);
     pal_body_default_cells(&s->scene->body[0], "clay", &s->mesh, cells);
     s->scene->body[0].n_effect = 0;
-    s->scene->body[0].n_support = held;
-    pal_item_put_number(&s->scene->body[0].model, "levels", 1, NULL);
+    s->scene->body[0].n_support = fixed;
+    pal_entry_put_number(&s->scene->body[0].model, "levels", 1, NULL);
     s->skinned = true;
     return tool_scene_open(s);
 }
@@ -63,17 +63,17 @@ static pal_brush handle(const pal_body *body, double lift_m)
     return b;
 }
 
-static const pal_row *brush_row(const pal_world *world)
+static const pal_component *brush_row(const pal_world *world)
 {
-    for (int i = 0; i < pal_world_rows(world); i++)
-        if (!strcmp(pal_world_effect(world, i)->effect->name, "brush")) return pal_world_effect(world, i);
+    for (int i = 0; i < pal_world_component_count(world); i++)
+        if (!strcmp(pal_world_component(world, i)->effect->name, "brush")) return pal_world_component(world, i);
     return NULL;
 }
 
 /* the row's forces alone, its n-th step */
 static void forces(tool_scene *s, int n_step)
 {
-    const pal_row *row = brush_row(s->world);
+    const pal_component *row = brush_row(s->world);
     for (int i = 0; i < n_step; i++) {
         pal_step step = {.body = s->body, .dt_s = 1e-3, .n_sub = 1};
         memset(s->body->load, 0, 3 * sizeof(double) * (size_t)s->body->n_node);
@@ -88,7 +88,7 @@ static void crumple(tool_scene *s, double far_m)
     for (int i = 0; i < 3 * s->body->n_dof; i++) {
         s->body->x[i] = s->body->x_rest[i] + far_m * check_random(&seed);
     }
-    pal_world_moved(s->world, 0);
+    pal_world_invalidate_limits(s->world, 0);
 }
 
 /* ---- what must hold ---- */
@@ -142,7 +142,7 @@ static void pressure_does_not_grow_with_what_it_blows_up_for_ever(void)
         for (int k = 0; k < 4; k++) {
             double sum_N = 0;
             for (int i = 0; i < 3 * s.body->n_dof; i++) s.body->x[i] = times[k] * s.body->x_rest[i];
-            pal_body_place(s.body);
+            pal_body_update_nodes(s.body);
             forces(&s, 10);
             for (int i = 0; i < s.body->n_node; i++) sum_N += pal_norm3(s.body->load + 3 * (size_t)i);
             if (k == 0) rest_N = sum_N;
@@ -160,11 +160,11 @@ static void a_small_node_bears_less_of_a_lasting_load_whatever_the_solver(void)
         pal_cells cells;
         REQUIRE(open_body(&s, &cells, which, true));
         const pal_material *m = &s.scene->body[0].material;
-        const double h = s.body->h_m, corner_kg = m->density_kg_m3 * h * h * h / 8;
+        const double h = s.body->edge_m, full_corner_kg = m->density_kg_m3 * h * h * h / 8;
         int thin = 0;
         for (int i = 0; i < s.body->n_node; i++)
             if (s.body->node_mass_kg[i] < s.body->node_mass_kg[thin]) thin = i;
-        const double part = s.body->node_mass_kg[thin] / corner_kg;
+        const double part = s.body->node_mass_kg[thin] / full_corner_kg;
         REQUIRE(!pal_world_load(s.world, 0, thin, (const double[3]){0, 0, 1e6}));
         REQUIRE(!pal_world_step(s.world, 1e-4));
         printf("  body %d: %.3g of a corner\n", which, part);
@@ -212,7 +212,7 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
         REQUIRE(open_body(&s, &cells, which, true));
         const pal_brush b = handle(s.body, 0.005);
         REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL));
-        const pal_row *row = brush_row(s.world);
+        const pal_component *row = brush_row(s.world);
         REQUIRE(row != NULL);
         forces(&s, 10);
         /* 4 t (1 - t) of the lift at each node: at most all of it, and nothing sideways */
@@ -275,13 +275,13 @@ static void forces_come_and_go_over_ten_steps(void)
     }
     REQUIRE(!pal_world_brush(s.world, 0, 0, NULL, NULL));
     for (int i = 1; i <= 10; i++) {
-        pal_world_tidy(s.world);
+        pal_world_remove_idle(s.world);
         REQUIRE(brush_row(s.world) != NULL);
         forces(&s, 1);
         sum_loads(s.body, sum);
         CHECK_NEAR(sum[2] / full, -1 + 0.1 * i, 1e-12);
     }
-    pal_world_tidy(s.world);
+    pal_world_remove_idle(s.world);
     CHECK(brush_row(s.world) == NULL);
     REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL));
     for (int i = 1; i <= 12; i++) {
@@ -298,11 +298,11 @@ static void rows_come_with_the_first_brush_and_go_with_the_last(void)
         tool_scene s, quiet;
         pal_cells cells, other;
         REQUIRE(open_body(&s, &cells, which, true) && open_body(&quiet, &other, which, true));
-        const int rows = pal_world_rows(s.world);
+        const int rows = pal_world_component_count(s.world);
         const size_t n_byte = pal_world_bytes(s.world);
         pal_brush b = everywhere(50), c = handle(s.body, 0.003);
         REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL) && !pal_world_brush(s.world, 0, 1, &c, NULL));
-        CHECK_INT(pal_world_rows(s.world), rows + 1);
+        CHECK_INT(pal_world_component_count(s.world), rows + 1);
         CHECK(pal_world_bytes(s.world) > n_byte);
         const long heap = n_heap_call;
         for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
@@ -310,20 +310,20 @@ static void rows_come_with_the_first_brush_and_go_with_the_last(void)
         REQUIRE(!pal_world_pose(s.world, 1, NULL));
         for (int i = 0; i < 12; i++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
         CHECK_INT(n_heap_call, heap);
-        pal_world_tidy(s.world);
-        CHECK_INT(pal_world_rows(s.world), rows + 1);
+        pal_world_remove_idle(s.world);
+        CHECK_INT(pal_world_component_count(s.world), rows + 1);
         REQUIRE(!pal_world_brush(s.world, 0, 0, NULL, NULL));
         for (int i = 0; i < 10; i++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
-        pal_world_tidy(s.world);
-        CHECK_INT(pal_world_rows(s.world), rows);
+        pal_world_remove_idle(s.world);
+        CHECK_INT(pal_world_component_count(s.world), rows);
         CHECK_INT(pal_world_bytes(s.world), n_byte);
         CHECK(pal_world_hash(s.world) != pal_world_hash(quiet.world));
         /* a reset ends all at once; then the world is as any other */
         REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL));
         CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
         pal_world_reset(s.world), pal_world_reset(quiet.world);
-        pal_world_tidy(s.world);
-        CHECK_INT(pal_world_rows(s.world), rows);
+        pal_world_remove_idle(s.world);
+        CHECK_INT(pal_world_component_count(s.world), rows);
         for (int i = 0; i < 10; i++)
             CHECK(!pal_world_step(s.world, 1.0 / 60) && !pal_world_step(quiet.world, 1.0 / 60));
         CHECK(pal_world_hash(s.world) == pal_world_hash(quiet.world));
@@ -336,7 +336,7 @@ static void run_tidy(tool_scene *s, int n)
 {
     for (int i = 0; i < n; i++) {
         CHECK_INT(pal_world_step(s->world, 1.0 / 60), 0);
-        pal_world_tidy(s->world);
+        pal_world_remove_idle(s->world);
     }
 }
 
@@ -381,16 +381,16 @@ static void a_curve_lifts_what_it_holds(void)
 
 static void expect(tool_scene *s, int body, int slot, pal_brush b, const char *sentence)
 {
-    pal_note note = {""};
-    CHECK_INT(pal_world_brush(s->world, body, slot, &b, &note), PAL_ERR_REFUSED);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_world_brush(s->world, body, slot, &b, &diag), PAL_ERR_REFUSED);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
 }
 
 static void what_cannot_be_is_refused_and_changes_nothing(void)
 {
     tool_scene s, ball;
     REQUIRE(open_body(&s, NULL, 0, true));
-    const int rows = pal_world_rows(s.world);
+    const int rows = pal_world_component_count(s.world);
     const size_t n_byte = pal_world_bytes(s.world);
     pal_brush good = handle(s.body, 0.004), b;
     expect(&s, 1, 0, good, "body 1 does not exist");
@@ -411,7 +411,7 @@ static void what_cannot_be_is_refused_and_changes_nothing(void)
     b = everywhere(6e4), expect(&s, 0, 0, b, "pressure_Pa 60000, body \"body\" takes up to 5e+04");
     b = everywhere(-6e4), expect(&s, 0, 0, b, "pressure_Pa -60000");
     b = everywhere(1), b.at_m[0] = 50, expect(&s, 0, 0, b, "within radius_m 10 of it");
-    CHECK_INT(pal_world_rows(s.world), rows);
+    CHECK_INT(pal_world_component_count(s.world), rows);
     CHECK_INT(pal_world_bytes(s.world), n_byte);
     /* one that is there stays as it is */
     REQUIRE(!pal_world_brush(s.world, 0, 0, &good, NULL));
@@ -436,14 +436,14 @@ static void the_hardest_hands_leave_numbers(void)
         for (int kind = 0; kind < 2; kind++) {
             tool_scene s;
             pal_cells cells;
-            pal_note note = {""};
+            pal_diagnostic diag = {""};
             REQUIRE(open_body(&s, &cells, which, true));
-            pal_brush b = handle(s.body, kind ? 10 * s.body->size_m : 0);
+            pal_brush b = handle(s.body, kind ? 10 * s.body->length_scale_m : 0);
             if (kind)
-                b.stiffness_N_m = 0.5 * s.body->load_cap_N / s.body->h_m;
+                b.stiffness_N_m = 0.5 * s.body->load_cap_N / s.body->edge_m;
             else
-                b = everywhere(0.99 * s.body->load_cap_N / (s.body->h_m * s.body->h_m));
-            if (pal_world_brush(s.world, 0, 0, &b, &note)) CHECK_FAIL("%s", note.text);
+                b = everywhere(0.99 * s.body->load_cap_N / (s.body->edge_m * s.body->edge_m));
+            if (pal_world_brush(s.world, 0, 0, &b, &diag)) CHECK_FAIL("%s", diag.text);
             for (int i = 0; i < 15; i++) {
                 pal_err err = pal_world_step(s.world, 1.0 / 60);
                 CHECK(err == PAL_ERR_OK || err == PAL_ERR_FROZEN);

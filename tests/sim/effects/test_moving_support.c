@@ -13,19 +13,19 @@ static bool open_bar(fem_scene *f, bool implicit, const char *solver, double shi
     f->own_hexes = false;
     if (implicit && !fem_ready(f, true)) return false;
     pal_body_def *def = &f->s.scene->body[0];
-    if (implicit) pal_item_init(&def->solver, "solver", solver);
-    def->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1e-4, 1, 1}};
-    pal_item *item = &def->effect[def->n_effect++];
+    if (implicit) pal_entry_init(&def->solver, "solver", solver);
+    def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1e-4, 1, 1}};
+    pal_config_entry *item = &def->effect[def->n_effect++];
     const double low[3] = {NX * edge_m - 1e-4, -1, -1}, high[3] = {1, 1, 1}, shift[3] = {shift_x, 0, shift_z};
     const double axis[3] = {1, 0, 0};
-    pal_item_init(item, "effects[9]", "moving_support");
+    pal_entry_init(item, "effects[9]", "moving_support");
     bool put =
-        !pal_item_put_numbers(item, "low_m", low, 3, NULL) && !pal_item_put_numbers(item, "high_m", high, 3, NULL);
-    put = put && !pal_item_put_numbers(item, "shift_m", shift, 3, NULL);
-    put = put && !pal_item_put_number(item, "rise_s", rise_s, NULL) &&
-          !pal_item_put_number(item, "period_s", period_s, NULL);
-    put = put && !pal_item_put_numbers(item, "turn_axis", axis, 3, NULL);
-    put = put && !pal_item_put_number(item, "turn_deg", turn_deg, NULL);
+        !pal_entry_put_numbers(item, "low_m", low, 3, NULL) && !pal_entry_put_numbers(item, "high_m", high, 3, NULL);
+    put = put && !pal_entry_put_numbers(item, "shift_m", shift, 3, NULL);
+    put = put && !pal_entry_put_number(item, "rise_s", rise_s, NULL) &&
+          !pal_entry_put_number(item, "period_s", period_s, NULL);
+    put = put && !pal_entry_put_numbers(item, "turn_axis", axis, 3, NULL);
+    put = put && !pal_entry_put_number(item, "turn_deg", turn_deg, NULL);
     return put && tool_scene_open(&f->s);
 }
 
@@ -81,8 +81,8 @@ static void a_stretched_bar_is_stretched_evenly(void)
     REQUIRE(open_bar(&f, true, "implicit_euler", 0.0008, 0, 0, 0, 0));
     pal_material material = f.s.scene->body[0].material;
     material.poisson = 0;
-    pal_note note = {""};
-    CHECK_INT(pal_world_material(f.s.world, 0, &material, &note), 0);
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_world_material(f.s.world, 0, &material, &diag), 0);
     REQUIRE(step_world(&f.s, 300));
     double worst = 0;
     for (int i = 0; i < f.s.body->n_node; i++) {
@@ -156,19 +156,19 @@ static void refuses_what_makes_no_sense(void)
         memset(&f, 0, sizeof f);
         REQUIRE(slab_scene(&f.s, 2, 2, 2, edge_m, 0, 0.01, 15));
         pal_body_def *def = &f.s.scene->body[0];
-        pal_item *item = &def->effect[def->n_effect++];
-        pal_item_init(item, "effects[9]", "moving_support");
-        if (k < 3) pal_item_put_numbers(item, "low_m", low, 3, NULL);
-        if (k < 2) pal_item_put_numbers(item, "high_m", high, 3, NULL);
-        if (k == 1) pal_item_put_number(item, "lowest", 0.1, NULL);
-        if (k == 3) pal_item_put_numbers(item, "turn_axis", zero, 3, NULL);
-        if (k == 4) pal_item_put_number(item, "rise_s", -1, NULL);
-        pal_note note = {""};
+        pal_config_entry *item = &def->effect[def->n_effect++];
+        pal_entry_init(item, "effects[9]", "moving_support");
+        if (k < 3) pal_entry_put_numbers(item, "low_m", low, 3, NULL);
+        if (k < 2) pal_entry_put_numbers(item, "high_m", high, 3, NULL);
+        if (k == 1) pal_entry_put_number(item, "lowest", 0.1, NULL);
+        if (k == 3) pal_entry_put_numbers(item, "turn_axis", zero, 3, NULL);
+        if (k == 4) pal_entry_put_number(item, "rise_s", -1, NULL);
+        pal_diagnostic diag = {""};
         static const char *const word[] = {"none of the body's 27 nodes", "or lowest", "together", "turn_axis",
                                            "rise_s"};
-        CHECK_INT(pal_world_create(f.s.scene, &note, &f.s.world), PAL_ERR_REFUSED);
-        CHECK(strstr(note.text, word[k]) && strstr(note.text, "effects[9]"));
-        if (!strstr(note.text, word[k])) printf("  %s\n", note.text);
+        CHECK_INT(pal_world_create(f.s.scene, &diag, &f.s.world), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, word[k]) && strstr(diag.text, "effects[9]"));
+        if (!strstr(diag.text, word[k])) printf("  %s\n", diag.text);
         f.s.world = NULL;
         fem_close(&f);
     }

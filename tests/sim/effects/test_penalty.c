@@ -1,25 +1,25 @@
 /* Row penalty: its force is the gradient of its energy, it bears what supports bear, and gives way by f / k. */
 #include "server/sim/core/effect_list.h"
-#include "tests/fixtures/solid_scene.h"
+#include "tests/fixtures/subdivision_scene.h"
 
 static const int32_t bricks[3] = {2, 2, 3};
-static const double size_m[3] = {0.05, 0.05, 0.1};
+static const double length_scale_m[3] = {0.05, 0.05, 0.1};
 
 /* a column with its foot in the row, k 0: the row's own; weight on */
 static bool begin(solid_scene *s, const char *solver, double k_N_m, bool gravity)
 {
-    solid_scene_take(s, solid_scene_box(bricks, size_m, true), 1, solver, "polar");
-    pal_item *row = &s->def->effect[s->def->n_effect++];
-    pal_item_init(row, "effects[0]", "penalty");
-    if (k_N_m > 0 && pal_item_put_number(row, "k_N_m", k_N_m, NULL)) abort();
-    if (gravity) pal_item_init(&s->def->effect[s->def->n_effect++], "effects[1]", "gravity");
+    solid_scene_take(s, solid_scene_box(bricks, length_scale_m, true), 1, solver, "polar");
+    pal_config_entry *row = &s->def->effect[s->def->n_effect++];
+    pal_entry_init(row, "effects[0]", "penalty");
+    if (k_N_m > 0 && pal_entry_put_number(row, "k_N_m", k_N_m, NULL)) abort();
+    if (gravity) pal_entry_init(&s->def->effect[s->def->n_effect++], "effects[1]", "gravity");
     return solid_scene_open(s);
 }
 
-static const pal_row *row_of(const solid_scene *s, const char *name)
+static const pal_component *row_of(const solid_scene *s, const char *name)
 {
-    for (int i = 0; i < pal_world_rows(s->world); i++) {
-        const pal_row *row = pal_world_effect(s->world, i);
+    for (int i = 0; i < pal_world_component_count(s->world); i++) {
+        const pal_component *row = pal_world_component(s->world, i);
         if (!strcmp(row->effect->name, name)) return row;
     }
     return NULL;
@@ -29,7 +29,7 @@ static void force_is_the_gradient_of_the_energy_and_the_tangent_its_slope(void)
 {
     solid_scene s;
     REQUIRE(begin(&s, "central_cg", 40, false));
-    const pal_row *row = row_of(&s, "penalty");
+    const pal_component *row = row_of(&s, "penalty");
     REQUIRE(row);
     pal_body *body = s.body;
     size_t n3 = 3 * (size_t)body->n_node;
@@ -57,7 +57,7 @@ static void the_row_is_as_stiff_as_it_says(void)
 {
     solid_scene s;
     REQUIRE(begin(&s, "central_cg", 40, false));
-    const pal_row *row = row_of(&s, "penalty");
+    const pal_component *row = row_of(&s, "penalty");
     pal_body *body = s.body;
     pal_step step = {.body = body};
     for (int turn = 0; turn < 2; turn++) {
@@ -80,11 +80,11 @@ static void it_bears_the_weight_under_both_solvers(void)
         solid_scene s;
         REQUIRE(begin(&s, solver[k], 2000, true));
         for (int i = 0; i < 240; i++) CHECK_INT(pal_world_step(s.world, s.scene->step_s), 0);
-        const pal_row *row = row_of(&s, "penalty");
-        double weight = 9.81 * pal_solid_mass_kg(s.body->solid), borne[3] = {0, 0, 0}, lower = 0;
+        const pal_component *row = row_of(&s, "penalty");
+        double weight = 9.81 * pal_subdivision_solid_mass_kg(s.body->solid), borne[3] = {0, 0, 0}, lower = 0;
         memset(s.body->f, 0, 3 * sizeof(double) * (size_t)s.body->n_node);
         pal_step step = {.body = s.body};
-        pal_body_place(s.body);
+        pal_body_update_nodes(s.body);
         CHECK_INT(row->effect->run(row->self, &step), 0);
         for (int i = 0; i < s.body->n_node; i++) pal_add3(borne, borne, s.body->f + 3 * (size_t)i);
         int n = 0;
@@ -108,7 +108,7 @@ static void a_stiffer_row_asks_an_explicit_solver_for_shorter_steps(void)
     CHECK_LE(pal_world_limit_s(stiff.world), 0.5 * pal_world_limit_s(soft.world));
     /* pulled off and let go, it comes back and does not diverge */
     for (int i = 0; i < stiff.body->n_dof; i++) stiff.body->x[3 * i] += 0.005;
-    pal_world_moved(stiff.world, 0);
+    pal_world_invalidate_limits(stiff.world, 0);
     double start = pal_world_energy_J(stiff.world);
     for (int i = 0; i < 60; i++) CHECK_INT(pal_world_step(stiff.world, stiff.scene->step_s), 0);
     CHECK_LE(pal_world_energy_J(stiff.world), start);
@@ -120,19 +120,19 @@ static void what_holds_nothing_is_refused(void)
 {
     solid_scene s;
     const double low[3] = {1, 1, 1}, high[3] = {2, 2, 2};
-    solid_scene_take(&s, solid_scene_box(bricks, size_m, true), 1, "central_cg", "polar");
-    pal_item *row = &s.def->effect[s.def->n_effect++];
-    pal_item_init(row, "effects[0]", "penalty");
-    if (pal_item_put_numbers(row, "low_m", low, 3, NULL)) abort();
-    CHECK_INT(pal_world_create(s.scene, &s.note, &s.world), PAL_ERR_REFUSED);
-    CHECK(strstr(s.note.text, "effects[0]: low_m and high_m belong together"));
-    if (pal_item_put_numbers(row, "high_m", high, 3, NULL)) abort();
-    CHECK_INT(pal_world_create(s.scene, &s.note, &s.world), PAL_ERR_REFUSED);
-    CHECK(strstr(s.note.text, "effects[0]: penalty holds none of the body's"));
-    pal_item_init(row, "effects[0]", "penalty");
-    if (pal_item_put_number(row, "k_N_m", -1, NULL)) abort();
-    CHECK_INT(pal_world_create(s.scene, &s.note, &s.world), PAL_ERR_REFUSED);
-    CHECK(strstr(s.note.text, "k_N_m"));
+    solid_scene_take(&s, solid_scene_box(bricks, length_scale_m, true), 1, "central_cg", "polar");
+    pal_config_entry *row = &s.def->effect[s.def->n_effect++];
+    pal_entry_init(row, "effects[0]", "penalty");
+    if (pal_entry_put_numbers(row, "low_m", low, 3, NULL)) abort();
+    CHECK_INT(pal_world_create(s.scene, &s.diag, &s.world), PAL_ERR_REFUSED);
+    CHECK(strstr(s.diag.text, "effects[0]: low_m and high_m belong together"));
+    if (pal_entry_put_numbers(row, "high_m", high, 3, NULL)) abort();
+    CHECK_INT(pal_world_create(s.scene, &s.diag, &s.world), PAL_ERR_REFUSED);
+    CHECK(strstr(s.diag.text, "effects[0]: penalty holds none of the body's"));
+    pal_entry_init(row, "effects[0]", "penalty");
+    if (pal_entry_put_number(row, "k_N_m", -1, NULL)) abort();
+    CHECK_INT(pal_world_create(s.scene, &s.diag, &s.world), PAL_ERR_REFUSED);
+    CHECK(strstr(s.diag.text, "k_N_m"));
     s.world = NULL;
     solid_scene_close(&s);
 }

@@ -1,19 +1,19 @@
 /* Bodies that sleep: at rest nothing of them is run, positions stay to the bit, a tool wakes them before it touches,
  * and so does all that the world does to them; runs repeat; a scene without the row knows nothing of it. */
 #include "server/base/vec3.h"
-#include "server/sim/surface/shell.h"
+#include "server/sim/surface/adaptive_surface.h"
 #include "tests/fixtures/model_scenes.h"
 #include "tests/heap_calls.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 
 /* runs of every row of the world so far */
 static uint64_t runs(const model_scene *m)
 {
     uint64_t sum = 0;
-    pal_row_info row;
-    for (int i = 0; i < pal_world_rows(m->world); i++) {
-        pal_world_row(m->world, i, &row);
+    pal_component_info row;
+    for (int i = 0; i < pal_world_component_count(m->world); i++) {
+        pal_world_component_info(m->world, i, &row);
         sum += row.n_run;
     }
     return sum;
@@ -69,8 +69,8 @@ static void falls_asleep_where_it_rests_and_costs_nothing(void)
         for (int i = 0; i < m.body->n_dof; i++)
             far = fmax(far, pal_dist3(x + 3 * (size_t)i, awake.body->x + 3 * (size_t)i));
         printf("  %s: asleep after %.2f s, %.2g S from where it would come to rest\n", model_kind_name[k],
-               n * m.scene->step_s, far / m.body->size_m);
-        CHECK_LE(far, 2e-5 * m.body->size_m);
+               n * m.scene->step_s, far / m.body->length_scale_m);
+        CHECK_LE(far, 2e-5 * m.body->length_scale_m);
         free(x);
         model_scene_close(&m), model_scene_close(&awake);
     }
@@ -134,11 +134,11 @@ static pal_err by_load(model_scene *m)
 static pal_err by_material(model_scene *m)
 {
     const pal_material to = {.young_Pa = 8e3, .poisson = 0.4, .density_kg_m3 = 1000, .damping_1_s = 12};
-    return pal_world_material(m->world, 0, &to, &note);
+    return pal_world_material(m->world, 0, &to, &diag);
 }
 static pal_err by_row(model_scene *m)
 {
-    return pal_world_switch_row(m->world, m->scene, 0, "gravity", false, &note);
+    return pal_world_switch_component(m->world, m->scene, 0, "gravity", false, &diag);
 }
 static pal_err by_reset(model_scene *m)
 {
@@ -151,7 +151,7 @@ static pal_err by_reset_body(model_scene *m)
 }
 static pal_err by_moving(model_scene *m)
 {
-    pal_world_moved(m->world, 0);
+    pal_world_invalidate_limits(m->world, 0);
     return PAL_ERR_OK;
 }
 
@@ -181,14 +181,14 @@ static void a_field_is_shown_without_waking_it(void)
     sleepy(&m, FEM, 12);
     REQUIRE(model_scene_open(&m));
     REQUIRE(steps_to_sleep(&m, 1500) >= 0);
-    CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &note), 0);
+    CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &diag), 0);
     double most = 0;
     for (int i = 0; i < m.body->n_shown; i++)
         most = fmax(most, (double)m.body->field[PAL_FIELD_DISPLACEMENT_M]->value[i]);
     CHECK(most > 1e-4);
     CHECK(model_scene_steps(&m, 5));
     CHECK(m.body->asleep);
-    CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, false, &note), 0);
+    CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, false, &diag), 0);
     model_scene_close(&m);
 }
 
@@ -245,10 +245,10 @@ static void does_not_sleep_while_something_goes_on(void)
 {
     model_scene m;
     sleepy(&m, SPRINGS, 12);
-    pal_item *breath = model_scene_effect(&m, "moving_support");
+    pal_config_entry *breath = model_scene_effect(&m, "moving_support");
     const double shift[3] = {0, 0, 1e-7};
-    pal_item_put_numbers(breath, "shift_m", shift, 3, NULL);
-    pal_item_put_number(breath, "period_s", 60, NULL);
+    pal_entry_put_numbers(breath, "shift_m", shift, 3, NULL);
+    pal_entry_put_number(breath, "period_s", 60, NULL);
     REQUIRE(model_scene_open(&m));
     CHECK_INT(steps_to_sleep(&m, 600), -1);
     model_scene_close(&m);
@@ -268,7 +268,7 @@ static void does_not_sleep_while_something_goes_on(void)
     CHECK_INT(steps_to_sleep(&m, 200), -1);
     double v = 0;
     for (int i = 0; i < m.body->n_dof; i++) v = fmax(v, pal_norm3(m.body->v + 3 * (size_t)i));
-    CHECK_LE(v, 1e-4 * m.body->size_m);
+    CHECK_LE(v, 1e-4 * m.body->length_scale_m);
     model_scene_close(&m);
 }
 
@@ -278,15 +278,15 @@ static void what_a_far_tool_holds_or_presses_stays_awake(void)
 {
     for (int k = 0; k < 2 * MODEL_KINDS; k++) {
         model_scene m;
-        const bool grab = k < MODEL_KINDS;
-        if (k % MODEL_KINDS == SOLID && !grab) continue; /* fem presses implicitly as well */
+        const bool grasp = k < MODEL_KINDS;
+        if (k % MODEL_KINDS == SOLID && !grasp) continue; /* fem presses implicitly as well */
         sleepy(&m, k % MODEL_KINDS, 12);
         m.scene->tool[0].force_cap_N = 0.05;
-        pal_item_put_number(&m.def->effect[1], "slip_S", 100, NULL); /* never through the body */
+        pal_entry_put_number(&m.def->effect[1], "slip_S", 100, NULL); /* never through the body */
         REQUIRE(model_scene_open(&m));
         REQUIRE(steps_to_sleep(&m, 1200) > 0);
         double *x = malloc(3 * sizeof(double) * (size_t)m.body->n_dof), held_m = 0, left_m = 0;
-        const int n_x = 3 * (m.body->shell ? m.body->shell->levels.n_vertex[0] : m.body->n_dof);
+        const int n_x = 3 * (m.body->adaptive ? m.body->adaptive->levels.n_vertex[0] : m.body->n_dof);
         const float *high = m.body->shown;
         REQUIRE(x);
         memcpy(x, m.body->x, 3 * sizeof(double) * (size_t)m.body->n_dof);
@@ -294,14 +294,14 @@ static void what_a_far_tool_holds_or_presses_stays_awake(void)
             if (m.body->shown[3 * i + 2] > high[2]) high = m.body->shown + 3 * (size_t)i;
         const bool box = m.kind == SPRINGS || m.kind == FEM;
         const double at[3] = {box ? 0.04 : (double)high[0], box ? 0.03 : (double)high[1],
-                              (double)high[2] + (grab ? 0.002 : 0.02)};
+                              (double)high[2] + (grasp ? 0.002 : 0.02)};
         int n_asleep = 0, n = (int)(1.6 / m.scene->step_s);
         for (int i = 0; i < n; i++) {
             /* up to 15 cm above it; or as far down, in half a second */
             const double way = 0.15 * fmin(1, fmax(0, i * m.scene->step_s - 0.1) / 0.4);
-            const pal_pose pose = {.position_m = {at[0], at[1], at[2] + (grab ? way : -way)},
+            const pal_pose pose = {.position_m = {at[0], at[1], at[2] + (grasp ? way : -way)},
                                    .quat = {1, 0, 0, 0},
-                                   .buttons = grab && i > 2};
+                                   .buttons = grasp && i > 2};
             CHECK_INT(pal_world_pose(m.world, 0, &pose), 0);
             REQUIRE(!pal_world_step(m.world, m.scene->step_s));
             const pal_tool *tool = &pal_world_tools(m.world)->tool[0];
@@ -312,10 +312,10 @@ static void what_a_far_tool_holds_or_presses_stays_awake(void)
         CHECK_INT(pal_world_pose(m.world, 0, NULL), 0);
         CHECK(steps_to_sleep(&m, 1200) > 0);
         for (int i = 0; i < n_x; i++) left_m = fmax(left_m, fabs(m.body->x[i] - x[i]));
-        printf("  %s: %s by %.2f mm, %.2g mm left\n", model_kind_name[m.kind], grab ? "held" : "pressed", 1e3 * held_m,
+        printf("  %s: %s by %.2f mm, %.2g mm left\n", model_kind_name[m.kind], grasp ? "held" : "pressed", 1e3 * held_m,
                1e3 * left_m);
         CHECK(held_m > 1e-4);
-        CHECK_LE(left_m, 5e-4 * m.body->size_m);
+        CHECK_LE(left_m, 5e-4 * m.body->length_scale_m);
         free(x);
         model_scene_close(&m);
     }
@@ -325,9 +325,9 @@ static void refuses_what_is_no_threshold(void)
 {
     model_scene m;
     sleepy(&m, SPRINGS, 12);
-    pal_item_put_number(&m.def->effect[m.def->n_effect - 1], "still_s", -1, NULL);
-    CHECK_INT(pal_world_create(m.scene, &note, &m.world), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "still_s") && strstr(note.text, "effects[4]"));
+    pal_entry_put_number(&m.def->effect[m.def->n_effect - 1], "rest_time_s", -1, NULL);
+    CHECK_INT(pal_world_create(m.scene, &diag, &m.world), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "rest_time_s") && strstr(diag.text, "effects[4]"));
     model_scene_close(&m);
 }
 

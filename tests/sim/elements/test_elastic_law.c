@@ -100,7 +100,7 @@ static void projection_is_that_of_the_eigenvalues(void)
         double least = 0, most = 0;
         for (int m = 0; m < 9; m++) least = fmin(least, w[m]), most = fmax(most, fabs(w[m]));
         pal_neo_modes modes;
-        pal_neo_modes_take(mu, k1, pressure, f, &modes);
+        pal_neo_modes_compute(mu, k1, pressure, f, &modes);
         pal_neo_modes_hessian(&modes, closed);
         if (least < -1e-9) CHECK(modes.projected);
         for (int i = 0; i < 9; i++)
@@ -169,15 +169,15 @@ static void von_mises_of_known_stresses(void)
 
 static void refuses_an_unknown_law(void)
 {
-    pal_item item;
-    pal_note note = {{0}};
+    pal_config_entry item;
+    pal_diagnostic diag = {{0}};
     pal_elastic_law law = PAL_LAW_LINEAR;
-    pal_item_init(&item, "model", "fem");
-    CHECK_INT(pal_elastic_law_read(&item, &law, &note), 0);
+    pal_entry_init(&item, "model", "fem");
+    CHECK_INT(pal_elastic_law_read(&item, &law, &diag), 0);
     CHECK_INT(law, PAL_LAW_COROTATIONAL);
-    pal_item_put_text(&item, "law", "hooke", NULL);
-    CHECK_INT(pal_elastic_law_read(&item, &law, &note), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "model.law") && strstr(note.text, "hooke"));
+    pal_entry_put_text(&item, "law", "hooke", NULL);
+    CHECK_INT(pal_elastic_law_read(&item, &law, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "model.law") && strstr(diag.text, "hooke"));
 }
 
 int main(void)

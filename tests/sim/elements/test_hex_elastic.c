@@ -3,7 +3,7 @@
 
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
-#include "server/num/shape.h"
+#include "server/num/shape_functions.h"
 
 static const char *const elements[2] = {"hex8_bbar", "hex8"};
 static const char *const laws[3] = {"corotational", "linear", "neo_hookean"};
@@ -13,18 +13,18 @@ static void begin(hex_body *b, int nx, int ny, int nz, bool (*keep)(int, int, in
 {
     const int n[3] = {nx, ny, nz};
     hex_body_begin(b, n, keep, 0.01);
-    pal_item_put_text(&b->item, "element", element, NULL);
-    pal_item_put_text(&b->item, "law", law, NULL);
+    pal_entry_put_text(&b->item, "element", element, NULL);
+    pal_entry_put_text(&b->item, "law", law, NULL);
 }
 
 /* K of one voxel by num/shape, times E, nu, h and share */
-static void dense(int bbar, double young_Pa, double poisson, double h_m, double share, double k[576])
+static void dense(int bbar, double young_Pa, double poisson, double edge_m, double share, double k[576])
 {
     double shear[576], volume[576], mu, lambda;
     pal_lame(young_Pa, poisson, &mu, &lambda);
     pal_hex_stiffness(bbar, shear, volume);
     for (int i = 0; i < 576; i++)
-        k[i] = share * h_m * (mu * shear[i] + (bbar ? lambda + 2 * mu / 3 : lambda) * volume[i]);
+        k[i] = share * edge_m * (mu * shear[i] + (bbar ? lambda + 2 * mu / 3 : lambda) * volume[i]);
 }
 
 static void product_is_that_of_the_integrated_stiffness(void)
@@ -63,11 +63,11 @@ static double plain_force(const hex_body *b, int bbar, const double *x, double *
     for (int e = 0; e < b->hexes.n_hex; e++) {
         const int32_t *node = b->hexes.node + 8 * e;
         double deform[9] = {0}, q[4] = {1, 0, 0, 0}, u[24];
-        dense(bbar, b->def->material.young_Pa, b->def->material.poisson, b->tets.h_m, b->hexes.fill[e], k);
+        dense(bbar, b->def->material.young_Pa, b->def->material.poisson, b->tets.edge_m, b->hexes.fill[e], k);
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 9; i++)
-                deform[i] += x[3 * node[c] + i / 3] * (c >> i % 3 & 1 ? 0.25 : -0.25) / b->tets.h_m;
-        pal_polar_turn(deform, q, 100);
+                deform[i] += x[3 * node[c] + i / 3] * (c >> i % 3 & 1 ? 0.25 : -0.25) / b->tets.edge_m;
+        pal_polar_rotation(deform, q, 100);
         pal_quat_matrix(q, turn);
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 3; i++) {
@@ -127,7 +127,7 @@ static void rotated_tangent_is_that_of_one_voxel_at_a_time(void)
         double deform[9] = {0}, q[4] = {1, 0, 0, 0}, r[9], u[24] = {0}, g[24] = {0};
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 9; i++) deform[i] += b.body.x[3 * node[c] + i / 3] * (c >> i % 3 & 1 ? 25 : -25);
-        pal_polar_turn(deform, q, 100);
+        pal_polar_rotation(deform, q, 100);
         pal_quat_matrix(q, r);
         for (int i = 0; i < 24; i++)
             for (int j = 0; j < 3; j++) u[i] += r[3 * j + i % 3] * p[3 * node[i / 3] + j];
@@ -173,12 +173,12 @@ static void product_and_assembled_matrix_agree(void)
     for (int law = 0; law < 3; law++)
         for (int element = 0; element < 2; element++) {
             hex_body b;
-            pal_blocks a;
+            pal_block_matrix a;
             pal_cliques list;
             begin(&b, 5, 4, 3, hex_irregular, elements[element], laws[law]);
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             REQUIRE(hex_effect->tangent->couple(b.row, &list));
-            REQUIRE(pal_blocks_make(b.body.n_node, &list, 1, b.arena, &a) == PAL_ERR_OK);
+            REQUIRE(pal_block_matrix_make(b.body.n_node, &list, 1, b.arena, &a) == PAL_ERR_OK);
             hex_shake(&b, 0.2, 6);
             int n = 3 * b.body.n_node;
             double *p = hex_zeros(n);
@@ -187,10 +187,10 @@ static void product_and_assembled_matrix_agree(void)
             for (int i = 0; i < n; i++) p[i] = hex_random(&seed);
             hex_effect->tangent->linearise(b.row, &b.body);
             hex_effect->tangent->multiply(b.row, &b.body, 3, 0, p, one);
-            pal_blocks_zero(&a);
+            pal_block_matrix_zero(&a);
             hex_effect->tangent->assemble(b.row, &b.body, 1, 0, &a);
             hex_effect->tangent->assemble(b.row, &b.body, 2, 0, &a);
-            pal_blocks_multiply(&a, 1, p, two);
+            pal_block_matrix_multiply(&a, 1, p, two);
             CHECK_LE(hex_farthest(one, two, n), 1e-12 * hex_largest(one, n));
             free(p), free(one), free(two);
             hex_body_free(&b);
@@ -269,7 +269,7 @@ static void neo_hookean_tangent_is_the_derivative_of_the_force(void)
 /* K p of one voxel from the points' projected Hessians one at a time (elastic_law) and the mean's rank one */
 static void plain_neo_product(const hex_body *b, int bbar, const int32_t *node, const double *p, double *out)
 {
-    const double h = b->tets.h_m, volume = h * h * h;
+    const double h = b->tets.edge_m, volume = h * h * h;
     double mu, lambda, grad[8][8][3], f[8][9] = {{0}}, df[9], dp[9], mean[24] = {0}, ratio = 0, along = 0;
     pal_lame(b->def->material.young_Pa, b->def->material.poisson, &mu, &lambda);
     double k1 = bbar ? mu / 3 : lambda + mu, kappa = bbar ? lambda + 2 * mu / 3 : 0;
@@ -288,7 +288,7 @@ static void plain_neo_product(const hex_body *b, int bbar, const int32_t *node, 
     for (int g = 0; g < 8; g++) {
         pal_neo_modes modes;
         memset(df, 0, sizeof df);
-        pal_neo_modes_take(mu, k1, kappa * (ratio - 1), f[g], &modes);
+        pal_neo_modes_compute(mu, k1, kappa * (ratio - 1), f[g], &modes);
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 9; i++) df[i] += 2 / h * p[3 * node[c] + i / 3] * grad[g][c][i % 3];
         pal_neo_modes_apply(&modes, df, dp);
@@ -307,7 +307,7 @@ static void neo_hookean_tangent_is_that_of_one_point_at_a_time(void)
             begin(&b, 5, 3, 2, NULL, elements[element], "neo_hookean");
             b.def->material.poisson = 0.4;
             /* points of turned over voxels are asked for as well */
-            pal_item_put_bool(&b.item, "untangle", false, NULL);
+            pal_entry_put_bool(&b.item, "recover", false, NULL);
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             int n = 3 * b.body.n_node;
             double *p = hex_zeros(n), *got = hex_zeros(n), *want = hex_zeros(n);
@@ -514,7 +514,7 @@ static void ten_thousand_turns_leave_no_energy(void)
         }
         CHECK_LE(worst, 1e-6 * strained);
         CHECK_LE(most, 1e-9 * 5000 * 0.01 * 0.01);
-        CHECK_INT(b.body.rescue.n_tangled, 0);
+        CHECK_INT(b.body.safeguards.n_inversion, 0);
         hex_body_free(&b);
     }
 }
@@ -558,7 +558,7 @@ static void share_of_material_scales_a_voxel(void)
     for (int i = 3; i >= 0; i--) {
         hex_body b;
         begin(&b, 1, 1, 1, NULL, "hex8_bbar", "corotational");
-        pal_item_put_bool(&b.item, "fill", row[i].key, NULL);
+        pal_entry_put_bool(&b.item, "fill", row[i].key, NULL);
         b.hexes.fill[0] = row[i].fill;
         REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
         hex_shake(&b, 0.1, 5);
@@ -635,15 +635,15 @@ static void bad_entries_are_refused(void)
     hex_body b;
     begin(&b, 2, 2, 2, NULL, "hex20", "linear");
     CHECK(hex_body_make(&b) == PAL_ERR_REFUSED);
-    CHECK(strstr(b.note.text, "hex20") != NULL);
+    CHECK(strstr(b.diag.text, "hex20") != NULL);
     hex_body_free(&b);
     begin(&b, 2, 2, 2, NULL, "hex8", "rubber");
     CHECK(hex_body_make(&b) == PAL_ERR_REFUSED);
     hex_body_free(&b);
     begin(&b, 2, 2, 2, NULL, "hex8", "linear");
-    pal_item_put_number(&b.item, "gauss", 3, NULL);
+    pal_entry_put_number(&b.item, "gauss", 3, NULL);
     CHECK(hex_body_make(&b) == PAL_ERR_REFUSED);
-    CHECK(strstr(b.note.text, "gauss") != NULL);
+    CHECK(strstr(b.diag.text, "gauss") != NULL);
     hex_body_free(&b);
     begin(&b, 2, 2, 2, NULL, "hex8_bbar", "corotational");
     b.tets.n_tet--;

@@ -7,17 +7,17 @@ static const char *const laws[] = {"corotational", "linear", "neo_hookean"};
     for (int ten = 0; ten < 2; ten++)                                                                                  \
         for (int law = 0; law < 3; law++)
 
-static bool open_box(elastic_bench *b, int nx, int ny, int nz, double off, int ten, int law, bool untangle)
+static bool open_box(elastic_bench *b, int nx, int ny, int nz, double off, int ten, int law, bool recover)
 {
     pal_prepared box;
     elastic_seed = 7;
-    return !elastic_box(nx, ny, nz, 0.01, off, &box) && elastic_open(b, &box, ten, laws[law], untangle);
+    return !elastic_box(nx, ny, nz, 0.01, off, &box) && elastic_open(b, &box, ten, laws[law], recover);
 }
 
 /* E h^2 */
 static double scale_N(const elastic_bench *b)
 {
-    return b->scene->body[0].material.young_Pa * b->body.h_m * b->body.h_m;
+    return b->scene->body[0].material.young_Pa * b->body.edge_m * b->body.edge_m;
 }
 
 static void is_silent_at_rest(void)
@@ -28,7 +28,7 @@ static void is_silent_at_rest(void)
         REQUIRE(open_box(&b, 4, 3, 3, 0.2, ten, law, true));
         elastic_force(&b);
         CHECK_LE(elastic_most(b.body.f, 3 * b.n), 1e-13 * scale_N(&b));
-        CHECK_LE(fabs(elastic_energy(&b)), 1e-20 * scale_N(&b) * b.body.h_m);
+        CHECK_LE(fabs(elastic_energy(&b)), 1e-20 * scale_N(&b) * b.body.edge_m);
         elastic_close(&b);
     }
 }
@@ -69,7 +69,7 @@ static void force_is_the_gradient_of_the_energy(void)
         for (int i = 0; i < 3 * b.n; i += 7) {
             memset(p, 0, 3 * sizeof *p * (size_t)b.n);
             p[i] = 1;
-            CHECK_NEAR(-energy_slope(&b, p, 2e-4 * b.body.h_m), f[i], 1e-6 * most);
+            CHECK_NEAR(-energy_slope(&b, p, 2e-4 * b.body.edge_m), f[i], 1e-6 * most);
         }
         free(f);
         free(p);
@@ -114,16 +114,16 @@ static void multiply_is_the_assembled_matrix(void)
         elastic_shake(&b, 0.4);
         const pal_tangent *t = b.row.effect->tangent;
         pal_cliques cliques;
-        pal_blocks k;
+        pal_block_matrix k;
         REQUIRE(t->couple(b.row.self, &cliques));
-        REQUIRE(pal_blocks_make(b.n, &cliques, 1, b.arena, &k) == 0);
+        REQUIRE(pal_block_matrix_make(b.n, &cliques, 1, b.arena, &k) == 0);
         t->linearise(b.row.self, &b.body);
         t->assemble(b.row.self, &b.body, 2, 0, &k);
         size_t n = 3 * (size_t)b.n;
         double *p = malloc(n * sizeof *p), *one = calloc(n, sizeof *one), *two = calloc(n, sizeof *two), pkp = 0;
         for (size_t i = 0; i < n; i++) p[i] = uniform();
         t->multiply(b.row.self, &b.body, 2, 0, p, one);
-        pal_blocks_multiply(&k, 1, p, two);
+        pal_block_matrix_multiply(&k, 1, p, two);
         double most = elastic_most(two, (int)n);
         CHECK(most > 0);
         for (size_t i = 0; i < n; i++) {
@@ -175,7 +175,7 @@ static void tangent_is_the_slope_of_the_force(void)
         for (size_t i = 0; i < n; i++) p[i] = uniform();
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         multiply_rows(&b, p, one);
-        force_slope(&b, p, 1e-5 * b.body.h_m, two);
+        force_slope(&b, p, 1e-5 * b.body.edge_m, two);
         double most = elastic_most(two, (int)n);
         CHECK(most > 0);
         for (size_t i = 0; i < n; i++) CHECK_NEAR(one[i], two[i], 1e-6 * most);
@@ -226,7 +226,7 @@ static void corotational_tangent_is_the_turned_one(void)
 static bool inside(const elastic_bench *b, int i, const int n[3])
 {
     for (int c = 0; c < 3; c++) {
-        double g = b->body.x_rest[3 * i + c] / b->body.h_m;
+        double g = b->body.x_rest[3 * i + c] / b->body.edge_m;
         if (!(g > 1e-6 && g < n[c] - 1e-6)) return false;
     }
     return true;
@@ -306,14 +306,14 @@ static void uniaxial_strain_has_the_moduli(void)
         const double f[9] = {1 + e, 0, 0, 0, 1 - nu * e, 0, 0, 0, 1 - nu * e};
         elastic_place(&b, f, 0);
         elastic_force(&b);
-        double pull = 0, side = 0, area = 4 * b.body.h_m * b.body.h_m;
+        double pull = 0, side = 0, area = 4 * b.body.edge_m * b.body.edge_m;
         for (int i = 0; i < b.n; i++) {
-            if (b.body.x_rest[3 * i] > 3.999 * b.body.h_m) pull -= b.body.f[3 * i];
+            if (b.body.x_rest[3 * i] > 3.999 * b.body.edge_m) pull -= b.body.f[3 * i];
             side = fmax(side, fmax(fabs(b.body.f[3 * i + 1]), fabs(b.body.f[3 * i + 2])));
         }
         CHECK_NEAR(pull / (young * e * area), 1, 1e-6);
         CHECK_LE(side, 1e-6 * young * e * area);
-        CHECK_NEAR(elastic_energy(&b) / (0.5 * young * e * e * area * 4 * b.body.h_m), 1, 1e-6);
+        CHECK_NEAR(elastic_energy(&b) / (0.5 * young * e * e * area * 4 * b.body.edge_m), 1, 1e-6);
         for (int field = PAL_FIELD_VON_MISES_PA; field <= PAL_FIELD_ENERGY_J_M3; field++) {
             double *sum = calloc(2 * (size_t)b.n, sizeof *sum), volume = 0;
             b.row.effect->measure(b.row.self, &b.body, (pal_field)field, sum, sum + b.n);
@@ -463,7 +463,7 @@ static void an_inverted_tetrahedron_takes_its_neighbours_rotation(void)
         for (int i = 0; i < 3 * b.n; i++) b.body.x[i] += b.body.f[i] / bound[i / 3];
     }
     CHECK_INT(b.tets->n_inverted, 0);
-    CHECK_LE(elastic_energy(&b), 1e-8 * scale_N(&b) * b.body.h_m);
+    CHECK_LE(elastic_energy(&b), 1e-8 * scale_N(&b) * b.body.edge_m);
     free(bound);
     elastic_close(&b);
     elastic_close(&plain);
@@ -487,7 +487,7 @@ static void shuffled_bodies_untangle(void)
                 elastic_force(&b);
                 for (int i = 0; i < 3 * b.n; i++) b.body.x[i] += b.body.f[i] / bound[i / 3];
             }
-            n_whole += b.tets->n_inverted == 0 && elastic_energy(&b) < 1e-6 * scale_N(&b) * b.body.h_m;
+            n_whole += b.tets->n_inverted == 0 && elastic_energy(&b) < 1e-6 * scale_N(&b) * b.body.edge_m;
             free(bound);
             elastic_close(&b);
         }
@@ -575,16 +575,16 @@ static void refuses_what_it_cannot_make(void)
     elastic_bench b;
     REQUIRE(box_make(1, 1, 1, 0.01, &box) == 0);
     REQUIRE(elastic_open(&b, &box, false, "linear", true));
-    pal_build build = {.scene = b.scene, .def = b.scene->body, .body = &b.body, .arena = b.arena, .note = &b.note};
-    pal_item item;
+    pal_build build = {.scene = b.scene, .def = b.scene->body, .body = &b.body, .arena = b.arena, .diag = &b.diag};
+    pal_config_entry item;
     void *self;
     static const char *const bad[][2] = {
         {"element", "tet10"}, {"element", "hex8"}, {"law", "rubber"}, {"lore", "linear"}};
     for (int k = 0; k < 4; k++) {
-        pal_item_init(&item, "model", "tet_elastic");
-        pal_item_put_text(&item, bad[k][0], bad[k][1], NULL);
+        pal_entry_init(&item, "model", "tet_elastic");
+        pal_entry_put_text(&item, bad[k][0], bad[k][1], NULL);
         CHECK_INT(pal_effect_tet_elastic.make(&item, &build, &self), PAL_ERR_REFUSED);
-        CHECK(strstr(b.note.text, "model"));
+        CHECK(strstr(b.diag.text, "model"));
     }
     elastic_close(&b);
 }

@@ -1,5 +1,5 @@
 /* A body that adapts in the world: steps without the heap, tools on the surface as it is now, frames, reset, guard. */
-#include "tests/fixtures/shells.h"
+#include "tests/fixtures/adaptive_worlds.h"
 #include "tests/heap_calls.h"
 
 #include <stdint.h>
@@ -26,7 +26,7 @@ static bool stomach_make(shell_scene *s, int levels)
     shell_scene_number(s, "levels", levels);
     s->scene->body[0].material.damping_1_s = 4;
     shell_scene_effect(s, "tool_push");
-    shell_scene_effect(s, "tool_grab");
+    shell_scene_effect(s, "tool_grasp");
     shell_scene_effect(s, "finite_guard");
     pal_tools_default(s->scene, 1);
     s->scene->tool[0].radius_m = tool_radius_m;
@@ -42,9 +42,9 @@ static int front(const shell_scene *s)
     return best;
 }
 
-static void pose(shell_scene *s, const double at[3], bool grab)
+static void pose(shell_scene *s, const double at[3], bool grasp)
 {
-    pal_pose p = {.quat = {1, 0, 0, 0}, .buttons = grab};
+    pal_pose p = {.quat = {1, 0, 0, 0}, .buttons = grasp};
     pal_copy3(p.position_m, at);
     CHECK_INT(pal_world_pose(s->world, 0, &p), 0);
 }
@@ -72,7 +72,7 @@ static void steps_without_the_heap_while_levels_switch(void)
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
     pal_frame *frame = pal_frame_create(s.world);
     REQUIRE(frame);
-    int most = 0, n_switch = 0, n_all = frame->part[0].n_all, least = s.body->n_active;
+    int most = 0, n_switch = 0, n_finest = frame->part[0].n_finest, least = s.body->n_active;
     for (int i = 0; i < 6 * STEP_HZ; i++) {
         uint64_t revision = s.body->revision;
         press_front(&s, top, i, 0.02);
@@ -84,9 +84,9 @@ static void steps_without_the_heap_while_levels_switch(void)
         n_switch += s.body->revision != revision;
         if (s.body->n_active > most) most = s.body->n_active;
     }
-    printf("  %d to %d of %d nodes, %d switches\n", least, most, n_all, n_switch);
+    printf("  %d to %d of %d nodes, %d switches\n", least, most, n_finest, n_switch);
     CHECK_INT(n_heap_call, 0);
-    CHECK(most > least + 40 && most < n_all / 2);
+    CHECK(most > least + 40 && most < n_finest / 2);
     CHECK(n_switch > 10);
     /* the tool is gone for 4 s: coarse again, at rest, and what is out of use is where it is at rest */
     CHECK_INT(s.body->n_active, least);
@@ -130,9 +130,9 @@ static void a_lasting_load_needs_a_node_in_use(void)
     int coarse = s.mesh.surface.n_vertex;
     CHECK_INT(pal_world_load(s.world, 0, coarse - 1, force), 0);
     CHECK_INT(pal_world_load(s.world, 0, coarse, force), PAL_ERR_REFUSED);
-    REQUIRE(pal_shell_split(s.body->shell, s.body, 0, 0) > 0);
-    pal_shell_update(s.body->shell, s.body);
-    int node = pal_levels_edge_midpoint(&s.body->shell->levels, s.body->shell->levels.face_edge[0]);
+    REQUIRE(pal_adaptive_split(s.body->adaptive, s.body, 0, 0) > 0);
+    pal_adaptive_update(s.body->adaptive, s.body);
+    int node = pal_levels_edge_midpoint(&s.body->adaptive->levels, s.body->adaptive->levels.face_edge[0]);
     CHECK_INT(pal_world_load(s.world, 0, node, force), 0);
     shell_scene_close(&s);
 }
@@ -140,17 +140,17 @@ static void a_lasting_load_needs_a_node_in_use(void)
 /* random splits and joins, several at once; false: nothing came of it */
 static bool change(shell_scene *s, unsigned *seed, int n)
 {
-    pal_shell *shell = s->body->shell;
+    pal_adaptive_surface *adaptive = s->body->adaptive;
     for (int i = 0; i < n; i++) {
         *seed = *seed * 1664525u + 1013904223u;
-        int32_t face = shell->leaf[(int)(*seed >> 8) % shell->n_leaf],
-                parent = pal_levels_face_parent(&shell->levels, face);
+        int32_t face = adaptive->leaf[(int)(*seed >> 8) % adaptive->n_leaf],
+                parent = pal_levels_face_parent(&adaptive->levels, face);
         if (*seed & 128)
-            (void)pal_shell_split(shell, s->body, face, 0);
+            (void)pal_adaptive_split(adaptive, s->body, face, 0);
         else if (parent >= 0)
-            (void)pal_shell_join(shell, s->body, parent);
+            (void)pal_adaptive_join(adaptive, s->body, parent);
     }
-    return pal_shell_update(shell, s->body);
+    return pal_adaptive_update(adaptive, s->body);
 }
 
 /* a world in which body 0 is another goes on where body 1, split, bent, loaded and with a count of rescues, is */
@@ -170,20 +170,20 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     pal_body *first = s.body, *body = s.body = pal_world_body(s.world, 1);
     unsigned seed = 3;
     for (int i = 0; i < 20; i++) change(&s, &seed, 20);
-    REQUIRE(body->shell->finest == 2);
+    REQUIRE(body->adaptive->finest == 2);
     CHECK_INT(pal_world_load(s.world, 1, front(&s), (double[3]){0, 0, -0.02}), 0);
     for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1e-3), 0);
-    body->rescue.n_capped = 7, first->rescue.n_heavy = 5;
-    REQUIRE(!pal_world_create(s.scene, &s.note, &next));
-    for (int round = 0; round < 2; round++) pal_world_follow(next, s.world, 0, first->x, first->v);
+    body->safeguards.n_capped = 7, first->safeguards.n_mass_scaled = 5;
+    REQUIRE(!pal_world_create(s.scene, &s.diag, &next));
+    for (int round = 0; round < 2; round++) pal_world_transfer(next, s.world, 0, first->x, first->v);
     pal_body *to = pal_world_body(next, 1);
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
-    CHECK_INT(to->shell->n_leaf, body->shell->n_leaf);
-    CHECK(!memcmp(to->shell->face_state, body->shell->face_state, (size_t)body->shell->levels.first_face[3]));
+    CHECK_INT(to->adaptive->n_leaf, body->adaptive->n_leaf);
+    CHECK(!memcmp(to->adaptive->face_state, body->adaptive->face_state, (size_t)body->adaptive->levels.first_face[3]));
     CHECK(!memcmp(to->x, body->x, n_byte) && !memcmp(to->v, body->v, n_byte));
-    CHECK(to->outer && !memcmp(to->outer, body->outer, n_byte));
-    CHECK_INT(to->rescue.n_capped, 7);
-    CHECK_INT(pal_world_body(next, 0)->rescue.n_heavy, 5);
+    CHECK(to->external_force && !memcmp(to->external_force, body->external_force, n_byte));
+    CHECK_INT(to->safeguards.n_capped, 7);
+    CHECK_INT(pal_world_body(next, 0)->safeguards.n_mass_scaled, 5);
     CHECK(pal_world_hash(next) == pal_world_hash(s.world));
     CHECK(pal_body_kinetic_J(body) > 0);
     CHECK_NEAR(pal_body_kinetic_J(to) / pal_body_kinetic_J(body), 1, 1e-12);
@@ -201,28 +201,28 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     shell_scene_close(&s);
 }
 
-static bool same_table(const pal_frame *frame, const pal_shell *shell)
+static bool same_table(const pal_frame *frame, const pal_adaptive_surface *adaptive)
 {
-    return !memcmp(frame->part[0].slot, shell->slot, 3 * sizeof *shell->slot * (size_t)shell->n_slot);
+    return !memcmp(frame->part[0].slot, adaptive->slot, 3 * sizeof *adaptive->slot * (size_t)adaptive->n_slot);
 }
 
 static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
 {
     shell_scene s;
     REQUIRE(stomach_make(&s, 4));
-    pal_shell *shell = s.body->shell;
+    pal_adaptive_surface *adaptive = s.body->adaptive;
     pal_frame *each = pal_frame_create(s.world), *some = pal_frame_create(s.world);
     REQUIRE(each && some);
     pal_shown shown;
     pal_world_shown(s.world, 0, &shown);
     CHECK(shown.adapts);
-    CHECK_INT(shown.n_tri, shell->n_slot);
-    CHECK_INT(each->part[0].n_slot, shell->n_slot);
+    CHECK_INT(shown.n_tri, adaptive->n_slot);
+    CHECK_INT(each->part[0].n_slot, adaptive->n_slot);
     CHECK_INT(shown.n_vertex, s.body->n_node);
-    CHECK_INT(each->part[0].n_all, s.body->n_node);
+    CHECK_INT(each->part[0].n_finest, s.body->n_node);
     CHECK_INT(shown.n_coarse_tri, s.mesh.surface.n_tri);
     CHECK(!memcmp(shown.coarse_tri, s.mesh.surface.tri, 3 * sizeof(int32_t) * (size_t)s.mesh.surface.n_tri));
-    CHECK(!memcmp(shown.tri, shell->slot, 3 * sizeof(int32_t) * (size_t)shell->n_slot));
+    CHECK(!memcmp(shown.tri, adaptive->slot, 3 * sizeof(int32_t) * (size_t)adaptive->n_slot));
     for (int i = shown.n_coarse; i < shown.n_vertex; i++) {
         const int32_t *end = shown.parent + 2 * (i - shown.n_coarse);
         CHECK(end[0] != end[1] && end[0] >= 0 && end[1] >= 0 && end[0] < i && end[1] < i);
@@ -230,18 +230,18 @@ static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
     unsigned seed = 4;
     int n_change = 0, n_long = 0;
     for (int i = 0; i < 300; i++) {
-        uint64_t before = shell->n_log;
+        uint64_t before = adaptive->n_log;
         n_change += change(&s, &seed, i % 10 ? 3 : 3000);
-        n_long += shell->n_log - before > (uint64_t)shell->n_log_room;
+        n_long += adaptive->n_log - before > (uint64_t)adaptive->n_log_room;
         CHECK_INT(pal_world_step(s.world, 1e-4), 0);
         pal_world_frame(s.world, each);
-        CHECK(same_table(each, shell));
-        CHECK_INT(each->part[0].n_active, shell->n_node);
-        CHECK_INT(each->part[0].n_spring, shell->n_spring);
+        CHECK(same_table(each, adaptive));
+        CHECK_INT(each->part[0].n_active, adaptive->n_node);
+        CHECK_INT(each->part[0].n_spring, adaptive->n_spring);
         CHECK(each->part[0].revision == s.body->revision);
         if (i % 7) continue;
         pal_world_frame(s.world, some);
-        CHECK(same_table(some, shell));
+        CHECK(same_table(some, adaptive));
         for (int k = 0; k < s.body->n_active; k++)
             for (int c = 0; c < 3; c++) {
                 int j = 3 * s.body->active[k] + c;
@@ -276,7 +276,7 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
     double top[3], p[3], was = 0, most = 0, rise = 0, fall = 0, deepest = 0, low = INFINITY, high = 0;
-    int n_switch = 0, most_node = 0;
+    int n_switch = 0, max_node = 0;
     bool switched = false;
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
     for (int i = 0; i < 3 * PER_S; i++) {
@@ -296,14 +296,14 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
         was = force;
         most = fmax(most, force);
         deepest = fmax(deepest, depth_m(&s, p));
-        if (s.body->n_active > most_node) most_node = s.body->n_active;
+        if (s.body->n_active > max_node) max_node = s.body->n_active;
         if (i >= 2.5 * PER_S) low = fmin(low, force), high = fmax(high, force);
     }
     printf(
         "  %d nodes, %d switches; %.3g N at most, %.2g up and %.2g down at a switch; %.2g mm deep; %.4g to %.4g N in "
         "the end\n",
-        most_node, n_switch, most, rise, fall, 1e3 * deepest, low, high);
-    CHECK(n_switch > 10 && most_node > s.mesh.surface.n_vertex + 40);
+        max_node, n_switch, most, rise, fall, 1e3 * deepest, low, high);
+    CHECK(n_switch > 10 && max_node > s.mesh.surface.n_vertex + 40);
     CHECK(most > 0.01);
     CHECK_LE(rise, 0.05 * most);
     CHECK_LE(fall, 0.05 * most);
@@ -376,11 +376,11 @@ static void a_grip_on_a_fine_node_goes_on_when_that_is_gone(void)
 {
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
-    pal_shell *shell = s.body->shell;
-    int32_t face = 0, edge = shell->levels.face_edge[0];
-    int node = pal_levels_edge_midpoint(&shell->levels, edge);
-    REQUIRE(pal_shell_split(shell, s.body, face, 0) > 0);
-    pal_shell_update(shell, s.body);
+    pal_adaptive_surface *adaptive = s.body->adaptive;
+    int32_t face = 0, edge = adaptive->levels.face_edge[0];
+    int node = pal_levels_edge_midpoint(&adaptive->levels, edge);
+    REQUIRE(pal_adaptive_split(adaptive, s.body, face, 0) > 0);
+    pal_adaptive_update(adaptive, s.body);
     double p[3], f[2] = {0};
     pal_copy3(p, s.body->x + 3 * node);
     for (int i = 0; i < 200; i++) {
@@ -415,7 +415,7 @@ static void a_body_that_diverges_stops_at_its_last_good_state(void)
     CHECK_NEAR(shell_scene_rms(&s), before, 0.2 * before);
     CHECK(pal_body_kinetic_J(s.body) == 0);
     for (int i = 0; i < s.body->n_node; i++)
-        if (!pal_shell_has(s.body->shell, i)) CHECK(!memcmp(s.body->x + 3 * i, s.body->x_rest + 3 * i, 24));
+        if (!pal_adaptive_has(s.body->adaptive, i)) CHECK(!memcmp(s.body->x + 3 * i, s.body->x_rest + 3 * i, 24));
     pal_world_reset(s.world);
     CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
     CHECK(!s.body->frozen);
@@ -428,7 +428,7 @@ static void displacement_in_colour_is_0_where_nothing_is_in_use(void)
     REQUIRE(stomach_make(&s, 3));
     double top[3];
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
-    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &s.note));
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &s.diag));
     for (int i = 0; i < 3 * STEP_HZ; i++) {
         press_front(&s, top, i, 0.02);
         CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
@@ -437,7 +437,7 @@ static void displacement_in_colour_is_0_where_nothing_is_in_use(void)
         for (int k = 0; k < s.body->n_node; k++) {
             most = fmax(most, (double)value[k]);
             /* taken 10 times a second: the newest set may be of the table before */
-            if (i % 6 == 5 && !pal_shell_has(s.body->shell, k)) CHECK(value[k] == 0);
+            if (i % 6 == 5 && !pal_adaptive_has(s.body->adaptive, k)) CHECK(value[k] == 0);
         }
         if (i == 2 * STEP_HZ - 1) CHECK(most > 0.01);
     }
@@ -456,9 +456,9 @@ static void a_step_too_long_for_the_finest_level_is_refused_at_load(void)
         REQUIRE(!pal_sphere_make(0.1, &ball));
         shell_scene_take(&s, &ball);
         shell_scene_number(&s, "levels", levels);
-        s.scene->most_substep = 12;
-        pal_err err = pal_world_create(s.scene, &s.note, &s.world);
-        printf("  %d levels: %s\n", levels, err ? s.note.text : "taken");
+        s.scene->max_substep = 12;
+        pal_err err = pal_world_create(s.scene, &s.diag, &s.world);
+        printf("  %d levels: %s\n", levels, err ? s.diag.text : "taken");
         CHECK(levels > 2 || !err);
         CHECK(levels < 5 || err == PAL_ERR_BUDGET);
         if (err) s.world = NULL;

@@ -1,12 +1,12 @@
 /* Model adaptive_springs: what it derives, its rows, live edits, and what it refuses. */
-#include "tests/fixtures/shell_plan.h"
+#include "tests/fixtures/adaptive_plan.h"
 
 static const char *row_names(const pal_world *world, char text[256])
 {
     text[0] = 0;
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         snprintf(text + strlen(text), 256 - strlen(text), "%s%s", i ? " " : "", info.name);
     }
     return text;
@@ -32,7 +32,7 @@ static void rows_are_those_that_the_keys_ask_for(void)
 
     open_stomach(&s);
     shell_scene_number(&s, "k_shape_N_m", 0);
-    pal_item_put_bool(shell_scene_model(&s), "refine", false, NULL);
+    pal_entry_put_bool(shell_scene_model(&s), "refine", false, NULL);
     REQUIRE(shell_scene_start(&s));
     CHECK_TEXT(row_names(s.world, text), "edge_spring rk4 surface_out");
     shell_scene_close(&s);
@@ -46,7 +46,7 @@ static void rows_are_those_that_the_keys_ask_for(void)
     /* the default output needs a skin, which a surface has not */
     open_stomach(&s);
     shell_scene_number(&s, "levels", 1);
-    pal_item_init(&s.scene->body[0].output, "output", "skin_out");
+    pal_entry_init(&s.scene->body[0].output, "output", "skin_output");
     REQUIRE(shell_scene_start(&s));
     CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring rk4 surface_out");
     shell_scene_close(&s);
@@ -65,7 +65,7 @@ static void constants_follow_from_material_and_thickness(void)
     CHECK_NEAR(mass / (1100 * 0.004 * area), 1, 1e-12);
     double k = sqrt(3) / 2 * 8000 * 0.004, m = mass / 188, bound[2] = {0}, want[2] = {0};
     double *sum = calloc(2 * (size_t)p.body->n_node, sizeof *sum), *damp = sum + p.body->n_node;
-    const pal_row *row[2] = {shell_plan_row(&p, "edge_spring"), shell_plan_row(&p, "shape_spring")};
+    const pal_component *row[2] = {shell_plan_row(&p, "edge_spring"), shell_plan_row(&p, "shape_spring")};
     row[0]->effect->stiffness(row[0]->self, p.body, sum);
     row[0]->effect->damping(row[0]->self, p.body, damp);
     for (int i = 0; i < p.body->n_node; i++) bound[0] += sum[i], bound[1] += damp[i];
@@ -101,10 +101,10 @@ static void entry_of_that_name_takes_the_place_of_the_models_row(void)
     shell_plan p;
     shell_plan_sphere(&p);
     shell_scene_number(&p.s, "thickness_m", 0.006);
-    pal_item *entry = shell_scene_effect(&p.s, "edge_spring");
-    pal_item_put_number(entry, "c_Ns_m", 0, NULL);
+    pal_config_entry *entry = shell_scene_effect(&p.s, "edge_spring");
+    pal_entry_put_number(entry, "c_Ns_m", 0, NULL);
     REQUIRE(shell_plan_open(&p));
-    const pal_row *row = shell_plan_row(&p, "edge_spring");
+    const pal_component *row = shell_plan_row(&p, "edge_spring");
     double *bound = calloc(2 * (size_t)p.body->n_node, sizeof *bound), k = 0, c = 0;
     row->effect->stiffness(row->self, p.body, bound);
     row->effect->damping(row->self, p.body, bound + p.body->n_node);
@@ -121,7 +121,7 @@ static void thousandfold_stiffness_is_borne(void)
 {
     shell_scene s;
     open_stomach(&s);
-    pal_item_put_bool(shell_scene_model(&s), "refine", false, NULL);
+    pal_entry_put_bool(shell_scene_model(&s), "refine", false, NULL);
     shell_scene_text(&s, "frame", "world");
     REQUIRE(shell_scene_start(&s));
     const double force[3] = {0, 0, -0.3};
@@ -131,15 +131,15 @@ static void thousandfold_stiffness_is_borne(void)
     double limit = pal_world_limit_s(s.world);
     pal_material to = s.scene->body[0].material;
     to.young_Pa *= 1000;
-    CHECK_INT(pal_world_material(s.world, 0, &to, &s.note), 0);
+    CHECK_INT(pal_world_material(s.world, 0, &to, &s.diag), 0);
     CHECK_NEAR(limit / pal_world_limit_s(s.world) / sqrt(1000), 1, 1e-3);
     for (int i = 0; i < CHECK_REPEATS(20, 5); i++) {
         CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
         CHECK(pal_body_finite(s.body));
-        CHECK_INT(s.body->rescue.n_clamped, 0);
+        CHECK_INT(s.body->safeguards.n_clamped, 0);
     }
     CHECK(pal_world_substeps(s.world) > 15 * before);
-    CHECK_LE(shell_scene_rms(&s), 0.05 * s.body->size_m);
+    CHECK_LE(shell_scene_rms(&s), 0.05 * s.body->length_scale_m);
     shell_scene_close(&s);
 }
 
@@ -148,10 +148,10 @@ static void density_edits_reach_the_damping(void)
 {
     shell_scene s;
     open_stomach(&s);
-    pal_item_put_bool(shell_scene_model(&s), "refine", false, NULL);
+    pal_entry_put_bool(shell_scene_model(&s), "refine", false, NULL);
     REQUIRE(shell_scene_start(&s));
     double bound[2] = {0}, *sum = calloc((size_t)s.body->n_node, sizeof *sum);
-    const pal_row *row = pal_world_effect(s.world, 0);
+    const pal_component *row = pal_world_component(s.world, 0);
     CHECK_TEXT(row->effect->name, "edge_spring");
     for (int way = 0; way < 2; way++) {
         memset(sum, 0, sizeof *sum * (size_t)s.body->n_node);
@@ -159,7 +159,7 @@ static void density_edits_reach_the_damping(void)
         for (int i = 0; i < s.body->n_node; i++) bound[way] += sum[i];
         pal_material to = s.scene->body[0].material;
         to.density_kg_m3 *= 4;
-        CHECK_INT(pal_world_material(s.world, 0, &to, &s.note), 0);
+        CHECK_INT(pal_world_material(s.world, 0, &to, &s.diag), 0);
     }
     CHECK_NEAR(bound[1] / bound[0], 2, 1e-12);
     free(sum);
@@ -192,8 +192,8 @@ static void check_refused(const char *key, double number, const char *text, cons
     else
         shell_scene_number(&p.s, key, number);
     p.arena = pal_arena_create(1 << 20, true);
-    CHECK(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan) == PAL_ERR_REFUSED);
-    CHECK_TEXT(p.s.note.text, want);
+    CHECK(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan) == PAL_ERR_REFUSED);
+    CHECK_TEXT(p.s.diag.text, want);
     shell_plan_close(&p);
 }
 
@@ -230,17 +230,17 @@ static void surfaces_that_cannot_be_split_are_refused_with_another_way(void)
     memset(&p, 0, sizeof p);
     shell_scene_take(&p.s, &surface);
     p.arena = pal_arena_create(1 << 20, true);
-    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan), PAL_ERR_REFUSED);
-    CHECK(!strncmp(p.s.note.text, "body \"shell\" model: ", 20));
-    CHECK(strstr(p.s.note.text, "edge") &&
-          strstr(p.s.note.text, "(model tet_springs takes any surface: it fills voxels)"));
+    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan), PAL_ERR_REFUSED);
+    CHECK(!strncmp(p.s.diag.text, "body \"shell\" model: ", 20));
+    CHECK(strstr(p.s.diag.text, "edge") &&
+          strstr(p.s.diag.text, "(model tet_springs takes any surface: it fills voxels)"));
     /* triangles that are none, and no triangles */
     p.s.mesh.surface.tri[5] = 6;
-    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan), PAL_ERR_REFUSED);
-    CHECK_TEXT(p.s.note.text, "body \"shell\" model: triangle 1 has corner 6 of 6 vertices");
+    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan), PAL_ERR_REFUSED);
+    CHECK_TEXT(p.s.diag.text, "body \"shell\" model: triangle 1 has corner 6 of 6 vertices");
     p.s.mesh.surface.n_tri = 0;
-    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan), PAL_ERR_REFUSED);
-    CHECK_TEXT(p.s.note.text,
+    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan), PAL_ERR_REFUSED);
+    CHECK_TEXT(p.s.diag.text,
                "body \"shell\" model: a mesh with 0 surface triangles; \"adaptive_springs\" is made of them");
     shell_plan_close(&p);
 
@@ -249,9 +249,9 @@ static void surfaces_that_cannot_be_split_are_refused_with_another_way(void)
     shell_scene_number(&p.s, "levels", 8);
     shell_scene_number(&p.s, "memory_MB", 1);
     p.arena = pal_arena_create(1 << 20, true);
-    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan), PAL_ERR_BUDGET);
-    CHECK(!strncmp(p.s.note.text, "body \"shell\" model: ", 20));
-    CHECK(!strstr(p.s.note.text, "tet_springs"));
+    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan), PAL_ERR_BUDGET);
+    CHECK(!strncmp(p.s.diag.text, "body \"shell\" model: ", 20));
+    CHECK(!strstr(p.s.diag.text, "tet_springs"));
     shell_plan_close(&p);
 }
 
@@ -265,11 +265,11 @@ static pal_err make_within(shell_scene *s, int levels, bool tools, double memory
     shell_scene_number(s, "memory_MB", memory_MB);
     if (tools) {
         shell_scene_effect(s, "tool_push");
-        shell_scene_effect(s, "tool_grab");
+        shell_scene_effect(s, "tool_grasp");
         shell_scene_effect(s, "finite_guard");
         pal_tools_default(s->scene, 4);
     }
-    return pal_world_create(s->scene, &s->note, &s->world);
+    return pal_world_create(s->scene, &s->diag, &s->world);
 }
 
 /* memory_MB is of the whole body as it runs: what the world tells of itself, lasting loads among it, keeps to it */
@@ -292,11 +292,11 @@ static void memory_of_the_world_keeps_to_its_bound(void)
             /* a hundredth less than it takes is refused, with what it takes and what it may */
             CHECK_INT(make_within(&s, levels, tools, 0.99 * whole), PAL_ERR_BUDGET);
             double needs = 0, may = 0;
-            const char *text = strstr(s.note.text, "what is shown ");
+            const char *text = strstr(s.diag.text, "what is shown ");
             CHECK(text && sscanf(text, "what is shown %lf MiB, the budget is %lf MiB", &needs, &may) == 2);
             CHECK_NEAR(needs, whole + 0.0625, 0.0625 + 1e-3 * whole);
             CHECK_NEAR(may, 0.99 * whole, 1e-3 * whole);
-            CHECK(!strncmp(s.note.text, "body \"shell\" model: ", 20) && !s.world);
+            CHECK(!strncmp(s.diag.text, "body \"shell\" model: ", 20) && !s.world);
             printf("  %d nodes: %.0f bytes each\n", n_node, whole * MiB / n_node);
             shell_scene_close(&s);
         }

@@ -1,6 +1,6 @@
 /* Solver central_cg: against the textbook's scheme, order, limit, what it conserves, and what goes wrong. */
 #include "tests/check.h"
-#include "tests/fixtures/solid_bodies.h"
+#include "tests/fixtures/subdivision_bodies.h"
 
 #include "server/num/envelope.h"
 
@@ -14,11 +14,11 @@ static bool open_kind(solid_world *w, int kind, bool linear)
 
 static void add_drag(solid_world *w, double rate_1_s)
 {
-    pal_item item;
+    pal_config_entry item;
     pal_build build = {.scene = &w->t.scene, .def = &w->t.def, .body = &w->t.body, .arena = w->t.arena};
-    pal_item_init(&item, "drag", "viscous");
+    pal_entry_init(&item, "drag", "viscous");
     w->t.def.material.damping_1_s = rate_1_s;
-    pal_row *row = &w->force[w->n_force++];
+    pal_component *row = &w->force[w->n_force++];
     row->effect = &pal_effect_viscous;
     if (row->effect->make(&item, &build, &row->self)) abort();
 }
@@ -106,7 +106,7 @@ static void it_is_the_textbooks_central_difference(void)
         REQUIRE(open_kind(&w, PLAIN, false));
         if (damping > 0) add_drag(&w, 5);
         for (int i = 0; i < 64 && damping > 1; i++) w.t.solid->samples[PAL_CELL_HEX].damping_1_s[i] = (float)i;
-        pal_solid_mass_fill(w.t.solid, &w.t.mass);
+        pal_subdivision_mass_fill(w.t.solid, &w.t.mass);
         REQUIRE(!solid_solver(&w, 0, 1e-14, NULL));
         solid_shake(&w, 0.1);
         for (int i = 0; i < 24; i++) w.t.body.v[i] = 0.2 * solid_uniform(&w.t);
@@ -118,7 +118,7 @@ static void it_is_the_textbooks_central_difference(void)
             textbook_step(&b, &w);
             for (int k = 0; k < 24; k++) far = fmax(far, fabs(w.t.body.x[k] - b.p[k]));
         }
-        CHECK_LE(far, 1e-12 * w.t.body.size_m);
+        CHECK_LE(far, 1e-12 * w.t.body.length_scale_m);
         double moved = 0;
         for (int k = 0; k < 24; k++) moved = fmax(moved, fabs(b.p[k] - w.t.body.x_rest[k]));
         CHECK_LE(1e-3, moved);
@@ -187,17 +187,17 @@ static double fastest(solid_world *w, int n_round)
     double *x = malloc(sizeof *x * (size_t)n), *v = calloc((size_t)n, sizeof *v), *u = calloc((size_t)n, sizeof *u),
            *g = malloc(sizeof *g * (size_t)n), omega2 = 0;
     if (pal_envelope_make(m->n_point, m->start, m->point, 1 << 20, w->t.arena, &e)) abort();
-    if (pal_envelope_factor(&e, m->start, m->point, m->mass_kg, b->held)) abort();
+    if (pal_envelope_factor(&e, m->start, m->point, m->mass_kg, b->fixed)) abort();
     memcpy(x, b->x, sizeof *x * (size_t)n);
     solid_forces(w);
     memcpy(g, b->g, sizeof *g * (size_t)n);
-    for (int i = 0; i < n; i++) v[i] = b->held[i / 3] ? 0 : solid_uniform(&w->t);
+    for (int i = 0; i < n; i++) v[i] = b->fixed[i / 3] ? 0 : solid_uniform(&w->t);
     for (int round = 0; round < n_round; round++) {
         double most = 0, along = 0, norm2 = 0;
         for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-        for (int i = 0; i < n; i++) v[i] /= most, b->x[i] = x[i] + b->h_m * v[i];
+        for (int i = 0; i < n; i++) v[i] /= most, b->x[i] = x[i] + b->edge_m * v[i];
         solid_forces(w);
-        for (int i = 0; i < n; i++) u[i] = b->held[i / 3] ? 0 : (g[i] - b->g[i]) / b->h_m;
+        for (int i = 0; i < n; i++) u[i] = b->fixed[i / 3] ? 0 : (g[i] - b->g[i]) / b->edge_m;
         for (int i = 0; i < n; i++) along += u[i] * v[i];
         pal_mass_operator_multiply(m, v, b->g);
         for (int i = 0; i < n; i++) norm2 += v[i] * b->g[i];
@@ -212,10 +212,10 @@ static double fastest(solid_world *w, int n_round)
 static void limit_is_the_true_one_within_two_percent(void)
 {
     for (int kind = 0; kind < 3; kind++)
-        for (int held = 0; held < 2; held++) {
+        for (int fixed = 0; fixed < 2; fixed++) {
             solid_world w;
             REQUIRE(open_kind(&w, kind, true));
-            for (int i = 0; i < 3 * held; i++) w.t.body.held[i] = 1;
+            for (int i = 0; i < 3 * fixed; i++) w.t.body.fixed[i] = 1;
             double want = 0.9 * 2 / fastest(&w, 500), limit = solid_limit(&w);
             CHECK_LE(limit, want * 1.002);
             CHECK_LE(0.97 * want, limit);
@@ -227,7 +227,7 @@ static double farthest(const solid_world *w)
 {
     double most = 0;
     for (int i = 0; i < 3 * w->t.body.n_dof; i++)
-        most = fmax(most, fabs(w->t.body.x[i] - w->t.body.x_rest[i]) / w->t.body.h_m);
+        most = fmax(most, fabs(w->t.body.x[i] - w->t.body.x_rest[i]) / w->t.body.edge_m);
     return most;
 }
 
@@ -237,7 +237,7 @@ static void just_below_the_true_limit_is_stable_and_just_above_is_not(void)
         for (int above = 0; above < 2; above++) {
             solid_world w;
             REQUIRE(open_kind(&w, kind, true));
-            w.t.body.held[0] = w.t.body.held[1] = w.t.body.held[2] = 1;
+            w.t.body.fixed[0] = w.t.body.fixed[1] = w.t.body.fixed[2] = 1;
             double dt = (above ? 1.05 : 0.99) * 2 / fastest(&w, 500);
             solid_shake(&w, 1e-6);
             solid_run(&w, above ? 200 : CHECK_REPEATS(10000, 1000), dt);
@@ -264,7 +264,7 @@ static void limit_holds_in_flight(void)
         solid_run(&w, 1, limit);
     }
     CHECK(pal_body_finite(&w.t.body));
-    CHECK_INT(w.t.body.rescue.n_clamped, 0);
+    CHECK_INT(w.t.body.safeguards.n_clamped, 0);
     CHECK_LE(farthest(&w), 40);
     CHECK_LE(0.5 * at_rest, least);
     CHECK_LE(most, 2 * at_rest);
@@ -298,16 +298,16 @@ static void limit_follows_mass_and_supports(void)
     const double before = solid_limit(&w);
     const pal_stroke stroke = {{0, 0, 0}, 1, 0, 1, 4};
     w.t.def.stroke = &stroke, w.t.def.n_stroke = 1;
-    pal_solid_sample(w.t.solid, &w.t.def);
-    pal_solid_mass_fill(w.t.solid, &w.t.mass);
+    pal_subdivision_solid_sample(w.t.solid, &w.t.def);
+    pal_subdivision_mass_fill(w.t.solid, &w.t.mass);
     CHECK_NEAR(solid_limit(&w) / before, 2, 1e-6);
     w.springs.k_N_m *= 4;
     CHECK_NEAR(solid_limit(&w) / before, 2, 1e-6);
     w.solve.effect->material(w.solve.self, &w.t.body, &w.t.def.material, NULL);
     CHECK_NEAR(solid_limit(&w) / before, 1, 1e-3);
-    memset(w.t.body.held, 1, (size_t)w.t.body.n_dof);
+    memset(w.t.body.fixed, 1, (size_t)w.t.body.n_dof);
     CHECK(isinf(solid_limit(&w)));
-    w.t.body.held[4] = 0;
+    w.t.body.fixed[4] = 0;
     CHECK_LE(before, solid_limit(&w));
     solid_world_close(&w);
 }
@@ -359,14 +359,14 @@ static void limit_counts_what_contact_says(void)
         pusher p = {way < 2 ? 6000 : 0, way < 2 ? 0 : 8};
         REQUIRE(open_kind(&w, SUBDIVIDED, true));
         const double alone = solid_limit(&w);
-        w.contact[w.n_contact++] = (pal_row){.effect = &pusher_effect[way], .self = &p};
+        w.contact[w.n_contact++] = (pal_component){.effect = &pusher_effect[way], .self = &p};
         const double limit = solid_limit(&w);
         CHECK_LE(limit, 0.6 * alone);
         solid_shake(&w, 1e-3);
         double before = farthest(&w);
         for (int i = 0; i < CHECK_REPEATS(1000, 300); i++) {
             pal_step step = solid_step(&w, limit);
-            pal_body_place(&w.t.body);
+            pal_body_update_nodes(&w.t.body);
             push(&p, &step);
             solid_run(&w, 1, limit);
         }

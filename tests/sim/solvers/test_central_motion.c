@@ -1,6 +1,6 @@
 /* Solver central_cg over many steps: what is conserved, rest, supports, drag, emergencies. */
 #include "tests/check.h"
-#include "tests/fixtures/solid_bodies.h"
+#include "tests/fixtures/subdivision_bodies.h"
 
 /* n x n x n cells of 0.1 m in all after n_level levels, springs between corners */
 static bool open_block(solid_world *w, int n, int n_level, bool linear)
@@ -11,11 +11,11 @@ static bool open_block(solid_world *w, int n, int n_level, bool linear)
 
 static void add_drag(solid_world *w, double rate_1_s)
 {
-    pal_item item;
+    pal_config_entry item;
     pal_build build = {.scene = &w->t.scene, .def = &w->t.def, .body = &w->t.body, .arena = w->t.arena};
-    pal_item_init(&item, "drag", "viscous");
+    pal_entry_init(&item, "drag", "viscous");
     w->t.def.material.damping_1_s = rate_1_s;
-    pal_row *row = &w->force[w->n_force++];
+    pal_component *row = &w->force[w->n_force++];
     row->effect = &pal_effect_viscous;
     if (row->effect->make(&item, &build, &row->self)) abort();
 }
@@ -38,7 +38,7 @@ static void undamped_energy_stays_over_many_steps(void)
 {
     solid_world w;
     REQUIRE(open_block(&w, 1, 0, true));
-    w.t.body.held[0] = w.t.body.held[1] = 1;
+    w.t.body.fixed[0] = w.t.body.fixed[1] = 1;
     const double dt = 0.5 * solid_limit(&w) / 0.9;
     solid_shake(&w, 0.1);
     const double before = kept_energy(&w, dt);
@@ -76,8 +76,8 @@ static void energy_of_a_bending_body_stays_within_a_percent(void)
     solid_world w;
     REQUIRE(open_block(&w, 2, 0, true));
     for (int i = 0; i < w.t.body.n_dof; i++) {
-        w.t.body.held[i] = w.t.body.x_rest[3 * i + 2] < -0.03;
-        w.t.body.x[3 * i] += w.t.body.held[i] ? 0 : 0.1 * (w.t.body.x_rest[3 * i + 2] + 0.05);
+        w.t.body.fixed[i] = w.t.body.x_rest[3 * i + 2] < -0.03;
+        w.t.body.x[3 * i] += w.t.body.fixed[i] ? 0 : 0.1 * (w.t.body.x_rest[3 * i + 2] + 0.05);
     }
     const double dt = 0.5 * solid_limit(&w) / 0.9;
     solid_run(&w, 1, dt);
@@ -124,7 +124,7 @@ static void a_free_body_keeps_its_momentum_and_angular_momentum(void)
         }
         find_momenta(&w, p[1], l[1]);
         pal_body_momentum(b, said);
-        double swing = 0.1 * 0.01 * pal_solid_mass_kg(w.t.solid);
+        double swing = 0.1 * 0.01 * pal_subdivision_solid_mass_kg(w.t.solid);
         for (int c = 0; c < 3; c++) {
             CHECK_NEAR(p[1][c] / p[0][0], p[0][c] / p[0][0], 1e-10);
             CHECK_NEAR(said[c] / p[0][0], p[1][c] / p[0][0], 1e-10);
@@ -140,7 +140,7 @@ static void rest_stays_rest_to_the_bit(void)
         solid_world w;
         REQUIRE(open_block(&w, 2, 2, false));
         if (drag) add_drag(&w, 4);
-        w.t.body.held[3] = drag ? 1 : 0;
+        w.t.body.fixed[3] = drag ? 1 : 0;
         double dt = solid_limit(&w);
         for (int i = 0; i < 50; i++) solid_run(&w, 1, dt * (1 + 0.5 * (i % 2)));
         CHECK(!memcmp(w.t.body.x, w.t.body.x_rest, 3 * sizeof(double) * (size_t)w.t.body.n_dof));
@@ -172,7 +172,7 @@ static void held_points_stand_and_led_ones_keep_their_velocity(void)
     solid_world w;
     REQUIRE(open_block(&w, 2, 1, false));
     pal_body *b = &w.t.body;
-    b->held[5] = 1, b->held[9] = 2;
+    b->fixed[5] = 1, b->fixed[9] = 2;
     for (int c = 0; c < 3; c++) b->v[15 + c] = 1, b->v[27 + c] = 0.01 * (c - 1);
     const double dt = 0.5 * solid_limit(&w);
     solid_run(&w, 50, dt);
@@ -194,7 +194,7 @@ static void led_points_pull_their_neighbours_by_the_mass_between_them(void)
     pal_body *b = &w.t.body;
     const pal_mass_operator *m = &w.t.mass;
     double want[8] = {0};
-    for (int i = 0; i < 4; i++) b->held[i] = 2, want[i] = 0.3;
+    for (int i = 0; i < 4; i++) b->fixed[i] = 2, want[i] = 0.3;
     solid_run(&w, 2, 1e-3);
     for (int i = 0; i < 4; i++) b->v[3 * i] = 0.3;
     solid_run(&w, 1, 1e-3);
@@ -214,7 +214,7 @@ static void all_points_held_is_fine(void)
 {
     solid_world w;
     REQUIRE(open_block(&w, 2, 1, false));
-    memset(w.t.body.held, 1, (size_t)w.t.body.n_dof);
+    memset(w.t.body.fixed, 1, (size_t)w.t.body.n_dof);
     CHECK(isinf(solid_limit(&w)));
     w.t.body.load[7] = 1e3;
     solid_run(&w, 10, 0.01);
@@ -253,7 +253,7 @@ static void huge_damping_that_varies_is_stable(void)
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int i = 0; i < 64 * w.t.solid->elements.n[kind]; i++)
             w.t.solid->samples[kind].damping_1_s[i] = i % 128 < 64 ? 1e7f : 0;
-    pal_solid_mass_fill(w.t.solid, &w.t.mass);
+    pal_subdivision_mass_fill(w.t.solid, &w.t.mass);
     REQUIRE(w.t.mass.damping_kg_s != NULL);
     solid_shake(&w, 0.2);
     const double dt = solid_limit(&w);
@@ -338,10 +338,11 @@ static void moves_are_clamped(void)
     b->v[31] = -1e9;
     solid_run(&w, 1, 1e-3);
     CHECK(pal_body_finite(b));
-    CHECK_LE(1, (double)b->rescue.n_clamped);
+    CHECK_LE(1, (double)b->safeguards.n_clamped);
     for (int i = 0; i < b->n_dof; i++) {
         const double *x = b->x + 3 * i, *r = b->x_rest + 3 * i;
-        CHECK_LE(sqrt(pow(x[0] - r[0], 2) + pow(x[1] - r[1], 2) + pow(x[2] - r[2], 2)), 0.2 * b->size_m * (1 + 1e-12));
+        CHECK_LE(sqrt(pow(x[0] - r[0], 2) + pow(x[1] - r[1], 2) + pow(x[2] - r[2], 2)),
+                 0.2 * b->length_scale_m * (1 + 1e-12));
     }
     solid_world_close(&w);
 }
@@ -358,8 +359,9 @@ static void heavy_steps_stay_bounded(void)
         step.heavy = true;
         CHECK_INT(w.solve.effect->run(w.solve.self, &step), 0);
     }
-    CHECK_INT(w.t.body.rescue.n_clamped, 0);
-    for (int i = 0; i < 3 * w.t.body.n_dof; i++) CHECK_LE(fabs(w.t.body.x[i] - w.t.body.x_rest[i]), 3 * w.t.body.h_m);
+    CHECK_INT(w.t.body.safeguards.n_clamped, 0);
+    for (int i = 0; i < 3 * w.t.body.n_dof; i++)
+        CHECK_LE(fabs(w.t.body.x[i] - w.t.body.x_rest[i]), 3 * w.t.body.edge_m);
     solid_world_close(&w);
 }
 
@@ -382,18 +384,18 @@ static void a_body_without_a_solid_is_refused_in_a_sentence(void)
 {
     pal_scene scene;
     pal_body body = {.name = "liver"};
-    pal_item item;
-    pal_note note = {{0}};
+    pal_config_entry item;
+    pal_diagnostic diag = {{0}};
     void *self = NULL;
     pal_arena *arena = pal_arena_create(1 << 16, true);
     pal_scene_default(&scene);
-    pal_build build = {.scene = &scene, .def = &scene.body[0], .body = &body, .arena = arena, .note = &note};
-    pal_item_init(&item, "solver", "central_cg");
+    pal_build build = {.scene = &scene, .def = &scene.body[0], .body = &body, .arena = arena, .diag = &diag};
+    pal_entry_init(&item, "solver", "central_cg");
     CHECK_INT(pal_effect_central_cg.make(&item, &build, &self), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "solver: \"central_cg\" needs a body of model subdivision_fem");
-    (void)pal_item_put_text(&item, "preconditioner", "magic", NULL);
+    CHECK_TEXT(diag.text, "solver: \"central_cg\" needs a body of model subdivision_fem");
+    (void)pal_entry_put_text(&item, "preconditioner", "magic", NULL);
     CHECK_INT(pal_effect_central_cg.make(&item, &build, &self), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "solver.preconditioner: \"magic\", known are factor, diagonal");
+    CHECK_TEXT(diag.text, "solver.preconditioner: \"magic\", known are factor, diagonal");
     pal_arena_destroy(arena);
 }
 

@@ -3,7 +3,7 @@
 #include "tests/fixtures/fem_beam.h"
 #include "tests/heap_calls.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 
 static const char *const solvers[] = {"implicit_euler", "sdirk2"};
 static const char *const elements[] = {"hex8_bbar", "hex8", "tet4", "tet10"};
@@ -18,7 +18,8 @@ static double noise(unsigned *state)
 static double load_work(const pal_body *body)
 {
     double sum = 0;
-    for (int i = 0; i < 3 * body->n_node && body->outer; i++) sum += body->outer[i] * (body->x[i] - body->x_rest[i]);
+    for (int i = 0; i < 3 * body->n_node && body->external_force; i++)
+        sum += body->external_force[i] * (body->x[i] - body->x_rest[i]);
     return sum;
 }
 
@@ -33,10 +34,10 @@ static void a_free_body_keeps_its_momentum(void)
             beam_solver(&b, solvers[s % 2]);
             if (s >= 2) {
                 pal_tools_default(b.scene, 2);
-                pal_item_init(&b.def->effect[b.def->n_effect++], "effects[0]", "tool_push");
-                pal_item_init(&b.def->effect[b.def->n_effect++], "effects[1]", "tool_grab");
+                pal_entry_init(&b.def->effect[b.def->n_effect++], "effects[0]", "tool_push");
+                pal_entry_init(&b.def->effect[b.def->n_effect++], "effects[1]", "tool_grasp");
             }
-            REQUIRE(!beam_open(&b, &note));
+            REQUIRE(!beam_open(&b, &diag));
             pal_pose pose = {.quat = {1, 0, 0, 0}, .position_m = {-1, 0, 0}, .buttons = 1};
             for (int t = 0; t < 2 && s >= 2; t++) CHECK_INT(pal_world_pose(b.world, t, &pose), 0);
             unsigned seed = 1;
@@ -62,7 +63,7 @@ static void energy_never_rises_in_an_euler_step(void)
                 beam_element(&b, elements[e], law ? "neo_hookean" : "corotational");
                 beam_key(&b, "newton", newton);
                 beam_key(&b, "tolerance", newton > 1 ? 1e-9 : 1e-2);
-                REQUIRE(!beam_open(&b, &note));
+                REQUIRE(!beam_open(&b, &diag));
                 beam_load_end(&b, 1500);
                 double before = 0, most = 0, lowest = 0, rise = 0;
                 for (int i = 0; i < CHECK_REPEATS(90, 15); i++) {
@@ -90,7 +91,7 @@ static void swing(const char *solver, int n, double end[3])
     beam_key(&b, "newton", 60);
     beam_key(&b, "tolerance", 1e-11);
     b.scene->step_s = fmax(1e-4, 0.04 / n);
-    if (beam_open(&b, &note)) return;
+    if (beam_open(&b, &diag)) return;
     for (int i = 0; i < b.body->n_node; i++) {
         double at = b.body->x_rest[3 * i] / b.length_m;
         b.body->v[3 * i + 2] = at * at * (6 - 4 * at + at * at) / 3;
@@ -129,7 +130,7 @@ static void the_beam_swings_at_its_own_frequency(void)
     beam_solver(&b, "sdirk2");
     beam_key(&b, "tolerance", 1e-4);
     b.scene->step_s = dt;
-    REQUIRE(!beam_open(&b, &note));
+    REQUIRE(!beam_open(&b, &diag));
     /* the shape of the first mode, nearly */
     for (int i = 0; i < b.body->n_node; i++) {
         double s = b.body->x_rest[3 * i] / b.length_m;
@@ -161,7 +162,7 @@ static void long_steps_stay_bounded_and_come_to_rest(void)
                 beam_element(&b, elements[e], "corotational");
                 beam_solver(&b, solvers[s]);
                 b.def->material.damping_1_s = 1;
-                REQUIRE(!beam_open(&b, &note));
+                REQUIRE(!beam_open(&b, &diag));
                 beam_load_end(&b, 1000);
                 double highest = -INFINITY, lowest = INFINITY, rest[3], end[3];
                 for (int i = 0; i < 120; i++) {
@@ -174,7 +175,7 @@ static void long_steps_stay_bounded_and_come_to_rest(void)
                 CHECK(pal_body_finite(b.body));
                 CHECK(!b.body->frozen);
                 CHECK_LE(highest, 0.01 * -lowest);
-                CHECK_NEAR(end[2], rest[2], 1e-3 * b.body->size_m);
+                CHECK_NEAR(end[2], rest[2], 1e-3 * b.body->length_scale_m);
                 CHECK(end[2] > 0.05 * b.length_m);
                 beam_free(&b);
             }
@@ -189,8 +190,8 @@ static void a_step_calls_no_heap(void)
             beam_element(&b, elements[e], "corotational");
             beam_solver(&b, solvers[s]);
             beam_key(&b, "newton", 3);
-            pal_item_put_bool(&b.def->solver, "refresh", false, NULL);
-            REQUIRE(!beam_open(&b, &note));
+            pal_entry_put_bool(&b.def->solver, "refresh", false, NULL);
+            REQUIRE(!beam_open(&b, &diag));
             beam_load_end(&b, 1000);
             n_heap_call = 0;
             for (int i = 0; i < 20; i++) {
@@ -215,9 +216,9 @@ static void a_body_at_rest_without_loads_takes_one_iteration_a_solve(void)
         beam_reference(&b, 3);
         b.def->material.damping_1_s = 8;
         beam_solver(&b, solver[k]);
-        REQUIRE(!beam_open(&b, &note));
-        for (int i = 0; i < b.body->n_dof; i++) b.body->v[3 * i + 2] = b.body->held[i] ? 0 : b.body->x[3 * i];
-        pal_world_moved(b.world, 0);
+        REQUIRE(!beam_open(&b, &diag));
+        for (int i = 0; i < b.body->n_dof; i++) b.body->v[3 * i + 2] = b.body->fixed[i] ? 0 : b.body->x[3 * i];
+        pal_world_invalidate_limits(b.world, 0);
         for (int i = 0; i < 600; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         int n_cg = 0;
         for (int i = 0; i < 60; i++) {
@@ -229,10 +230,10 @@ static void a_body_at_rest_without_loads_takes_one_iteration_a_solve(void)
         double off = 0;
         for (int i = 0; i < 3 * b.body->n_dof; i++) off = fmax(off, fabs(b.body->x[i] - b.body->x_rest[i]));
         printf("  %s: %d iterations in 60 steps, %d searches, %.1e of S off rest\n", solver[k], n_cg,
-               (int)b.body->rescue.n_search, off / b.body->size_m);
+               (int)b.body->safeguards.n_search, off / b.body->length_scale_m);
         CHECK(n_cg <= 60 * (k + 1));
-        CHECK(off < 1e-11 * b.body->size_m);
-        CHECK_INT(b.body->rescue.n_search, 0);
+        CHECK(off < 1e-11 * b.body->length_scale_m);
+        CHECK_INT(b.body->safeguards.n_search, 0);
         beam_free(&b);
     }
 }
@@ -246,7 +247,7 @@ static void a_run_with_refreshed_factors_repeats(void)
         beam_make(&b, 16, 4, 4, 0.0125, true);
         beam_element(&b, "hex8_bbar", "corotational");
         beam_key(&b, "refresh_iterations", 2);
-        REQUIRE(!beam_open(&b, &note));
+        REQUIRE(!beam_open(&b, &diag));
         for (int turn = 0; turn <= k; turn++) {
             beam_load_end(&b, 1500);
             for (int i = 0; i < 90; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
@@ -272,9 +273,9 @@ static void a_refreshed_factor_saves_iterations(void)
         beam_make(&b, 16, 4, 4, 0.0125, true);
         beam_element(&b, "hex8_bbar", "corotational");
         beam_key(&b, "refresh_iterations", 4);
-        pal_item_put_bool(&b.def->solver, "refresh", k, NULL);
+        pal_entry_put_bool(&b.def->solver, "refresh", k, NULL);
         b.def->material.damping_1_s = 10;
-        REQUIRE(!beam_open(&b, &note));
+        REQUIRE(!beam_open(&b, &diag));
         beam_load_end(&b, 2500);
         for (int i = 0; i < 240; i++) {
             pal_solve_report report;
@@ -292,21 +293,21 @@ static void all_held_and_one_element_are_fine(void)
 {
     for (int s = 0; s < 2; s++)
         for (int e = 0; e < 4; e++)
-            for (int held = 0; held < 3; held++) {
+            for (int fixed = 0; fixed < 3; fixed++) {
                 fem_beam b;
-                beam_make(&b, 1, 1, 1, 1, held > 0);
+                beam_make(&b, 1, 1, 1, 1, fixed > 0);
                 beam_element(&b, elements[e], "corotational");
                 beam_solver(&b, solvers[s]);
-                pal_item_init(&b.def->effect[b.def->n_effect++], "effects[0]", "gravity");
-                if (held == 2) b.def->support[0].high_m[0] = 2;
-                REQUIRE(!beam_open(&b, &note));
+                pal_entry_init(&b.def->effect[b.def->n_effect++], "effects[0]", "gravity");
+                if (fixed == 2) b.def->support[0].high_m[0] = 2;
+                REQUIRE(!beam_open(&b, &diag));
                 for (int i = 0; i < 30; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
                 double drop = b.body->x_rest[0] - b.body->x[0], fall = b.body->x_rest[2] - b.body->x[2];
                 CHECK(pal_body_finite(b.body));
-                CHECK_NEAR(drop, 0, held ? 0 : 1e-6);
+                CHECK_NEAR(drop, 0, fixed ? 0 : 1e-6);
                 /* backward Euler falls g dt^2 n (n + 1) / 2 in n steps; sdirk2 falls right */
-                if (!held) CHECK_NEAR(fall, s ? 9.81 * 0.125 : 9.81 / 3600 * 465, 1e-6);
-                if (held == 2) CHECK_NEAR(fall, 0, 0);
+                if (!fixed) CHECK_NEAR(fall, s ? 9.81 * 0.125 : 9.81 / 3600 * 465, 1e-6);
+                if (fixed == 2) CHECK_NEAR(fall, 0, 0);
                 beam_free(&b);
             }
 }
@@ -319,7 +320,7 @@ static void drag_is_implicit_however_strong(void)
         beam_element(&b, "hex8_bbar", "corotational");
         beam_solver(&b, solvers[s]);
         b.def->material.damping_1_s = 6;
-        REQUIRE(!beam_open(&b, &note));
+        REQUIRE(!beam_open(&b, &diag));
         for (int i = 0; i < b.body->n_node; i++) b.body->v[3 * i] = 0.1;
         for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         double expect = s ? 0.1 * exp(-6.0) : 0.1 * pow(1 + 6.0 / 60, -60);
@@ -329,7 +330,7 @@ static void drag_is_implicit_however_strong(void)
         beam_element(&b, "hex8_bbar", "corotational");
         beam_solver(&b, solvers[s]);
         b.def->material.damping_1_s = 1e9;
-        REQUIRE(!beam_open(&b, &note));
+        REQUIRE(!beam_open(&b, &diag));
         for (int i = 0; i < b.body->n_node; i++) b.body->v[3 * i] = 0.1;
         for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         CHECK_LE(fabs(b.body->v[0]), 0.1);
@@ -343,8 +344,8 @@ static void a_state_that_is_no_number_freezes_the_body(void)
     fem_beam b;
     beam_make(&b, 2, 2, 2, 0.02, true);
     beam_element(&b, "hex8_bbar", "corotational");
-    pal_item_init(&b.def->effect[b.def->n_effect++], "effects[0]", "finite_guard");
-    REQUIRE(!beam_open(&b, &note));
+    pal_entry_init(&b.def->effect[b.def->n_effect++], "effects[0]", "finite_guard");
+    REQUIRE(!beam_open(&b, &diag));
     REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     b.body->v[30] = NAN;
     CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_FROZEN);
@@ -364,8 +365,8 @@ static void an_edited_material_is_that_of_a_world_made_with_it(void)
         pal_material to = b.def->material;
         to.young_Pa *= 3, to.poisson = 0.3, to.density_kg_m3 = 2000;
         if (k) b.def->material = to;
-        REQUIRE(!beam_open(&b, &note));
-        if (!k) CHECK_INT(pal_world_material(b.world, 0, &to, &note), 0);
+        REQUIRE(!beam_open(&b, &diag));
+        if (!k) CHECK_INT(pal_world_material(b.world, 0, &to, &diag), 0);
         beam_load_end(&b, 1000);
         for (int i = 0; i < 30; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         hash[k] = pal_world_hash(b.world);
@@ -385,15 +386,15 @@ static void refuses_what_it_cannot_take(void)
     for (int k = 0; k < 6; k++) {
         fem_beam b;
         beam_make(&b, 2, 2, 2, 0.02, true);
-        if (k == 0) pal_item_init(&b.def->model, "model", "tet_springs");
-        if (k == 1) pal_hexes_free(&b.mesh.hexes), pal_item_put_text(&b.def->model, "element", "hex8", NULL);
-        if (k == 2) pal_item_put_text(&b.def->model, "element", "hex9", NULL);
-        if (k == 3) pal_item_put_number(&b.def->model, "stiffer", 1, NULL);
+        if (k == 0) pal_entry_init(&b.def->model, "model", "tet_springs");
+        if (k == 1) pal_hexes_free(&b.mesh.hexes), pal_entry_put_text(&b.def->model, "element", "hex8", NULL);
+        if (k == 2) pal_entry_put_text(&b.def->model, "element", "hex9", NULL);
+        if (k == 3) pal_entry_put_number(&b.def->model, "stiffer", 1, NULL);
         if (k == 4) beam_key(&b, "tolerance", 2);
-        if (k == 5) pal_item_put_text(&b.def->model, "law", "jelly", NULL);
+        if (k == 5) pal_entry_put_text(&b.def->model, "law", "jelly", NULL);
         pal_world *world = NULL;
-        CHECK_INT(pal_world_create(b.scene, &note, &world), PAL_ERR_REFUSED);
-        if (!strstr(note.text, expect[k])) CHECK_TEXT(note.text, expect[k]);
+        CHECK_INT(pal_world_create(b.scene, &diag, &world), PAL_ERR_REFUSED);
+        if (!strstr(diag.text, expect[k])) CHECK_TEXT(diag.text, expect[k]);
         if (world) pal_world_destroy(world);
         beam_free(&b);
     }

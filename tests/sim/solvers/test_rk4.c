@@ -1,6 +1,6 @@
 /* Solver rk4: order, drag, stability limit, held nodes, and what goes wrong. */
+#include "tests/fixtures/adaptive_plan.h"
 #include "tests/fixtures/boxes.h"
-#include "tests/fixtures/shell_plan.h"
 #include "tests/stability/hard_case.h"
 
 static const double stable_radius = 2.8284271247461903; /* of the classical method on the imaginary axis */
@@ -115,8 +115,8 @@ static void undamped_oscillation_keeps_its_energy(void)
 static double fastest_mode(shell_plan *p, double *mode)
 {
     size_t n = 3 * (size_t)p->body->n_node;
-    const pal_row *row = shell_plan_row(p, "edge_spring");
-    double omega2 = 0, small = 1e-7 * p->body->h_m;
+    const pal_component *row = shell_plan_row(p, "edge_spring");
+    double omega2 = 0, small = 1e-7 * p->body->edge_m;
     for (size_t i = 0; i < n; i++) mode[i] = i % 3 == 2 || p->body->mass_kg[i / 3] == 0 ? 0 : shell_plan_uniform(p);
     for (int round = 0; round < 800; round++) {
         /* the mode's largest entry is 1 */
@@ -170,19 +170,20 @@ static double fastest(shell_plan *p, int n_round, double shift)
     double *x = malloc(n * sizeof *x), *mode = malloc(n * sizeof *mode), *f = malloc(n * sizeof *f), omega2 = 0;
     pal_step step = shell_plan_step(p, 0);
     memcpy(x, body->x, n * sizeof *x);
-    pal_gather(&step);
+    pal_assemble_forces(&step);
     memcpy(f, body->f, n * sizeof *f);
-    for (size_t i = 0; i < n; i++) mode[i] = body->mass_kg[i / 3] > 0 && !body->held[i / 3] ? shell_plan_uniform(p) : 0;
+    for (size_t i = 0; i < n; i++)
+        mode[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? shell_plan_uniform(p) : 0;
     for (int round = 0; round < n_round; round++) {
         double most = 0, along = 0, norm2 = 0;
         for (size_t i = 0; i < n; i++) most = fmax(most, fabs(mode[i]));
-        double small = 1e-6 * body->h_m;
+        double small = 1e-6 * body->edge_m;
         for (size_t i = 0; i < n; i++) mode[i] /= most, body->x[i] = x[i] + small * mode[i];
-        pal_gather(&step);
+        pal_assemble_forces(&step);
         for (size_t i = 0; i < n; i++) {
             double m = body->mass_kg[i / 3], force = (f[i] - body->f[i]) / small;
             along += force * mode[i], norm2 += m * mode[i] * mode[i];
-            mode[i] = m > 0 && !body->held[i / 3] ? force / m + shift * mode[i] : 0;
+            mode[i] = m > 0 && !body->fixed[i / 3] ? force / m + shift * mode[i] : 0;
         }
         omega2 = along / norm2;
     }
@@ -200,7 +201,8 @@ static bool open_mixture(shell_plan *p, int shape, int n_mix, int kind)
     shell_scene_number(&p->s, "levels", 3);
     shell_scene_number(&p->s, "c_spring_Ns_m", 0);
     if (kind == 0) shell_scene_number(&p->s, "k_shape_N_m", 0);
-    if (kind == 2 && shape < 2 && pal_item_put_text(shell_scene_effect(&p->s, "inflate"), "kind", "gas", NULL)) abort();
+    if (kind == 2 && shape < 2 && pal_entry_put_text(shell_scene_effect(&p->s, "inflate"), "kind", "gas", NULL))
+        abort();
     if (!shell_plan_open(p)) return false;
     shell_plan_mix(p, n_mix);
     return true;
@@ -320,9 +322,9 @@ static void limit_follows_levels_and_factors(void)
     shell_scene_number(&p.s, "c_spring_Ns_m", 0);
     REQUIRE(shell_plan_open(&p));
     double coarse = shell_plan_limit(&p);
-    p.shell->spring_ramp = 4;
+    p.adaptive->spring_ramp = 4;
     CHECK_NEAR(shell_plan_limit(&p) / coarse, 0.5, 1e-12);
-    p.shell->spring_ramp = 1;
+    p.adaptive->spring_ramp = 1;
     CHECK_NEAR(shell_plan_limit(&p) / coarse, 1, 1e-12);
     shell_plan_mix(&p, 3);
     CHECK_LE(shell_plan_limit(&p), 0.75 * coarse);
@@ -336,7 +338,7 @@ static void held_nodes_stand_and_led_ones_keep_their_velocity(void)
 {
     shell_plan p;
     REQUIRE(open_swing(&p, 4));
-    p.body->held[5] = 1, p.body->held[9] = 2;
+    p.body->fixed[5] = 1, p.body->fixed[9] = 2;
     pal_set3(p.body->v + 15, 1, 1, 1);
     pal_set3(p.body->v + 27, 0.01, 0.02, -0.03);
     shell_plan_run(&p, 50, 1e-4);
@@ -358,10 +360,10 @@ static void moves_are_clamped(void)
     p.body->v[4] = -1e9;
     shell_plan_run(&p, 1, 1e-3);
     CHECK(pal_body_finite(p.body));
-    CHECK(p.body->rescue.n_clamped >= 2);
+    CHECK(p.body->safeguards.n_clamped >= 2);
     for (int i = 0; i < p.body->n_active; i++) {
-        CHECK_LE(pal_dist3(p.body->x + 3 * i, p.body->x_rest + 3 * i), 0.2 * p.body->size_m * (1 + 1e-12));
-        CHECK_LE(pal_norm3(p.body->v + 3 * i) * 1e-3, 0.2 * p.body->size_m * (1 + 1e-12));
+        CHECK_LE(pal_dist3(p.body->x + 3 * i, p.body->x_rest + 3 * i), 0.2 * p.body->length_scale_m * (1 + 1e-12));
+        CHECK_LE(pal_norm3(p.body->v + 3 * i) * 1e-3, 0.2 * p.body->length_scale_m * (1 + 1e-12));
     }
     shell_plan_close(&p);
 }
@@ -374,7 +376,7 @@ static void heavy_steps_stay_bounded(void)
     double limit = shell_plan_limit(&p);
     shell_plan_shake(&p, 0.05, 0);
     double before = shell_plan_energy(&p);
-    pal_row *solve = shell_plan_row(&p, "rk4");
+    pal_component *solve = shell_plan_row(&p, "rk4");
     for (int i = 0; i < 200; i++) {
         pal_step step = shell_plan_step(&p, 20 * limit);
         step.heavy = true;
@@ -382,7 +384,7 @@ static void heavy_steps_stay_bounded(void)
     }
     double after = shell_plan_row(&p, "edge_spring")->effect->energy(shell_plan_row(&p, "edge_spring")->self, p.body);
     CHECK(pal_body_finite(p.body));
-    CHECK_INT(p.body->rescue.n_clamped, 0);
+    CHECK_INT(p.body->safeguards.n_clamped, 0);
     CHECK_LE(after, before);
     shell_plan_close(&p);
 }
@@ -394,14 +396,14 @@ static void other_bodies_come_to_the_same_rest(void)
     int n = 0;
     for (int way = 0; way < 2; way++) {
         pal_prepared box;
-        pal_note note = {{0}};
+        pal_diagnostic diag = {{0}};
         pal_world *world = NULL;
         REQUIRE(!box_make(2, 2, 4, 0.01, &box));
         pal_scene *scene = box_scene(&box, true, true);
         scene->body[0].material.young_Pa = 2e4;
         scene->body[0].material.damping_1_s = 60;
-        if (way) pal_item_init(&scene->body[0].solver, "solver", "rk4");
-        if (pal_world_create(scene, &note, &world)) printf("  %s\n", note.text);
+        if (way) pal_entry_init(&scene->body[0].solver, "solver", "rk4");
+        if (pal_world_create(scene, &diag, &world)) printf("  %s\n", diag.text);
         REQUIRE(world != NULL);
         for (int i = 0; i < 100; i++) CHECK_INT(pal_world_step(world, 1.0 / 60), 0);
         const pal_body *body = pal_world_body(world, 0);

@@ -7,10 +7,10 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
-#include "tests/fixtures/largest_w2.h"
+#include "tests/fixtures/largest_frequency.h"
 
 enum { NODES = 5 * 4 * 3 };
-static pal_note note;
+static pal_diagnostic diag;
 static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
@@ -49,8 +49,8 @@ static void put_grid(bench *b)
 static bool bench_plan(bench *b)
 {
     b->arena = pal_arena_create(1 << 20, true);
-    if (pal_plan_build(b->scene, b->arena, &note, &b->plan)) {
-        printf("  %s\n", note.text);
+    if (pal_plan_build(b->scene, b->arena, &diag, &b->plan)) {
+        printf("  %s\n", diag.text);
         return false;
     }
     b->body = &b->plan.body[0];
@@ -64,7 +64,7 @@ static bool bench_varied(bench *b, const char *weights)
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < NODES; i++) b->k_J[k][i] = 1e-3 * pow(10, uniform());
     put_grid(b);
-    if (weights) pal_item_put_text(&b->def->model, "weights", weights, NULL);
+    if (weights) pal_entry_put_text(&b->def->model, "weights", weights, NULL);
     return bench_plan(b);
 }
 
@@ -76,14 +76,14 @@ static void bench_close(bench *b)
     box_free(&b->box);
 }
 
-static const pal_row *row_named(const bench *b, const char *name)
+static const pal_component *row_named(const bench *b, const char *name)
 {
     for (int r = 0; r < b->plan.n_row; r++)
         if (!strcmp(b->plan.row[r].effect->name, name)) return &b->plan.row[r];
     return NULL;
 }
 
-static void run_row(const bench *b, const pal_row *row)
+static void run_row(const bench *b, const pal_component *row)
 {
     pal_step step = {.body = b->body};
     memset(b->body->f, 0, 3 * sizeof(double) * (size_t)b->body->n_node);
@@ -93,13 +93,13 @@ static void run_row(const bench *b, const pal_row *row)
 static void shake(bench *b, double amount)
 {
     for (int i = 0; i < 3 * b->body->n_dof; i++) {
-        b->body->x[i] = b->body->x_rest[i] + amount * b->body->h_m * uniform();
+        b->body->x[i] = b->body->x_rest[i] + amount * b->body->edge_m * uniform();
         b->body->v[i] = uniform();
     }
 }
 
 #define EACH_SPRING_ROW(b, row)                                                                                        \
-    for (const pal_row *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                                \
+    for (const pal_component *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                          \
         if (row->effect->energy && row->effect->internal)
 
 static const char *const k_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"}, *const c_key[3] = {"c_distance_Js",
@@ -114,21 +114,21 @@ static void a_grid_of_equal_values_is_the_homogeneous_body(void)
         bench a, b;
         REQUIRE(bench_make(&a) && bench_make(&b));
         for (int k = 0; k < 3; k++) {
-            pal_item_put_number(&a.def->model, k_key[k], k_J[k], NULL);
-            pal_item_put_number(&a.def->model, c_key[k], c_Js[k], NULL);
-            pal_item_put_number(&b.def->model, c_key[k], c_Js[k], NULL);
+            pal_entry_put_number(&a.def->model, k_key[k], k_J[k], NULL);
+            pal_entry_put_number(&a.def->model, c_key[k], c_Js[k], NULL);
+            pal_entry_put_number(&b.def->model, c_key[k], c_Js[k], NULL);
             for (int i = 0; i < NODES; i++) b.k_J[k][i] = k_J[k];
         }
         put_grid(&b);
         for (int i = 0; i < 2 && by_volume; i++)
-            pal_item_put_text(&(i ? &b : &a)->def->model, "weights", "volume", NULL);
+            pal_entry_put_text(&(i ? &b : &a)->def->model, "weights", "volume", NULL);
         REQUIRE(bench_plan(&a) && bench_plan(&b));
         CHECK_INT(a.plan.n_row, b.plan.n_row);
         shake(&a, 0.3);
         memcpy(b.body->x, a.body->x, 3 * sizeof(double) * (size_t)a.body->n_dof);
         memcpy(b.body->v, a.body->v, 3 * sizeof(double) * (size_t)a.body->n_dof);
         for (int r = 0; r < a.plan.n_row; r++) {
-            const pal_row *row = &a.plan.row[r], *other = &b.plan.row[r];
+            const pal_component *row = &a.plan.row[r], *other = &b.plan.row[r];
             if (!row->effect->internal || row->effect->stage != PAL_STAGE_FORCE) continue;
             double most = 0, apart = 0, bound[2][128] = {{0}};
             run_row(&a, row), run_row(&b, other);
@@ -206,12 +206,12 @@ static void a_spring_has_its_weight_times_the_mean_of_its_corners(void)
             for (int i = 0; i < NODES; i++)
                 b.k_J[k][i] = slope_at((const double[]){0.01 * (i % 5), 0.01 * (i / 5 % 4), 0.01 * (i / 20)}, k);
         put_grid(&b);
-        pal_item_put_text(&b.def->model, "weights", by_volume ? "volume" : "equal", NULL);
+        pal_entry_put_text(&b.def->model, "weights", by_volume ? "volume" : "equal", NULL);
         REQUIRE(bench_plan(&b));
         for (int i = 0; i < 3 * b.body->n_dof; i++) b.body->x[i] *= s;
         for (int kind = 0; kind < 3; kind++) {
             static const char *const name[3] = {"edge_distance", "face_area", "tet_volume"};
-            const pal_row *row = row_named(&b, name[kind]);
+            const pal_component *row = row_named(&b, name[kind]);
             REQUIRE(row);
             double c = pow(s, kind + 1) - 1, wanted = 0.5 * c * c * sum_of_sides(&b, kind + 2, by_volume);
             CHECK_NEAR(row->effect->energy(row->self, b.body), wanted, 1e-12 * wanted);
@@ -228,8 +228,8 @@ static void given_constants_may_have_the_weights_of_derived_ones(void)
     REQUIRE(bench_make(&a) && bench_make(&b));
     pal_spring_factors(a.def->material.poisson, false, factor);
     for (int k = 0; k < 3; k++)
-        pal_item_put_number(&b.def->model, k_key[k], factor[k] * a.def->material.young_Pa * 0.01 * 0.01 * 0.01, NULL);
-    pal_item_put_text(&b.def->model, "weights", "volume", NULL);
+        pal_entry_put_number(&b.def->model, k_key[k], factor[k] * a.def->material.young_Pa * 0.01 * 0.01 * 0.01, NULL);
+    pal_entry_put_text(&b.def->model, "weights", "volume", NULL);
     REQUIRE(bench_plan(&a) && bench_plan(&b));
     shake(&a, 0.3);
     memcpy(b.body->x, a.body->x, 3 * sizeof(double) * (size_t)a.body->n_dof);
@@ -278,7 +278,7 @@ static void forces_of_varied_springs_are_the_gradient_of_their_energy(void)
         shake(&b, turn == 0 ? 0.05 : 0.5);
         EACH_SPRING_ROW(b, row)
         {
-            double most = 0, worst = 0, step = 1e-6 * b.body->h_m;
+            double most = 0, worst = 0, step = 1e-6 * b.body->edge_m;
             run_row(&b, row);
             for (int i = 0; i < 3 * b.body->n_dof; i++) {
                 double x = b.body->x[i];
@@ -302,7 +302,7 @@ static void the_substep_is_half_the_stable_one_of_varied_springs_or_less(void)
     for (int by_volume = 0; by_volume < 2; by_volume++) {
         bench b;
         REQUIRE(bench_varied(&b, by_volume ? "volume" : "equal"));
-        const pal_row *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
+        const pal_component *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
         for (int turn = 0; turn < 3; turn++) {
             if (turn == 1) shake(&b, 0.2);
             for (int i = 0; i < 3 * b.body->n_dof && turn == 2; i++) b.body->x[i] = 1.8 * b.body->x_rest[i];
@@ -328,7 +328,7 @@ static void a_varied_body_keeps_its_momentum_and_comes_back(void)
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < NODES; i++) b.k_J[k][i] = 1e-3 * pow(10, uniform());
     put_grid(&b);
-    REQUIRE(!pal_world_create(b.scene, &note, &world));
+    REQUIRE(!pal_world_create(b.scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     double before[3], after[3], scale = 0;
     for (int i = 0; i < 3 * body->n_dof; i++) body->v[i] = 0.05 * uniform() + (i % 3 == 0 ? 0.1 : 0);
@@ -344,7 +344,7 @@ static void a_varied_body_keeps_its_momentum_and_comes_back(void)
 
 static double energy_of(const bench *b, const char *name)
 {
-    const pal_row *row = row_named(b, name);
+    const pal_component *row = row_named(b, name);
     return row ? row->effect->energy(row->self, b->body) : NAN;
 }
 
@@ -369,7 +369,7 @@ static void a_material_edit_leaves_what_is_given(void)
     stiffer.young_Pa *= 3;
     for (int r = 0; r < b.plan.n_row; r++)
         if (b.plan.row[r].effect->material)
-            CHECK_INT(b.plan.row[r].effect->material(b.plan.row[r].self, b.body, &stiffer, &note), 0);
+            CHECK_INT(b.plan.row[r].effect->material(b.plan.row[r].self, b.body, &stiffer, &diag), 0);
     CHECK_NEAR(energy_of(&b, "edge_distance"), before[0], 0);
     CHECK_NEAR(energy_of(&b, "tet_volume"), 3 * before[1], 1e-12 * before[1]);
     bench_close(&b);
@@ -379,7 +379,7 @@ static void a_material_edit_leaves_what_is_given(void)
     for (int i = 0; i < NODES; i++) b.k_J[0][i] = b.k_J[2][i] = 1e-3;
     put_grid(&b);
     b.def->spring_grid.k_J[PAL_SPRING_AREA] = NULL;
-    pal_item_put_number(&b.def->model, "k_area_J", 5e-4, NULL);
+    pal_entry_put_number(&b.def->model, "k_area_J", 5e-4, NULL);
     REQUIRE(bench_plan(&b));
     CHECK(row_named(&b, "face_area") != NULL);
     bench_close(&b);
@@ -389,7 +389,7 @@ static void nodes_show_their_constant_in_colour(void)
 {
     bench b;
     REQUIRE(bench_varied(&b, "volume"));
-    const pal_row *row = row_named(&b, "edge_distance");
+    const pal_component *row = row_named(&b, "edge_distance");
     REQUIRE(row && row->effect->measure);
     double sum[128] = {0}, volume[128] = {0};
     REQUIRE(b.body->n_dof == NODES);
@@ -402,9 +402,10 @@ static void nodes_show_their_constant_in_colour(void)
 
     /* derived constants are the same everywhere, and follow an edit */
     pal_world *world;
-    REQUIRE(bench_make(&b) && !pal_world_create(b.scene, &note, &world));
-    CHECK(pal_world_gives(world, 0, PAL_FIELD_STIFFNESS_J) && !pal_world_gives(world, 0, PAL_FIELD_ENERGY_J_M3));
-    REQUIRE(!pal_world_field(world, 0, PAL_FIELD_STIFFNESS_J, true, &note));
+    REQUIRE(bench_make(&b) && !pal_world_create(b.scene, &diag, &world));
+    CHECK(pal_world_has_field(world, 0, PAL_FIELD_STIFFNESS_J) &&
+          !pal_world_has_field(world, 0, PAL_FIELD_ENERGY_J_M3));
+    REQUIRE(!pal_world_field(world, 0, PAL_FIELD_STIFFNESS_J, true, &diag));
     pal_body *body = pal_world_body(world, 0);
     const float *value = body->field[PAL_FIELD_STIFFNESS_J]->value;
     double factor[3];
@@ -414,7 +415,7 @@ static void nodes_show_their_constant_in_colour(void)
         for (int i = 0; i < body->n_shown; i++) CHECK_NEAR((double)value[i], wanted, 1e-6 * wanted);
         pal_material edit = b.def->material;
         edit.young_Pa *= 3;
-        REQUIRE(!pal_world_material(world, 0, &edit, &note));
+        REQUIRE(!pal_world_material(world, 0, &edit, &diag));
         for (int i = 0; i < 12; i++) REQUIRE(!pal_world_step(world, b.scene->step_s));
     }
     pal_world_destroy(world);
@@ -424,11 +425,11 @@ static void nodes_show_their_constant_in_colour(void)
 static void expect(bench *b, const char *sentence)
 {
     pal_world *world = NULL;
-    note.text[0] = 0;
-    CHECK_INT(pal_world_create(b->scene, &note, &world), PAL_ERR_REFUSED);
+    diag.text[0] = 0;
+    CHECK_INT(pal_world_create(b->scene, &diag, &world), PAL_ERR_REFUSED);
     pal_world_destroy(world);
-    if (!strstr(note.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", note.text, sentence);
-    if (strchr(note.text, '\n')) CHECK_FAIL("\"%s\" has a line end", note.text);
+    if (!strstr(diag.text, sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, sentence);
+    if (strchr(diag.text, '\n')) CHECK_FAIL("\"%s\" has a line end", diag.text);
 }
 
 static void refuses_a_grid_that_is_none_in_one_sentence(void)
@@ -467,21 +468,21 @@ static void refuses_a_grid_that_is_none_in_one_sentence(void)
     for (int k = 0; k < 3; k++) {
         char sentence[96];
         put_grid(&b);
-        pal_item_init(&b.def->model, "model", "tet_springs");
-        pal_item_put_number(&b.def->model, k_key[k], 1e-3, NULL);
+        pal_entry_init(&b.def->model, "model", "tet_springs");
+        pal_entry_put_number(&b.def->model, k_key[k], 1e-3, NULL);
         snprintf(sentence, sizeof sentence, "model.%s: stands beside a grid that gives the same", k_key[k]);
         expect(&b, sentence);
     }
-    pal_item_init(&b.def->model, "model", "tet_springs");
-    pal_item_put_text(&b.def->model, "weights", "square", NULL);
+    pal_entry_init(&b.def->model, "model", "tet_springs");
+    pal_entry_put_text(&b.def->model, "weights", "square", NULL);
     expect(&b, "model.weights: \"square\", wanted \"equal\" or \"volume\"");
-    pal_item_init(&b.def->model, "model", "fem");
+    pal_entry_init(&b.def->model, "model", "fem");
     expect(&b, "model.grid: model \"fem\" has no springs");
     /* an entry in place of the model's row */
-    pal_item_init(&b.def->model, "model", "tet_springs");
-    pal_item *entry = &b.def->effect[b.def->n_effect++];
-    pal_item_init(entry, "effects[1]", "edge_distance");
-    pal_item_put_number(entry, "k_J", 1, NULL);
+    pal_entry_init(&b.def->model, "model", "tet_springs");
+    pal_config_entry *entry = &b.def->effect[b.def->n_effect++];
+    pal_entry_init(entry, "effects[1]", "edge_distance");
+    pal_entry_put_number(entry, "k_J", 1, NULL);
     expect(&b, "effects[1].k_J: stands beside a grid that gives the same");
     bench_close(&b);
 }

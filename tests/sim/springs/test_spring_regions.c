@@ -7,7 +7,7 @@
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
@@ -48,7 +48,7 @@ static void put_region(bench *b, double x_m, double young_Pa, double poisson, do
 
 static void bench_open(bench *b)
 {
-    if (pal_world_create(b->scene, &note, &b->world)) printf("  %s\n", note.text), abort();
+    if (pal_world_create(b->scene, &diag, &b->world)) printf("  %s\n", diag.text), abort();
     b->body = pal_world_body(b->world, 0);
 }
 
@@ -64,18 +64,18 @@ static void shake(const bench *b)
 {
     seed = 9;
     for (int i = 0; i < 3 * b->body->n_dof; i++) {
-        b->body->x[i] = b->body->x_rest[i] + 0.1 * b->body->h_m * uniform();
+        b->body->x[i] = b->body->x_rest[i] + 0.1 * b->body->edge_m * uniform();
         b->body->v[i] = uniform();
     }
-    pal_world_moved(b->world, 0);
+    pal_world_invalidate_limits(b->world, 0);
 }
 
 static void forces(const bench *b, double *f)
 {
     pal_step step = {.body = b->body};
     memset(b->body->f, 0, 3 * sizeof(double) * (size_t)b->body->n_node);
-    for (int r = 0; r < pal_world_rows(b->world); r++) {
-        const pal_row *row = pal_world_effect(b->world, r);
+    for (int r = 0; r < pal_world_component_count(b->world); r++) {
+        const pal_component *row = pal_world_component(b->world, r);
         if (row->effect->internal) CHECK_INT(row->effect->run(row->self, &step), 0);
     }
     memcpy(f, b->body->f, 3 * sizeof(double) * (size_t)b->body->n_node);
@@ -83,8 +83,8 @@ static void forces(const bench *b, double *f)
 
 static double energy(const bench *b, const char *name)
 {
-    for (int r = 0; r < pal_world_rows(b->world); r++) {
-        const pal_row *row = pal_world_effect(b->world, r);
+    for (int r = 0; r < pal_world_component_count(b->world); r++) {
+        const pal_component *row = pal_world_component(b->world, r);
         if (!strcmp(row->effect->name, name)) return row->effect->energy(row->self, b->body);
     }
     return NAN;
@@ -112,11 +112,11 @@ static void a_region_all_over_is_the_body_of_its_material(void)
         bench a, b;
         bench_make(&a), bench_make(&b);
         if (weights[k % 3]) {
-            pal_item_put_text(&a.def->model, "weights", weights[k % 3], NULL);
-            pal_item_put_text(&b.def->model, "weights", weights[k % 3], NULL);
+            pal_entry_put_text(&a.def->model, "weights", weights[k % 3], NULL);
+            pal_entry_put_text(&b.def->model, "weights", weights[k % 3], NULL);
         }
-        if (k > 2) pal_item_put_number(&a.def->model, "k_area_J", 0, NULL);
-        if (k > 2) pal_item_put_number(&b.def->model, "k_area_J", 0, NULL);
+        if (k > 2) pal_entry_put_number(&a.def->model, "k_area_J", 0, NULL);
+        if (k > 2) pal_entry_put_number(&b.def->model, "k_area_J", 0, NULL);
         put_region(&a, 1, 36000, 0.47, 1500);
         b.def->material.young_Pa = 36000, b.def->material.poisson = 0.47, b.def->material.density_kg_m3 = 1500;
         bench_open(&a), bench_open(&b);
@@ -124,7 +124,7 @@ static void a_region_all_over_is_the_body_of_its_material(void)
         /* the body's own material is nowhere: an edit of it changes nothing but masses, which go with its density */
         pal_material edit = a.def->material;
         edit.young_Pa *= 7, edit.poisson = 0.3;
-        REQUIRE(!pal_world_material(a.world, 0, &edit, &note));
+        REQUIRE(!pal_world_material(a.world, 0, &edit, &diag));
         check_same(&a, &b);
         bench_close(&a), bench_close(&b);
     }
@@ -146,8 +146,8 @@ static void what_a_region_does_not_give_is_of_the_body(void)
         pal_material edit = a.def->material, same = edit;
         edit.young_Pa = 9000, edit.poisson = 0.48;
         same.young_Pa = k ? 9000 : 500, same.poisson = k ? 0.3 : 0.48;
-        REQUIRE(!pal_world_material(a.world, 0, &edit, &note));
-        REQUIRE(!pal_world_material(b.world, 0, &same, &note));
+        REQUIRE(!pal_world_material(a.world, 0, &edit, &diag));
+        REQUIRE(!pal_world_material(b.world, 0, &same, &diag));
         check_same(&a, &b);
         bench_close(&a), bench_close(&b);
     }
@@ -184,13 +184,13 @@ static void a_bar_of_two_parts_stretches_in_series(void)
     b.def->material.poisson = 0.26, b.def->material.damping_1_s = 30;
     put_region(&b, 0.02, ratio * b.def->material.young_Pa, NAN, NAN);
     b.def->n_support = 2;
-    b.def->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
-    b.def->support[1] = (pal_support){.low_m = {0.04 - 1e-6, -1, -1}, .high_m = {1, 1, 1}};
+    b.def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1e-6, 1, 1}};
+    b.def->support[1] = (pal_support_def){.low_m = {0.04 - 1e-6, -1, -1}, .high_m = {1, 1, 1}};
     bench_open(&b);
     const double pull = 0.0008;
     for (int i = 0; i < b.body->n_dof; i++)
         if (b.body->x_rest[3 * i] > 0.039) b.body->x[3 * i] += pull;
-    pal_world_moved(b.world, 0);
+    pal_world_invalidate_limits(b.world, 0);
     for (int i = 0; i < 400; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 120));
     double moved = 0;
     int n = 0;
@@ -226,8 +226,8 @@ static void what_is_given_stands_for_all(void)
     bench_make(&a), bench_make(&b);
     const char *const key[] = {"k_distance_J", "k_area_J", "k_volume_J"};
     for (int k = 0; k < 3; k++) {
-        pal_item_put_number(&a.def->model, key[k], 1e-3 * (k + 1), NULL);
-        pal_item_put_number(&b.def->model, key[k], 1e-3 * (k + 1), NULL);
+        pal_entry_put_number(&a.def->model, key[k], 1e-3 * (k + 1), NULL);
+        pal_entry_put_number(&b.def->model, key[k], 1e-3 * (k + 1), NULL);
     }
     put_region(&a, 0.02, 1e6, 0.3, NAN);
     bench_open(&a), bench_open(&b);
@@ -263,8 +263,8 @@ static void nodes_show_the_constant_of_their_part(void)
     double factor[3], sum[128] = {0}, n[128] = {0};
     pal_spring_factors(b.def->material.poisson, false, factor);
     const double own = factor[0] * b.def->material.young_Pa * 1e-6;
-    for (int r = 0; r < pal_world_rows(b.world); r++) {
-        const pal_row *row = pal_world_effect(b.world, r);
+    for (int r = 0; r < pal_world_component_count(b.world); r++) {
+        const pal_component *row = pal_world_component(b.world, r);
         if (row->effect->measure && !strcmp(row->effect->name, "edge_distance"))
             row->effect->measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, n);
     }

@@ -6,10 +6,10 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
-#include "tests/fixtures/largest_w2.h"
+#include "tests/fixtures/largest_frequency.h"
 #include "tests/stability/hard_case.h"
 
-static pal_note note;
+static pal_diagnostic diag;
 static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
@@ -33,14 +33,14 @@ static bool bench_open(bench *b, int nx, int ny, int nz, double damping_Js)
     if (box_make(nx, ny, nz, 0.01, &b->box)) return false;
     b->scene = box_scene(&b->box, false, true);
     b->arena = pal_arena_create(1 << 20, true);
-    pal_item *model = &b->scene->body[0].model;
+    pal_config_entry *model = &b->scene->body[0].model;
     if (damping_Js > 0) {
-        pal_item_put_number(model, "c_distance_Js", damping_Js, NULL);
-        pal_item_put_number(model, "c_area_Js", damping_Js, NULL);
-        pal_item_put_number(model, "c_volume_Js", damping_Js, NULL);
+        pal_entry_put_number(model, "c_distance_Js", damping_Js, NULL);
+        pal_entry_put_number(model, "c_area_Js", damping_Js, NULL);
+        pal_entry_put_number(model, "c_volume_Js", damping_Js, NULL);
     }
-    if (pal_plan_build(b->scene, b->arena, &note, &b->plan)) {
-        printf("  %s\n", note.text);
+    if (pal_plan_build(b->scene, b->arena, &diag, &b->plan)) {
+        printf("  %s\n", diag.text);
         return false;
     }
     b->body = &b->plan.body[0];
@@ -61,7 +61,7 @@ static void bench_close(bench *b)
     box_free(&b->box);
 }
 
-static void run_row(bench *b, const pal_row *row)
+static void run_row(bench *b, const pal_component *row)
 {
     pal_step step = {.body = b->body};
     memset(b->body->f, 0, 3 * sizeof(double) * (size_t)b->body->n_node);
@@ -71,7 +71,7 @@ static void run_row(bench *b, const pal_row *row)
 static void shake(bench *b, double amount, double speed_m_s)
 {
     for (int i = 0; i < 3 * b->body->n_dof; i++) {
-        b->body->x[i] = b->body->x_rest[i] + amount * b->body->h_m * uniform();
+        b->body->x[i] = b->body->x_rest[i] + amount * b->body->edge_m * uniform();
         b->body->v[i] = speed_m_s * uniform();
     }
 }
@@ -84,20 +84,20 @@ static double largest(const double *f, int n)
 }
 
 #define EACH_FORCE_ROW(b, row)                                                                                         \
-    for (const pal_row *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                                \
+    for (const pal_component *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                          \
         if (row->effect->stage == PAL_STAGE_FORCE)
 
 static void internal_rows_are_silent_at_rest(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 0));
-    double scale = b.scene->body[0].material.young_Pa * b.body->h_m * b.body->h_m;
+    double scale = b.scene->body[0].material.young_Pa * b.body->edge_m * b.body->edge_m;
     EACH_FORCE_ROW(b, row)
     {
         if (!row->effect->internal) continue;
         run_row(&b, row);
         CHECK_LE(largest(b.body->f, 3 * b.body->n_node), 1e-14 * scale);
-        if (row->effect->energy) CHECK_LE(row->effect->energy(row->self, b.body), 1e-20 * scale * b.body->h_m);
+        if (row->effect->energy) CHECK_LE(row->effect->energy(row->self, b.body), 1e-20 * scale * b.body->edge_m);
     }
     bench_close(&b);
 }
@@ -140,7 +140,7 @@ static void forces_are_the_gradient_of_their_energy(void)
         {
             if (!row->effect->energy) continue;
             run_row(&b, row);
-            double most = largest(b.body->f, 3 * b.body->n_node), step = 1e-6 * b.body->h_m, worst = 0;
+            double most = largest(b.body->f, 3 * b.body->n_node), step = 1e-6 * b.body->edge_m, worst = 0;
             for (int i = 0; i < 3 * b.body->n_dof; i++) {
                 double x = b.body->x[i];
                 b.body->x[i] = x + step;
@@ -161,7 +161,7 @@ static void chooses_half_the_stable_substep_or_less(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 0));
-    const pal_row *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
+    const pal_component *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
     for (int turn = 0; turn < 4; turn++) {
         if (turn == 1) shake(&b, 0.2, 0);
         for (int i = 0; i < 3 * b.body->n_dof && turn >= 2; i++)
@@ -195,11 +195,11 @@ static void a_breathing_tetrahedron_has_the_analytic_period(void)
     pal_scene *scene = box_scene(&box, false, false);
     scene->body[0].material.damping_1_s = 0;
     scene->body[0].output.name[0] = 0;
-    pal_item_put_number(&scene->body[0].model, "k_distance_J", k_d, NULL);
-    pal_item_put_number(&scene->body[0].model, "k_area_J", k_a, NULL);
-    pal_item_put_number(&scene->body[0].model, "k_volume_J", k_v, NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_distance_J", k_d, NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_area_J", k_a, NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_volume_J", k_v, NULL);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     double mr2 = 4 * body->mass_kg[0] * 3 * 0.005 * 0.005, w = sqrt((6 * k_d + 16 * k_a + 9 * k_v) / mr2);
     for (int i = 0; i < 12; i++) body->x[i] *= 1 + amplitude;
@@ -225,16 +225,16 @@ static void a_scaled_tetrahedron_has_the_analytic_energy_and_virial(void)
     REQUIRE(!box_one_tet(0.01, &box));
     pal_scene *scene = box_scene(&box, false, false);
     scene->body[0].output.name[0] = 0;
-    pal_item_put_number(&scene->body[0].model, "k_distance_J", k[0], NULL);
-    pal_item_put_number(&scene->body[0].model, "k_area_J", k[1], NULL);
-    pal_item_put_number(&scene->body[0].model, "k_volume_J", k[2], NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_distance_J", k[0], NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_area_J", k[1], NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_volume_J", k[2], NULL);
     pal_arena *arena = pal_arena_create(1 << 16, true);
     pal_plan plan;
-    REQUIRE(!pal_plan_build(scene, arena, &note, &plan));
+    REQUIRE(!pal_plan_build(scene, arena, &diag, &plan));
     pal_body *body = &plan.body[0];
     for (int i = 0; i < 12; i++) body->x[i] *= s;
     for (int r = 0; r < plan.n_row; r++) {
-        const pal_row *row = &plan.row[r];
+        const pal_component *row = &plan.row[r];
         if (!row->effect->energy) continue;
         int power = !strcmp(row->effect->name, "edge_distance") ? 1 : !strcmp(row->effect->name, "face_area") ? 2 : 3;
         int many = power == 1 ? 6 : power == 2 ? 4 : 1;
@@ -260,7 +260,7 @@ static pal_world *open_free(pal_prepared *box, pal_scene **scene)
     (*scene)->body[0].material.damping_1_s = 0;
     (*scene)->body[0].n_effect = 0;
     pal_world *world;
-    if (pal_world_create(*scene, &note, &world)) return NULL;
+    if (pal_world_create(*scene, &diag, &world)) return NULL;
     pal_body *body = pal_world_body(world, 0);
     seed = 3;
     for (int i = 0; i < 3 * body->n_dof; i++) body->v[i] = 0.05 * uniform() + (i % 3 == 0 ? 0.1 : 0);
@@ -306,8 +306,8 @@ static double energy_in_phase_J(pal_world *world, double dt_s)
     pal_step step = {.body = body};
     double sum = pal_world_energy_J(world) - pal_body_kinetic_J(body);
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        const pal_row *row = pal_world_effect(world, i);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *row = pal_world_component(world, i);
         if (row->effect->stage == PAL_STAGE_FORCE) row->effect->run(row->self, &step);
     }
     for (int i = 0; i < 3 * body->n_dof; i++) {
@@ -372,12 +372,12 @@ static void restores_volume_and_area_after_a_squeeze(void)
     pal_scene *scene = box_scene(&box, true, false);
     scene->body[0].material.damping_1_s = 20;
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     double v0 = volume(body), a0 = surface_area(body);
     CHECK_NEAR(v0, 0.06 * 0.04 * 0.04, 1e-15);
     for (int i = 0; i < body->n_dof; i++)
-        if (!body->held[i]) body->x[3 * i + 2] *= 0.5;
+        if (!body->fixed[i]) body->x[3 * i + 2] *= 0.5;
     CHECK_LE(volume(body), 0.6 * v0);
     for (int i = 0; i < 240; i++) REQUIRE(!pal_world_step(world, scene->step_s));
     CHECK_NEAR(volume(body) / v0, 1, 1e-6);
@@ -394,7 +394,7 @@ static void answers_a_symmetric_load_symmetrically(void)
     REQUIRE(!box_make(n[0], n[1], n[2], 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     /* the middle of the top is pulled up, both ends outwards */
     for (int j = 0; j <= n[1]; j++) {
@@ -425,7 +425,7 @@ static void drag_fades_a_free_motion_at_the_stated_rate(void)
     pal_scene *scene = box_scene(&box, false, false);
     scene->body[0].material.damping_1_s = 3;
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     for (int i = 0; i < body->n_dof; i++) body->v[3 * i] = 0.1;
     for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(world, scene->step_s));

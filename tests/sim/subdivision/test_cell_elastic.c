@@ -108,7 +108,7 @@ static void force_is_the_gradient_of_energy(void)
             cell_body b;
             double turn[9];
             cell_nth(&b, i);
-            double h = cbrt(pal_solid_volume_m3(b.solid) / pal_cell_elements_count(&b.solid->elements));
+            double h = cbrt(pal_subdivision_solid_volume_m3(b.solid) / pal_cell_elements_count(&b.solid->elements));
             cell_rotation(1.2, turn);
             cell_map(&b, turn, 0.3);
             cell_shake(&b, part[s] * h, 21);
@@ -124,7 +124,7 @@ static void force_without_the_turning_of_the_frame_would_not_be(void)
     cell_nth(&b, 0);
     cell_shake(&b, 0.3, 21);
     int n = 3 * b.body.n_node;
-    double held[24] = {0}, u[24];
+    double fixed[24] = {0}, u[24];
     cell_effect->tangent->linearise(b.row, &b.body);
     double turn[24 * 3] = {0};
     cell_effect->tangent->rotate(b.row, &b.body, turn);
@@ -135,16 +135,16 @@ static void force_without_the_turning_of_the_frame_would_not_be(void)
     for (int i = 0; i < 9; i++) r[i] *= scale;
     for (int i = 0; i < 8; i++)
         for (int c = 0; c < 3; c++) u[3 * i + c] = b.body.d[3 * i + c] - pal_dot3(r + 3 * c, b.body.node_rest + 3 * i);
-    cell_effect->tangent->multiply(b.row, &b.body, -1, 0, u, held);
+    cell_effect->tangent->multiply(b.row, &b.body, -1, 0, u, fixed);
     const double *f = cell_force(&b);
     double torque[2][3] = {{0}}, apart = 0;
     for (int i = 0; i < 8; i++)
         for (int k = 0; k < 2; k++) {
             double c[3];
-            pal_cross3(c, b.body.d + 3 * i, (k ? held : f) + 3 * i);
+            pal_cross3(c, b.body.d + 3 * i, (k ? fixed : f) + 3 * i);
             pal_axpy3(torque[k], 1, c);
         }
-    for (int i = 0; i < n; i++) apart = fmax(apart, fabs(f[i] - held[i]));
+    for (int i = 0; i < n; i++) apart = fmax(apart, fabs(f[i] - fixed[i]));
     CHECK_LE(cell_largest(torque[0], 3), 1e-10 * cell_largest(f, n));
     CHECK(cell_largest(torque[1], 3) > 1e-3 * cell_largest(f, n));
     CHECK(apart > 1e-3 * cell_largest(f, n));
@@ -159,7 +159,7 @@ static void forces_have_no_sum_and_no_torque(void)
             double turn[9], sum[3] = {0}, torque[3] = {0}, of = 0, arm = 0, c[3];
             const double part[3] = {0.01, 0.1, 0.3};
             cell_nth(&b, i);
-            double h = cbrt(pal_solid_volume_m3(b.solid) / pal_cell_elements_count(&b.solid->elements));
+            double h = cbrt(pal_subdivision_solid_volume_m3(b.solid) / pal_cell_elements_count(&b.solid->elements));
             cell_rotation(2.2, turn);
             cell_map(&b, turn, 0);
             cell_shake(&b, part[s] * h, 31);
@@ -200,7 +200,7 @@ static void uniform_strain_has_the_energy_of_the_law(void)
             cell_nth(&b, i);
             for (int k = 0; k < 9; k++) a[k] = strain[s][k] + (k % 4 == 0);
             cell_map(&b, a, 0);
-            double wanted = density_of(strain[s], 1000, 0.3) * pal_solid_volume_m3(b.solid);
+            double wanted = density_of(strain[s], 1000, 0.3) * pal_subdivision_solid_volume_m3(b.solid);
             CHECK_NEAR(cell_energy(&b) / wanted, 1, 1e-6);
             cell_free(&b);
         }
@@ -260,19 +260,19 @@ static void where_kinds_meet_uniform_strain_leaves_little(void)
     /* splines and trilinear functions do not match where their elements meet, so that inner nodes there bear forces
      * under uniform stress (half of sigma h^2); what reaches inner control points is 1.2 % of what outer ones bear */
     cell_body b;
-    double inner = 0, outer = 0;
+    double inner = 0, external_force = 0;
     cell_must(&b, solid_block(3, 3, 3), 2);
     CHECK_INT(b.solid->elements.n[PAL_CELL_CUBIC], 1000);
     CHECK_INT(b.solid->elements.n[PAL_CELL_HEX], 728);
     cell_map(&b, (double[9]){1.01, 0, 0, 0, 1, 0, 0, 0, 1}, 0);
     double *g = calloc(3 * (size_t)b.body.n_dof, sizeof *g);
-    pal_point_rows_pull(b.body.embed, cell_force(&b), g);
+    pal_interpolation_apply_transpose(b.body.interpolation, cell_force(&b), g);
     for (int i = 0; i < b.body.n_dof; i++) {
-        double *most = cell_largest(b.cells.x + 3 * i, 3) < 1 ? &inner : &outer;
+        double *most = cell_largest(b.cells.x + 3 * i, 3) < 1 ? &inner : &external_force;
         *most = fmax(*most, pal_norm3(g + 3 * i));
     }
     CHECK(inner > 0);
-    CHECK_LE(inner, 0.015 * outer);
+    CHECK_LE(inner, 0.015 * external_force);
     free(g);
     cell_free(&b);
 }
@@ -286,14 +286,14 @@ static void young_that_varies_inside_an_element_is_integrated_exactly(void)
         b.def->material.poisson = 0;
         CHECK_INT(cell_make(&b, 0), PAL_ERR_OK);
         pal_cell_kind of = kind == 0 ? PAL_CELL_HEX : PAL_CELL_CUBIC;
-        for (int p = 0; p < PAL_CELL_POINTS; p++) {
+        for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
             double at[3], x[3];
-            pal_cell_point(p, at);
+            pal_cell_gauss_point(p, at);
             double n[64];
             pal_cell_shape(pal_cell_kind_nodes(of), at, n, NULL);
             memset(x, 0, sizeof x);
             for (int m = 0; m < pal_cell_kind_nodes(of); m++)
-                pal_axpy3(x, n[m], b.solid->node_rest + 3 * (size_t)pal_solid_nodes(b.solid, of, 0)[m]);
+                pal_axpy3(x, n[m], b.solid->node_rest + 3 * (size_t)pal_subdivision_solid_nodes(b.solid, of, 0)[m]);
             b.solid->samples[of].young_Pa[p] = (float)(1000 + 500 * x[1]);
         }
         b.solid->sampled++;
@@ -331,7 +331,7 @@ static void painting_takes_effect(void)
     cell_map(&b, (double[9]){1.01, 0, 0, 0, 1, 0, 0, 0, 1}, 0);
     double was = cell_energy(&b);
     b.def->stroke = &stroke, b.def->n_stroke = 1;
-    pal_solid_sample(b.solid, b.def);
+    pal_subdivision_solid_sample(b.solid, b.def);
     CHECK_NEAR(cell_energy(&b) / was, 10, 1e-5);
     const double *f = cell_force(&b);
     CHECK(cell_largest(f, 3 * b.body.n_node) > 0);
@@ -454,7 +454,7 @@ static void products_are_those_of_the_held_tangent(void)
         /* rotations at nodes: of the body, weighing mu V together */
         cell_effect->tangent->rotate(b.row, &b.body, turn);
         const pal_material *m = &b.def->material;
-        double sum[9] = {0}, shear_J = pal_solid_volume_m3(b.solid) * m->young_Pa / (2 * (1 + m->poisson));
+        double sum[9] = {0}, shear_J = pal_subdivision_solid_volume_m3(b.solid) * m->young_Pa / (2 * (1 + m->poisson));
         for (int k = 0; k < 3 * n; k++) sum[k % 9] += turn[k];
         for (int k = 0; k < 9; k++) CHECK_NEAR(sum[k] / shear_J, r[k], 1e-5);
         free(p), free(q), free(kp), free(kq), free(turn);
@@ -478,7 +478,7 @@ static void measures_are_those_of_the_strain(void)
             pal_cell_points points;
             pal_cells_elastic_points(b.row, b.body.d, kind, b.solid->elements.n[kind] - 1, &points);
             const double e[6] = {0.02, 0, 0, 0, 0, 0};
-            for (int p = 0; p < PAL_CELL_POINTS; p += 7) {
+            for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p += 7) {
                 for (int k = 0; k < 6; k++) CHECK_NEAR(points.strain[p][k], e[k], 1e-9);
                 CHECK_NEAR(points.det_f[p], 1.02, 1e-9);
                 CHECK_NEAR(points.von_mises_Pa[p], 2 * 1000 / 2.6 * 0.02, 1e-5);
@@ -490,7 +490,7 @@ static void measures_are_those_of_the_strain(void)
             CHECK_NEAR(sum[k] / volume[k], 2 * 1000 / 2.6 * 0.02, 1e-4);
             all += volume[k];
         }
-        CHECK_NEAR(all / pal_solid_volume_m3(b.solid), 1, 1e-12);
+        CHECK_NEAR(all / pal_subdivision_solid_volume_m3(b.solid), 1, 1e-12);
         memset(sum, 0, sizeof *sum * (size_t)n), all = 0;
         cell_effect->measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
         for (int k = 0; k < n; k++) all += sum[k];
@@ -505,15 +505,15 @@ static void refuses_what_it_cannot_be(void)
     cell_body b;
     void *self = NULL;
     cell_begin(&b, solid_block(1, 1, 1));
-    CHECK_INT(pal_item_put_text(&b.item, "operator", "cosine", &b.note), PAL_ERR_OK);
+    CHECK_INT(pal_entry_put_text(&b.item, "operator", "cosine", &b.diag), PAL_ERR_OK);
     CHECK_INT(cell_make(&b, 0), PAL_ERR_REFUSED);
-    CHECK_TEXT(b.note.text, "model.operator: \"cosine\" is neither polar nor edges");
+    CHECK_TEXT(b.diag.text, "model.operator: \"cosine\" is neither polar nor edges");
     pal_body none = {0};
-    pal_build build = {.body = &none, .arena = b.arena, .note = &b.note};
-    pal_item item;
-    pal_item_init(&item, "effects[1]", "cell_elastic");
+    pal_build build = {.body = &none, .arena = b.arena, .diag = &b.diag};
+    pal_config_entry item;
+    pal_entry_init(&item, "effects[1]", "cell_elastic");
     CHECK_INT(cell_effect->make(&item, &build, &self), PAL_ERR_REFUSED);
-    CHECK_TEXT(b.note.text, "effects[1]: \"cell_elastic\" needs a body of model subdivision_fem");
+    CHECK_TEXT(b.diag.text, "effects[1]: \"cell_elastic\" needs a body of model subdivision_fem");
     CHECK(self == NULL);
     cell_free(&b);
 }

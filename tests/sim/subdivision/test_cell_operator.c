@@ -5,8 +5,8 @@
 static void edges_body(cell_body *b, pal_cells cells, int n_level)
 {
     cell_begin(b, cells);
-    CHECK_INT(pal_item_put_text(&b->item, "operator", "edges", &b->note), PAL_ERR_OK);
-    if (cell_make(b, n_level)) CHECK_FAIL("%s", b->note.text);
+    CHECK_INT(pal_entry_put_text(&b->item, "operator", "edges", &b->diag), PAL_ERR_OK);
+    if (cell_make(b, n_level)) CHECK_FAIL("%s", b->diag.text);
     CHECK_INT(b->row->op, PAL_CELL_EDGES);
 }
 static void edges_nth(cell_body *b, int i)
@@ -73,7 +73,7 @@ static void a_hexahedron_moves_as_its_edges_say_and_twice_that_as_printed(void)
         const double *map = s ? shear : stretch;
         double d[8][3], printed[8][3], wanted[8][3], apart;
         edges_body(&b, solid_bricks(1, 1, 1, 1, s ? 1 : 2, s ? 1 : 3), 0);
-        const int32_t *node = pal_solid_nodes(b.solid, PAL_CELL_HEX, 0);
+        const int32_t *node = pal_subdivision_solid_nodes(b.solid, PAL_CELL_HEX, 0);
         cell_map(&b, map, 0);
         for (int m = 0; m < 8; m++) pal_sub3(wanted[m], b.body.d + 3 * node[m], b.body.node_rest + 3 * node[m]);
         pal_cells_elastic_displaced(b.row, b.body.d, PAL_CELL_HEX, 0, d[0]);
@@ -95,7 +95,7 @@ static void sums_along_lines_move_the_lattice_as_it_is_moved(void)
         double d[64][3], wanted[64][3], apart, turn[9];
         edges_body(&b, solid_block(3, 3, 3), 0);
         CHECK_INT(b.solid->elements.n[PAL_CELL_CUBIC], 1);
-        const int32_t *node = pal_solid_nodes(b.solid, PAL_CELL_CUBIC, 0);
+        const int32_t *node = pal_subdivision_solid_nodes(b.solid, PAL_CELL_CUBIC, 0);
         cell_map(&b, map[s], 0);
         for (int m = 0; m < 64; m++) pal_sub3(wanted[m], b.body.d + 3 * node[m], b.body.node_rest + 3 * node[m]);
         pal_cells_elastic_displaced(b.row, b.body.d, PAL_CELL_CUBIC, 0, d[0]);
@@ -122,7 +122,7 @@ static void an_apex_goes_up_two_thirds_of_what_it_is_drawn(void)
     cell_body b;
     edges_nth(&b, 2);
     CHECK(b.solid->elements.n[PAL_CELL_PYRAMID] > 0);
-    const int32_t *node = pal_solid_nodes(b.solid, PAL_CELL_PYRAMID, 0);
+    const int32_t *node = pal_subdivision_solid_nodes(b.solid, PAL_CELL_PYRAMID, 0);
     double up[3] = {0, 0, 0}, d[5][3], base[3] = {0, 0, 0};
     for (int m = 0; m < 4; m++) pal_axpy3(up, -0.25, b.body.d + 3 * node[m]);
     pal_axpy3(up, 1, b.body.d + 3 * node[4]);

@@ -11,7 +11,7 @@ static void make(cell_body *b, int i, double poisson)
                   : i == 2 ? cell_pyramids()
                            : solid_block(2, 1, 1));
     b->def->material.poisson = poisson;
-    if (cell_make(b, level[i])) CHECK_FAIL("%s", b->note.text);
+    if (cell_make(b, level[i])) CHECK_FAIL("%s", b->diag.text);
 }
 enum { BODIES = 4 };
 
@@ -42,7 +42,8 @@ static void uniform_strains_cost_what_they_should(void)
             make(&b, i, nu);
             for (int c = 0; c < 9; c++) a[c] = strain[k][c] + (c % 4 == 0), square += strain[k][c] * strain[k][c];
             cell_map(&b, a, 0);
-            const double wanted = (mu * square + 0.5 * lambda * trace * trace) * pal_solid_volume_m3(b.solid);
+            const double wanted =
+                (mu * square + 0.5 * lambda * trace * trace) * pal_subdivision_solid_volume_m3(b.solid);
             CHECK_NEAR(cell_energy(&b) / wanted, 1, 2e-3);
             cell_free(&b);
         }
@@ -58,7 +59,7 @@ static void forces_are_the_gradient_and_sum_up_to_nothing(void)
         double *x = calloc(2 * (size_t)n, sizeof *x), *p = x + n;
         cell_rotation(1.2, turn);
         cell_map(&b, turn, 0.3);
-        cell_shake(&b, 0.1 * cbrt(pal_solid_volume_m3(b.solid) / b.row->tangle.n_cell), 21);
+        cell_shake(&b, 0.1 * cbrt(pal_subdivision_solid_volume_m3(b.solid) / b.row->recovery.n_cell), 21);
         memcpy(x, b.body.d, sizeof *x * (size_t)n);
         for (int k = 0; k < 4; k++) {
             for (int m = 0; m < n; m++) p[m] = 2 * pal_random_unit(11 + (uint64_t)k, (uint64_t)m) - 1;
@@ -140,12 +141,12 @@ static void patches_take_whole_control_cells(void)
     for (int m = 0; m < b.body.n_node; m++)
         if (b.body.d[3 * m] + b.body.d[3 * m + 1] > b.body.d[3 * far] + b.body.d[3 * far + 1]) far = m;
     b.body.d[3 * far] -= 2;
-    CHECK(cell_effect->untangle(b.row, &(pal_step){.body = &b.body}) & PAL_TANGLE_CHANGED);
+    CHECK(cell_effect->recover(b.row, &(pal_step){.body = &b.body}) & PAL_INVERSION_CHANGED);
     int of[2] = {0, 0}, all[2] = {0, 0};
-    for (int e = 0; e < b.row->tangle.n_cell; e++) {
-        int kind = e >= b.row->tangle.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;
-        int home = b.row->group[kind].home[e - b.row->tangle.first[kind]];
-        all[home]++, of[home] += b.row->tangle.patch[e] >= 0;
+    for (int e = 0; e < b.row->recovery.n_cell; e++) {
+        int kind = e >= b.row->recovery.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;
+        int home = b.row->group[kind].home[e - b.row->recovery.first[kind]];
+        all[home]++, of[home] += b.row->recovery.patch[e] >= 0;
     }
     CHECK_INT(all[0] + all[1], 128);
     for (int h = 0; h < 2; h++) CHECK(of[h] == 0 || of[h] == all[h]);

@@ -2,7 +2,7 @@
  * its inner nodes. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/solid.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/solids.h"
 
@@ -29,7 +29,7 @@ static void clay_make(clay *c)
     c->scene->n_body = 1;
     c->def = &c->scene->body[0];
     pal_body_default_cells(c->def, "clay", &c->mesh, &c->cells);
-    if (pal_item_put_number(&c->def->model, "levels", 1, NULL)) abort();
+    if (pal_entry_put_number(&c->def->model, "levels", 1, NULL)) abort();
 }
 
 static void cut_at(clay *c, double x, double y, double z, double offset_m)
@@ -41,8 +41,8 @@ static void cut_at(clay *c, double x, double y, double z, double offset_m)
 
 static bool clay_start(clay *c)
 {
-    pal_note note = {""};
-    if (pal_world_create(c->scene, &note, &c->world)) CHECK_FAIL("%s", note.text);
+    pal_diagnostic diag = {""};
+    if (pal_world_create(c->scene, &diag, &c->world)) CHECK_FAIL("%s", diag.text);
     if (c->world) c->body = pal_world_body(c->world, 0);
     return c->world != NULL;
 }
@@ -111,7 +111,7 @@ static void fields_colour_the_cut(void)
         double *x = c.body->x + 3 * i;
         x[0] = r[0] * (1 + kappa * r[2]);
     }
-    pal_world_moved(c.world, 0);
+    pal_world_invalidate_limits(c.world, 0);
     REQUIRE(!pal_world_field(c.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
     const float *value = c.body->field[PAL_FIELD_ENERGY_J_M3]->value;
     double low = 0, high = 0;

@@ -2,8 +2,8 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
-#include "server/sim/subdivision/solid.h"
-#include "server/sim/subdivision/solid_mass.h"
+#include "server/sim/subdivision/subdivision_mass.h"
+#include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/solids.h"
 #include "tests/heap_calls.h"
@@ -18,7 +18,7 @@ typedef struct clay {
     pal_plan plan;
     pal_world *world;
     pal_body *body;
-    pal_note note;
+    pal_diagnostic diag;
 } clay;
 
 /* takes the cells */
@@ -37,35 +37,35 @@ static void clay_take(clay *c, pal_cells cells)
     pal_body_default_cells(c->def, "clay", &c->mesh, &c->cells);
 }
 
-static void clay_block(clay *c, int n, double size_m)
+static void clay_block(clay *c, int n, double length_scale_m)
 {
-    clay_take(c, solid_bricks(n, n, n, size_m / n, size_m / n, size_m / n));
+    clay_take(c, solid_bricks(n, n, n, length_scale_m / n, length_scale_m / n, length_scale_m / n));
 }
 
 /* a cube of six pyramids: pyramids are left whatever the levels */
-static void clay_pyramids(clay *c, double size_m)
+static void clay_pyramids(clay *c, double length_scale_m)
 {
     pal_cells cells = solid_pyramids();
-    for (int32_t i = 0; i < 3 * cells.n_vertex; i++) cells.x[i] *= size_m / 2;
+    for (int32_t i = 0; i < 3 * cells.n_vertex; i++) cells.x[i] *= length_scale_m / 2;
     clay_take(c, cells);
 }
 
 static void clay_number(clay *c, const char *key, double number)
 {
-    if (pal_item_put_number(&c->def->model, key, number, NULL)) abort();
+    if (pal_entry_put_number(&c->def->model, key, number, NULL)) abort();
 }
 
 static bool clay_plan(clay *c)
 {
     c->arena = pal_arena_create(1 << 20, true);
-    if (pal_plan_build(c->scene, c->arena, &c->note, &c->plan)) CHECK_FAIL("%s", c->note.text);
+    if (pal_plan_build(c->scene, c->arena, &c->diag, &c->plan)) CHECK_FAIL("%s", c->diag.text);
     c->body = c->plan.body;
     return c->body != NULL;
 }
 
 static bool clay_start(clay *c)
 {
-    if (pal_world_create(c->scene, &c->note, &c->world)) CHECK_FAIL("%s", c->note.text);
+    if (pal_world_create(c->scene, &c->diag, &c->world)) CHECK_FAIL("%s", c->diag.text);
     if (c->world) c->body = pal_world_body(c->world, 0);
     return c->world != NULL;
 }
@@ -80,7 +80,7 @@ static void clay_close(clay *c)
     free(c->scene);
 }
 
-static const pal_row *clay_row(const clay *c, const char *name)
+static const pal_component *clay_row(const clay *c, const char *name)
 {
     for (int i = 0; i < c->plan.n_row; i++)
         if (!strcmp(c->plan.row[i].effect->name, name)) return &c->plan.row[i];
@@ -108,7 +108,7 @@ static void blocks_have_the_elements_of_the_paper(void)
         CHECK_INT(c.body->n_dof, (block[k].n + 1) * (block[k].n + 1) * (block[k].n + 1));
         CHECK_INT(c.body->n_shown, block[k].shown);
         CHECK_INT(c.body->surface->n_tri, 2 * (block[k].shown - 2));
-        CHECK_NEAR(c.body->h_m, cbrt(pal_solid_volume_m3(c.body->solid) / block[k].all), 1e-15);
+        CHECK_NEAR(c.body->edge_m, cbrt(pal_subdivision_solid_volume_m3(c.body->solid) / block[k].all), 1e-15);
         clay_close(&c);
     }
 }
@@ -116,15 +116,16 @@ static void blocks_have_the_elements_of_the_paper(void)
 static void rows_are_those_that_the_material_asks_for(void)
 {
     static const char *const want[2][9] = {
-        {"tool_push", "tool_grab", "cell_elastic", "gravity", "central_cg", "finite_guard", "surface_out"},
-        {"tool_push", "tool_grab", "cell_elastic", "viscous", "gravity", "central_cg", "finite_guard", "surface_out"}};
+        {"tool_push", "tool_grasp", "cell_elastic", "gravity", "central_cg", "finite_guard", "surface_output"},
+        {"tool_push", "tool_grasp", "cell_elastic", "viscous", "gravity", "central_cg", "finite_guard",
+         "surface_output"}};
     for (int k = 0; k < 2; k++) {
         clay c;
         clay_block(&c, 2, 0.1);
         c.def->material.damping_1_s = k ? 4 : 0;
-        pal_item_put_text(&c.def->model, "operator", "edges", NULL);
+        pal_entry_put_text(&c.def->model, "operator", "edges", NULL);
         /* the default of other bodies, which needs a skin */
-        if (k) pal_item_init(&c.def->output, "output", "skin_out");
+        if (k) pal_entry_init(&c.def->output, "output", "skin_output");
         REQUIRE(clay_plan(&c));
         CHECK_INT(c.plan.n_row, 7 + k);
         for (int i = 0; i < c.plan.n_row; i++) CHECK_TEXT(c.plan.row[i].effect->name, want[k][i]);
@@ -143,14 +144,14 @@ static void masses_of_points_and_of_nodes_sum_up_to_the_solids(void)
             clay_block(&c, 3, 0.1);
         c.def->material.density_kg_m3 = 1100;
         REQUIRE(clay_plan(&c));
-        double mass = pal_solid_mass_kg(c.body->solid);
+        double mass = pal_subdivision_solid_mass_kg(c.body->solid);
         for (int i = 0; i < c.body->n_dof; i++) point += c.body->mass_kg[i];
         for (int i = 0; i < c.body->n_node; i++) node += c.body->node_mass_kg[i];
         for (int i = 0; i < c.body->mass_operator->n_entry; i++) entry += c.body->mass_operator->mass_kg[i];
         CHECK_NEAR(point / mass, 1, 1e-12);
         CHECK_NEAR(node / mass, 1, 1e-12);
         CHECK_NEAR(entry / mass, 1, 1e-12);
-        CHECK_NEAR(mass / (1100 * pal_solid_volume_m3(c.body->solid)), 1, 1e-6);
+        CHECK_NEAR(mass / (1100 * pal_subdivision_solid_volume_m3(c.body->solid)), 1, 1e-6);
         clay_close(&c);
     }
 }
@@ -162,17 +163,17 @@ static void supports_hold_control_points(void)
     clay_block(&c, 3, 0.1);
     REQUIRE(clay_plan(&c));
     for (int i = 0; i < c.body->n_dof; i++) {
-        n_held += c.body->held[i];
-        CHECK_INT(c.body->held[i], c.body->x_rest[3 * i + 2] < -0.049);
+        n_held += c.body->fixed[i];
+        CHECK_INT(c.body->fixed[i], c.body->x_rest[3 * i + 2] < -0.049);
     }
     CHECK_INT(n_held, 16);
     clay_close(&c);
 
     clay_block(&c, 3, 0.1);
-    c.def->support[0] = (pal_support){.low_m = {-1, -1, -1}, .high_m = {-0.04, -0.04, 1}};
+    c.def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, -0.04, 1}};
     REQUIRE(clay_plan(&c));
     n_held = 0;
-    for (int i = 0; i < c.body->n_dof; i++) n_held += c.body->held[i];
+    for (int i = 0; i < c.body->n_dof; i++) n_held += c.body->fixed[i];
     CHECK_INT(n_held, 4);
     clay_close(&c);
 }
@@ -190,7 +191,7 @@ static void the_surface_is_the_boundary_of_the_subdivided_cells(void)
         const pal_body *b = c.body;
         CHECK(!pal_surface_check(b->surface, &facts));
         CHECK(facts.closed && facts.manifold && facts.oriented);
-        CHECK_NEAR(pal_surface_volume(b->surface) / pal_solid_volume_m3(b->solid), 1, 0.01);
+        CHECK_NEAR(pal_surface_volume(b->surface) / pal_subdivision_solid_volume_m3(b->solid), 1, 0.01);
         for (int i = 0; i < b->n_shown; i++) {
             CHECK(b->shown_node[i] < b->solid->elements.n_vertex);
             CHECK_NEAR(pal_dist3(b->surface->x + 3 * i, b->node_rest + 3 * b->shown_node[i]), 0, 1e-16);
@@ -223,7 +224,7 @@ static void a_cut_shows_what_it_hid(void)
     REQUIRE(clay_plan(&c));
     CHECK(!pal_surface_check(c.body->surface, &facts));
     CHECK(facts.closed && facts.manifold && facts.oriented);
-    CHECK_NEAR(pal_surface_volume(c.body->surface) / pal_solid_volume_m3(c.body->solid), 0.5, 1e-3);
+    CHECK_NEAR(pal_surface_volume(c.body->surface) / pal_subdivision_solid_volume_m3(c.body->solid), 0.5, 1e-3);
     pal_surface_box(c.body->surface, low, high);
     CHECK_NEAR(high[0], 0, 1e-6);
     for (int t = 0; t < c.body->surface->n_tri; t++) n_inner += c.body->shown_face[t] < 0;
@@ -235,8 +236,8 @@ static void a_cut_shows_what_it_hid(void)
     c.def->cut = true;
     c.def->cut_normal[0] = 1, c.def->cut_m = -1;
     c.arena = pal_arena_create(1 << 20, true);
-    CHECK_INT(pal_plan_build(c.scene, c.arena, &c.note, &c.plan), PAL_ERR_REFUSED);
-    CHECK_TEXT(c.note.text, "body \"clay\" model: the cut leaves nothing of it");
+    CHECK_INT(pal_plan_build(c.scene, c.arena, &c.diag, &c.plan), PAL_ERR_REFUSED);
+    CHECK_TEXT(c.diag.text, "body \"clay\" model: the cut leaves nothing of it");
     clay_close(&c);
 }
 
@@ -251,20 +252,20 @@ static void gravity_pulls_with_the_bodys_weight(void)
         else
             clay_block(&c, 3, 0.1);
         REQUIRE(clay_plan(&c));
-        const pal_row *row = clay_row(&c, "gravity");
+        const pal_component *row = clay_row(&c, "gravity");
         REQUIRE(row != NULL);
-        pal_step step = {.body = c.body, .force = (pal_row *)(uintptr_t)row, .n_force = 1, .dt_s = 1e-3};
-        CHECK(!pal_gather(&step));
+        pal_step step = {.body = c.body, .force = (pal_component *)(uintptr_t)row, .n_force = 1, .dt_s = 1e-3};
+        CHECK(!pal_assemble_forces(&step));
         for (int i = 0; i < c.body->n_dof; i++) pal_add3(sum, sum, c.body->g + 3 * i);
         for (int i = 0; i < c.body->n_node; i++) pal_add3(nodes, nodes, c.body->f + 3 * i);
-        double weight = 9.81 * pal_solid_mass_kg(c.body->solid);
+        double weight = 9.81 * pal_subdivision_solid_mass_kg(c.body->solid);
         CHECK_NEAR(sum[2] / weight, -1, 1e-12);
         CHECK_NEAR(nodes[2] / weight, -1, 1e-12);
         CHECK_NEAR(fabs(sum[0]) + fabs(sum[1]), 0, 1e-15 * weight);
         /* a lift of 1 cm costs m g h */
         double before = row->effect->energy(row->self, c.body);
         for (int i = 0; i < c.body->n_dof; i++) c.body->x[3 * i + 2] += 0.01;
-        pal_body_place(c.body);
+        pal_body_update_nodes(c.body);
         CHECK_NEAR((row->effect->energy(row->self, c.body) - before) / (0.01 * weight), 1, 1e-10);
         clay_close(&c);
     }
@@ -284,8 +285,8 @@ static void ease_is_what_a_nodes_impulse_gives_it(void)
         const int node = b->shown_node[k];
         double v[27] = {0}, r[27] = {0}, p[27], q[27], rr = 0, ease = 0;
         REQUIRE(n == 27);
-        for (int32_t i = b->embed->start[node]; i < b->embed->start[node + 1]; i++)
-            r[b->embed->point[i]] = b->embed->weight[i];
+        for (int32_t i = b->interpolation->start[node]; i < b->interpolation->start[node + 1]; i++)
+            r[b->interpolation->point[i]] = b->interpolation->weight[i];
         memcpy(p, r, sizeof p);
         for (int i = 0; i < n; i++) rr += r[i] * r[i];
         for (int turn = 0; turn < 200 && rr > 1e-28; turn++) {
@@ -299,11 +300,11 @@ static void ease_is_what_a_nodes_impulse_gives_it(void)
             for (int i = 0; i < n; i++) p[i] = r[i] + next / rr * p[i];
             rr = next;
         }
-        for (int32_t i = b->embed->start[node]; i < b->embed->start[node + 1]; i++)
-            ease += b->embed->weight[i] * v[b->embed->point[i]];
-        CHECK_NEAR(b->node_ease_1_kg[node] / ease, 1, 1e-6);
+        for (int32_t i = b->interpolation->start[node]; i < b->interpolation->start[node + 1]; i++)
+            ease += b->interpolation->weight[i] * v[b->interpolation->point[i]];
+        CHECK_NEAR(b->node_inverse_mass_1_kg[node] / ease, 1, 1e-6);
         /* a node is never heavier than the body */
-        CHECK_LE(1 / pal_solid_mass_kg(b->solid), ease * (1 + 1e-9));
+        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->solid), ease * (1 + 1e-9));
     }
     clay_close(&c);
 }
@@ -317,18 +318,18 @@ static void edits_of_material_reach_masses_and_samples(void)
     clay_block(&c, 2, 0.1);
     c.def->n_stroke = 1, c.def->stroke = &stroke;
     REQUIRE(clay_start(&c));
-    const pal_solid *solid = c.body->solid;
-    double mass = pal_solid_mass_kg(solid), ease = c.body->node_ease_1_kg[c.body->shown_node[0]];
-    CHECK(mass > 1000 * pal_solid_volume_m3(solid) * (1 + 1e-3));
+    const pal_subdivision_solid *solid = c.body->solid;
+    double mass = pal_subdivision_solid_mass_kg(solid), ease = c.body->node_inverse_mass_1_kg[c.body->shown_node[0]];
+    CHECK(mass > 1000 * pal_subdivision_solid_volume_m3(solid) * (1 + 1e-3));
     float young = 0;
     for (int e = 0; e < 64 * solid->elements.n[PAL_CELL_HEX]; e++)
         young = fmaxf(young, solid->samples[PAL_CELL_HEX].young_Pa[e]);
     CHECK_NEAR((double)young, 50000, 1e-2);
     pal_material to = c.def->material;
     to.young_Pa = 8000, to.density_kg_m3 = 1500;
-    CHECK_INT(pal_world_material(c.world, 0, &to, &c.note), 0);
-    CHECK_NEAR(pal_solid_mass_kg(solid) / mass, 1.5, 1e-6);
-    CHECK_NEAR(c.body->node_ease_1_kg[c.body->shown_node[0]] * 1.5 / ease, 1, 1e-6);
+    CHECK_INT(pal_world_material(c.world, 0, &to, &c.diag), 0);
+    CHECK_NEAR(pal_subdivision_solid_mass_kg(solid) / mass, 1.5, 1e-6);
+    CHECK_NEAR(c.body->node_inverse_mass_1_kg[c.body->shown_node[0]] * 1.5 / ease, 1, 1e-6);
     double sum = 0;
     for (int i = 0; i < c.body->n_dof; i++) sum += c.body->mass_kg[i];
     CHECK_NEAR(sum / mass, 1.5, 1e-6);
@@ -354,10 +355,10 @@ static void nodes_stand_where_points_carry_them_after_steps_and_resets(void)
             for (int i = 0; i < 10; i++) CHECK_INT(pal_world_step(c.world, 1.0 / 60), 0);
         if (way == 1) {
             c.body->x[3 * (c.body->n_dof - 1)] += 0.01;
-            pal_world_moved(c.world, 0);
+            pal_world_invalidate_limits(c.world, 0);
         }
         if (way == 2) pal_world_reset(c.world);
-        pal_point_rows_place(c.body->embed, c.body->x, d);
+        pal_interpolation_apply(c.body->interpolation, c.body->x, d);
         for (int i = 0; i < 3 * c.body->n_node; i++) most = fmax(most, fabs(d[i] - c.body->d[i]));
         CHECK(most == 0);
         for (int i = 0; i < c.body->n_shown && way != 1; i++)
@@ -412,7 +413,7 @@ static void a_pressed_solid_pushes_back_calmly(void)
         clay c;
         clay_block(&c, 3, 0.1);
         clay_number(&c, "levels", 1);
-        pal_item_init(&c.def->solver, "solver", way ? "implicit_euler" : "");
+        pal_entry_init(&c.def->solver, "solver", way ? "implicit_euler" : "");
         pal_tools_default(c.scene, 1);
         c.scene->tool[0].radius_m = 0.01;
         c.scene->gravity_m_s2 = 0;
@@ -428,7 +429,7 @@ static void a_pressed_solid_pushes_back_calmly(void)
             for (int k = 0; k < c.body->n_shown && !way; k++)
                 deepest = fmax(deepest, 0.01 - pal_dist3(c.body->d + 3 * c.body->shown_node[k], pose.position_m));
         }
-        CHECK_INT(c.body->rescue.n_capped, 0);
+        CHECK_INT(c.body->safeguards.n_capped, 0);
         clay_close(&c);
     }
     printf("  %.3f N, implicit %.3f N, vertices up to %.2f mm inside, changes by %.2g N a step\n", force[0], force[1],
@@ -446,7 +447,7 @@ static void a_step_takes_no_heap(void)
     pal_tools_default(c.scene, 2);
     c.scene->tool[0].radius_m = c.scene->tool[1].radius_m = 0.01;
     REQUIRE(clay_start(&c));
-    CHECK_INT(pal_world_field(c.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &c.note), 0);
+    CHECK_INT(pal_world_field(c.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &c.diag), 0);
     for (int i = 0; i < CHECK_REPEATS(20, 6); i++) {
         pal_pose push = {.position_m = {0, 0, 0.06 - 0.001 * i}, .quat = {1, 0, 0, 0}};
         pal_pose pull = {.position_m = {0.05 + 0.002 * i, 0, 0}, .quat = {1, 0, 0, 0}, .buttons = i > 2};
@@ -468,12 +469,12 @@ static void check_refused(const char *key, double number, const char *text, cons
     clay c;
     clay_block(&c, 2, 0.1);
     if (text)
-        pal_item_put_text(&c.def->model, key, text, NULL);
+        pal_entry_put_text(&c.def->model, key, text, NULL);
     else
         clay_number(&c, key, number);
-    pal_err err = pal_world_create(c.scene, &c.note, &c.world);
+    pal_err err = pal_world_create(c.scene, &c.diag, &c.world);
     CHECK(err == PAL_ERR_REFUSED || err == PAL_ERR_BUDGET);
-    CHECK_TEXT(c.note.text, want);
+    CHECK_TEXT(c.diag.text, want);
     clay_close(&c);
 }
 
@@ -481,10 +482,10 @@ static void check_row_refused(const char *effect, const char *want)
 {
     clay c;
     clay_block(&c, 2, 0.1);
-    pal_item_init(&c.def->effect[c.def->n_effect++], "effects[4]", effect);
-    pal_err err = pal_world_create(c.scene, &c.note, &c.world);
+    pal_entry_init(&c.def->effect[c.def->n_effect++], "effects[4]", effect);
+    pal_err err = pal_world_create(c.scene, &c.diag, &c.world);
     CHECK_INT(err, PAL_ERR_REFUSED);
-    CHECK_TEXT(c.note.text, want);
+    CHECK_TEXT(c.diag.text, want);
     clay_close(&c);
 }
 
@@ -511,29 +512,29 @@ static void what_makes_no_sense_is_refused_in_a_sentence(void)
     clay c;
     clay_block(&c, 2, 0.1);
     c.def->cells = NULL;
-    CHECK_INT(pal_world_create(c.scene, &c.note, &c.world), PAL_ERR_REFUSED);
-    CHECK_TEXT(c.note.text, "body \"clay\" model: \"subdivision_fem\" works on control cells, and the body has none");
+    CHECK_INT(pal_world_create(c.scene, &c.diag, &c.world), PAL_ERR_REFUSED);
+    CHECK_TEXT(c.diag.text, "body \"clay\" model: \"subdivision_fem\" works on control cells, and the body has none");
     c.def->cells = &c.cells;
-    pal_item_init(&c.def->model, "model", "fem");
-    CHECK_INT(pal_world_create(c.scene, &c.note, &c.world), PAL_ERR_REFUSED);
-    CHECK_TEXT(c.note.text, "body \"clay\" model: \"fem\" does not take control cells; \"subdivision_fem\" does");
+    pal_entry_init(&c.def->model, "model", "fem");
+    CHECK_INT(pal_world_create(c.scene, &c.diag, &c.world), PAL_ERR_REFUSED);
+    CHECK_TEXT(c.diag.text, "body \"clay\" model: \"fem\" does not take control cells; \"subdivision_fem\" does");
     clay_close(&c);
 
     /* a stroke without a radius */
     static const pal_stroke stroke = {.young_factor = 1, .density_factor = 1};
     clay_block(&c, 2, 0.1);
     c.def->n_stroke = 1, c.def->stroke = &stroke;
-    CHECK_INT(pal_world_create(c.scene, &c.note, &c.world), PAL_ERR_REFUSED);
-    CHECK_TEXT(c.note.text, "body \"clay\" strokes[0].radius_m: 0, wanted more than 0");
+    CHECK_INT(pal_world_create(c.scene, &c.diag, &c.world), PAL_ERR_REFUSED);
+    CHECK_TEXT(c.diag.text, "body \"clay\" strokes[0].radius_m: 0, wanted more than 0");
     clay_close(&c);
 
     /* more than the stated memory, with both numbers */
     clay_block(&c, 3, 0.1);
     clay_number(&c, "levels", 4);
     clay_number(&c, "memory_MB", 20);
-    CHECK_INT(pal_world_create(c.scene, &c.note, &c.world), PAL_ERR_BUDGET);
-    CHECK(!strncmp(c.note.text, "body \"clay\" model: ", 19));
-    CHECK(strstr(c.note.text, "20") != NULL);
+    CHECK_INT(pal_world_create(c.scene, &c.diag, &c.world), PAL_ERR_BUDGET);
+    CHECK(!strncmp(c.diag.text, "body \"clay\" model: ", 19));
+    CHECK(strstr(c.diag.text, "20") != NULL);
     clay_close(&c);
 }
 

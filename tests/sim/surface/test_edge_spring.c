@@ -1,6 +1,6 @@
 /* Springs of adaptive surfaces: forces, energies, bounds, laws and constants on every mixture of levels. */
+#include "tests/fixtures/adaptive_plan.h"
 #include "tests/fixtures/boxes.h"
-#include "tests/fixtures/shell_plan.h"
 
 /* shape 0: a sphere, 1: the stomach, 2: a sheet; a mixture of three levels, no anchors */
 static bool open_mixture(shell_plan *p, int shape, const char *law, double c_Ns_m)
@@ -32,11 +32,11 @@ static void force_is_minus_the_gradient_of_energy(void)
         for (int law = 0; law < 2; law++) {
             shell_plan p;
             REQUIRE(open_mixture(&p, shape, laws[law], 0));
-            const pal_row *row = shell_plan_row(&p, "edge_spring");
+            const pal_component *row = shell_plan_row(&p, "edge_spring");
             shell_plan_shake(&p, 0.1, 0);
-            p.shell->spring_ramp = 0.7;
+            p.adaptive->spring_ramp = 0.7;
             shell_plan_force(&p, row);
-            double most = largest(&p), worst = 0, step = 1e-6 * p.body->h_m;
+            double most = largest(&p), worst = 0, step = 1e-6 * p.body->edge_m;
             CHECK(most > 0.01);
             for (int k = 0; k < p.body->n_active; k += 3)
                 for (int c = 0; c < 3; c++) {
@@ -72,7 +72,7 @@ static void no_net_force_or_torque_whatever_the_motion(void)
         }
         CHECK(sum > 0.1);
         CHECK_LE(pal_norm3(force), 1e-13 * sum);
-        CHECK_LE(pal_norm3(torque), 1e-13 * sum * p.body->size_m);
+        CHECK_LE(pal_norm3(torque), 1e-13 * sum * p.body->length_scale_m);
         shell_plan_close(&p);
     }
 }
@@ -83,13 +83,13 @@ static void rest_force_is_zero_on_every_mixture(void)
         for (int law = 0; law < 2; law++) {
             shell_plan p;
             REQUIRE(open_mixture(&p, shape, laws[law], 0.05));
-            const pal_row *row = shell_plan_row(&p, "edge_spring");
+            const pal_component *row = shell_plan_row(&p, "edge_spring");
             double k_0 = sqrt(3) / 2 * 5000 * 0.003;
             for (int round = 0; round < 5; round++) {
                 /* nodes that a split put on the straight middle of a bent surface go to their rest places */
                 shell_plan_shake(&p, 0, 0);
                 shell_plan_force(&p, row);
-                CHECK_LE(largest(&p), 1e-13 * k_0 * p.body->h_m);
+                CHECK_LE(largest(&p), 1e-13 * k_0 * p.body->edge_m);
                 CHECK_LE(row->effect->energy(row->self, p.body), 1e-28 * k_0);
                 shell_plan_mix(&p, 10);
             }
@@ -120,13 +120,13 @@ static void damping_takes_energy_and_leaves_momentum(void)
     CHECK_LE(pal_norm3(net), 1e-12 * sum);
     /* -sum c share ((dv.d)/l)^2, spring by spring */
     double want = 0;
-    for (int s = 0; s < p.shell->n_spring; s++) {
-        const int32_t *end = p.shell->levels.edge[p.shell->spring[s]].vertex;
+    for (int s = 0; s < p.adaptive->n_spring; s++) {
+        const int32_t *end = p.adaptive->levels.edge[p.adaptive->spring[s]].vertex;
         double d[3], dv[3];
         pal_sub3(d, p.body->x + 3 * end[1], p.body->x + 3 * end[0]);
         pal_sub3(dv, p.body->v + 3 * end[1], p.body->v + 3 * end[0]);
         double rate = pal_dot3(dv, d) / pal_norm3(d);
-        want -= 0.05 * (double)p.shell->spring_share[s] * rate * rate;
+        want -= 0.05 * (double)p.adaptive->spring_share[s] * rate * rate;
     }
     CHECK_NEAR(power / want, 1, 1e-10);
     /* a rigid motion is not damped */
@@ -150,12 +150,12 @@ static void springs_without_length_push_open(void)
     double k_0 = sqrt(3) / 2 * 5000 * 0.003, *want = calloc(3 * (size_t)p.body->n_node, sizeof *want), worst = 0;
     shell_plan_shake(&p, 0, 1);
     for (int k = 0; k < p.body->n_active; k++) pal_set3(p.body->x + 3 * pal_body_point(p.body, k), 0.01, 0.02, 0.03);
-    for (int s = 0; s < p.shell->n_spring; s++) {
-        const int32_t *end = p.shell->levels.edge[p.shell->spring[s]].vertex;
+    for (int s = 0; s < p.adaptive->n_spring; s++) {
+        const int32_t *end = p.adaptive->levels.edge[p.adaptive->spring[s]].vertex;
         double d[3];
         pal_sub3(d, p.body->x_rest + 3 * end[1], p.body->x_rest + 3 * end[0]);
-        pal_axpy3(want + 3 * end[1], k_0 * (double)p.shell->spring_share[s], d);
-        pal_axpy3(want + 3 * end[0], -k_0 * (double)p.shell->spring_share[s], d);
+        pal_axpy3(want + 3 * end[1], k_0 * (double)p.adaptive->spring_share[s], d);
+        pal_axpy3(want + 3 * end[0], -k_0 * (double)p.adaptive->spring_share[s], d);
     }
     shell_plan_force(&p, shell_plan_row(&p, "edge_spring"));
     for (int i = 0; i < 3 * p.body->n_node; i++) worst = fmax(worst, fabs(p.body->f[i] - want[i]));
@@ -166,12 +166,12 @@ static void springs_without_length_push_open(void)
     double dt = 0.5 * shell_plan_limit(&p), sum = 0;
     shell_plan_run(&p, 1500, dt);
     CHECK(pal_body_finite(p.body));
-    for (int s = 0; s < p.shell->n_spring; s++) {
-        const int32_t *end = p.shell->levels.edge[p.shell->spring[s]].vertex;
+    for (int s = 0; s < p.adaptive->n_spring; s++) {
+        const int32_t *end = p.adaptive->levels.edge[p.adaptive->spring[s]].vertex;
         sum += pal_dist3(p.body->x + 3 * end[1], p.body->x + 3 * end[0]) /
                pal_dist3(p.body->x_rest + 3 * end[1], p.body->x_rest + 3 * end[0]);
     }
-    CHECK_NEAR(sum / p.shell->n_spring, 1, 0.1);
+    CHECK_NEAR(sum / p.adaptive->n_spring, 1, 0.1);
     shell_plan_close(&p);
 }
 
@@ -200,7 +200,7 @@ static void sheet_of_equilateral_triangles_stretches_as_its_material(void)
         shell_scene_number(&p.s, "thickness_m", 0.002);
         REQUIRE(shell_plan_open(&p));
         if (level == 3) shell_plan_mix(&p, 40);
-        const pal_row *row = shell_plan_row(&p, "edge_spring");
+        const pal_component *row = shell_plan_row(&p, "edge_spring");
         const double strain = 1e-5, area = pal_surface_area(surface), E2D = 5000 * 0.002;
         for (int turn = 0; turn < 6; turn++) {
             double c = cos(0.3 * turn), s = sin(0.3 * turn);
@@ -227,7 +227,7 @@ static void fabric_of_square_cells_bears_seven_eighths_along_its_threads(void)
     shell_scene_number(&p.s, "k_shape_N_m", 0);
     REQUIRE(shell_plan_open(&p));
     shell_plan_mix(&p, 40);
-    const pal_row *row = shell_plan_row(&p, "edge_spring");
+    const pal_component *row = shell_plan_row(&p, "edge_spring");
     const double strain = 1e-5, area = 0.08 * 0.08;
     double least = INFINITY;
     for (int way = -1; way <= 1; way += 2) {
@@ -259,12 +259,12 @@ static void paper_law_softens_by_level(void)
         const int n[3] = {114, 450, 1794};
         double share = (1 << level) * 114.0 / n[level], sum = 0, damp = 0;
         double *bound = calloc(2 * (size_t)p.body->n_node, sizeof *bound), *c_bound = bound + p.body->n_node;
-        const pal_row *row = shell_plan_row(&p, "edge_spring");
+        const pal_component *row = shell_plan_row(&p, "edge_spring");
         row->effect->stiffness(row->self, p.body, bound);
         row->effect->damping(row->self, p.body, c_bound);
         for (int i = 0; i < p.body->n_node; i++) sum += bound[i], damp += c_bound[i];
-        CHECK_NEAR(sum / (4 * 10 * p.shell->n_spring * share), 1, 1e-6);
-        CHECK_NEAR(damp / (4 * 0.1 * p.shell->n_spring * share), 1, 1e-6);
+        CHECK_NEAR(sum / (4 * 10 * p.adaptive->n_spring * share), 1, 1e-6);
+        CHECK_NEAR(damp / (4 * 0.1 * p.adaptive->n_spring * share), 1, 1e-6);
         free(bound);
         shell_plan_close(&p);
     }
@@ -275,12 +275,12 @@ static void stiffness_bounds_the_rows_of_the_hessian(void)
 {
     shell_plan p;
     REQUIRE(open_mixture(&p, 2, "membrane", 0));
-    const pal_row *row = shell_plan_row(&p, "edge_spring");
+    const pal_component *row = shell_plan_row(&p, "edge_spring");
     size_t n = 3 * (size_t)p.body->n_node;
     double *bound = calloc(n, sizeof *bound), *sum = calloc(n, sizeof *sum), *up = calloc(n, sizeof *up);
     shell_plan_shake(&p, 0.05, 0);
     row->effect->stiffness(row->self, p.body, bound);
-    double step = 1e-7 * p.body->h_m, tight = 0;
+    double step = 1e-7 * p.body->edge_m, tight = 0;
     for (int k = 0; k < p.body->n_active; k++)
         for (int c = 0; c < 3; c++) {
             int i = 3 * pal_body_point(p.body, k) + c;
@@ -327,7 +327,7 @@ static void material_edits_and_regions_reach_the_springs(void)
                                       .low_m = {1e-6, -1, -1},
                                       .high_m = {1, 1, 1}};
         REQUIRE(shell_plan_open(&p));
-        const pal_row *row = shell_plan_row(&p, "edge_spring");
+        const pal_component *row = shell_plan_row(&p, "edge_spring");
         double k = given ? 10 : sqrt(3) / 2 * 5000 * 0.003, J[2];
         pal_material to = def->material;
         for (int edit = 0; edit < 2; edit++) {
@@ -337,12 +337,12 @@ static void material_edits_and_regions_reach_the_springs(void)
                 for (int i = 0; i < p.body->n_node; i++)
                     if ((p.body->x_rest[3 * i] > 0) == half) p.body->x[3 * i + 1] *= 1.00001;
                 J[half] = 0;
-                for (int s = 0; s < p.shell->n_spring; s++) {
-                    const int32_t *e = p.shell->levels.edge[p.shell->spring[s]].vertex;
+                for (int s = 0; s < p.adaptive->n_spring; s++) {
+                    const int32_t *e = p.adaptive->levels.edge[p.adaptive->spring[s]].vertex;
                     const double *a = p.body->x_rest + 3 * e[0], *b = p.body->x_rest + 3 * e[1];
                     double l0 = pal_dist3(a, b), l = pal_dist3(p.body->x + 3 * e[0], p.body->x + 3 * e[1]);
                     double ratio = a[0] + b[0] > 2e-6 ? 15000 / (given ? 5000 : to.young_Pa) : 1;
-                    J[half] += 0.5 * k * ratio * (double)p.shell->spring_share[s] * (l - l0) * (l - l0);
+                    J[half] += 0.5 * k * ratio * (double)p.adaptive->spring_share[s] * (l - l0) * (l - l0);
                 }
                 CHECK_NEAR(row->effect->energy(row->self, p.body) / J[half], 1, 1e-6);
             }
@@ -359,16 +359,16 @@ static void the_same_state_gives_the_same_bits(void)
 {
     shell_plan p, q;
     REQUIRE(open_mixture(&p, 1, "membrane", 0.05) && open_mixture(&q, 1, "membrane", 0.05));
-    const pal_row *row = shell_plan_row(&p, "edge_spring");
+    const pal_component *row = shell_plan_row(&p, "edge_spring");
     size_t n = 3 * sizeof(double) * (size_t)p.body->n_node;
     double *first = malloc(n);
     /* q comes to the state by another way */
-    int32_t leaf = q.shell->leaf[0];
-    if (pal_shell_split(q.shell, q.body, leaf, 0)) {
-        pal_shell_update(q.shell, q.body);
+    int32_t leaf = q.adaptive->leaf[0];
+    if (pal_adaptive_split(q.adaptive, q.body, leaf, 0)) {
+        pal_adaptive_update(q.adaptive, q.body);
         shell_plan_force(&q, shell_plan_row(&q, "edge_spring"));
-        CHECK(pal_shell_join(q.shell, q.body, leaf));
-        pal_shell_update(q.shell, q.body);
+        CHECK(pal_adaptive_join(q.adaptive, q.body, leaf));
+        pal_adaptive_update(q.adaptive, q.body);
     }
     p.seed = q.seed = 3;
     shell_plan_shake(&p, 0.2, 1);
@@ -388,23 +388,23 @@ static void other_bodies_and_implicit_solvers_are_refused(void)
 {
     pal_prepared box;
     pal_plan plan;
-    pal_note note = {{0}};
+    pal_diagnostic diag = {{0}};
     REQUIRE(!box_make(2, 2, 2, 0.01, &box));
     pal_scene *scene = box_scene(&box, false, false);
-    pal_item_init(&scene->body[0].effect[scene->body[0].n_effect++], "effects[1]", "edge_spring");
+    pal_entry_init(&scene->body[0].effect[scene->body[0].n_effect++], "effects[1]", "edge_spring");
     pal_arena *arena = pal_arena_create(1 << 20, true);
-    CHECK_INT(pal_plan_build(scene, arena, &note, &plan), PAL_ERR_REFUSED);
-    CHECK_TEXT(note.text, "effects[1]: \"edge_spring\" needs a body of model adaptive_springs");
+    CHECK_INT(pal_plan_build(scene, arena, &diag, &plan), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "effects[1]: \"edge_spring\" needs a body of model adaptive_springs");
     pal_arena_destroy(arena);
     free(scene);
     box_free(&box);
 
     shell_plan p;
     shell_plan_sphere(&p);
-    pal_item_init(&p.s.scene->body[0].solver, "solver", "implicit_euler");
+    pal_entry_init(&p.s.scene->body[0].solver, "solver", "implicit_euler");
     p.arena = pal_arena_create(1 << 20, true);
-    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.note, &p.plan), PAL_ERR_REFUSED);
-    CHECK_TEXT(p.s.note.text, "body \"shell\": row \"edge_spring\" has no tangent, which its implicit solver needs");
+    CHECK_INT(pal_plan_build(p.s.scene, p.arena, &p.s.diag, &p.plan), PAL_ERR_REFUSED);
+    CHECK_TEXT(p.s.diag.text, "body \"shell\": row \"edge_spring\" has no tangent, which its implicit solver needs");
     shell_plan_close(&p);
 }
 

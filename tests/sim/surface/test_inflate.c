@@ -1,6 +1,6 @@
 /* Filling of hollow bodies: pressure, gas, fluid (row inflate). */
-#include "tests/fixtures/shell_rows.h"
-#include "tests/fixtures/shells.h"
+#include "tests/fixtures/adaptive_components.h"
+#include "tests/fixtures/adaptive_worlds.h"
 
 static const char *const kinds[] = {"pressure", "gas", "fluid"};
 
@@ -21,9 +21,9 @@ static double drawn_volume(const shell_row *r, const double *x, double *gradient
 {
     double sum = 0;
     if (gradient) memset(gradient, 0, 3 * sizeof(double) * (size_t)r->body.n_node);
-    for (int t = 0; t < r->shell->n_tri; t++)
+    for (int t = 0; t < r->adaptive->n_tri; t++)
         for (int c = 0; c < 3; c++) {
-            const int32_t *tri = r->shell->tri + 3 * t;
+            const int32_t *tri = r->adaptive->tri + 3 * t;
             double n[3];
             pal_cross3(n, x + 3 * tri[(c + 1) % 3], x + 3 * tri[(c + 2) % 3]);
             sum += pal_dot3(x + 3 * tri[c], n) / 18;
@@ -104,8 +104,8 @@ static void gas_keeps_pressure_times_volume(void)
 {
     shell_row r;
     REQUIRE(open_row(&r, false, 2, "gas", 0));
-    pal_shell_level(r.shell, &r.body, 1);
-    pal_shell_update(r.shell, &r.body);
+    pal_adaptive_set_level(r.adaptive, &r.body, 1);
+    pal_adaptive_update(r.adaptive, &r.body);
     double rest_m3 = drawn_volume(&r, r.body.x_rest, NULL);
     CHECK_NEAR(rest_m3, 4.0 / 3 * M_PI * pow(0.05, 3), 0.02 * rest_m3);
     for (double s = 0.5; s < 2; s *= 1.1) {
@@ -143,7 +143,7 @@ static void a_switch_of_level_changes_no_energy(void)
         double coarse_m3 = drawn_volume(&r, r.body.x_rest, NULL);
         for (int turn = 0; turn < 4; turn++) {
             if (turn == 1 || turn == 2) shell_row_mix(&r, 30);
-            if (turn == 3) pal_shell_level(r.shell, &r.body, 2), pal_shell_update(r.shell, &r.body);
+            if (turn == 3) pal_adaptive_set_level(r.adaptive, &r.body, 2), pal_adaptive_update(r.adaptive, &r.body);
             blow(&r, 1.1);
             shell_row_run(&r, 10);
             double energy = shell_row_energy(&r);
@@ -279,24 +279,24 @@ static void a_surface_that_looks_inwards_is_blown_up_as_well(void)
 }
 
 /* a free sphere of radius 0.05 m on 450 nodes with this filling, no gravity, damped */
-static pal_item *world_sphere(shell_scene *s, bool anchors)
+static pal_config_entry *world_sphere(shell_scene *s, bool anchors)
 {
     pal_surface sphere;
     if (pal_sphere_make(0.05, &sphere)) abort();
     shell_scene_take(s, &sphere);
     shell_scene_number(s, "levels", 2);
     shell_scene_number(s, "start_level", 1);
-    if (pal_item_put_bool(shell_scene_model(s), "refine", false, NULL)) abort();
+    if (pal_entry_put_bool(shell_scene_model(s), "refine", false, NULL)) abort();
     if (!anchors) shell_scene_number(s, "k_shape_N_m", 0);
     s->scene->body[0].material.damping_1_s = 30;
     return shell_scene_effect(s, "inflate");
 }
 static double world_volume(const shell_scene *s, const double *x)
 {
-    const pal_shell *shell = s->body->shell;
+    const pal_adaptive_surface *adaptive = s->body->adaptive;
     double sum = 0, n[3];
-    for (int t = 0; t < shell->n_tri; t++) {
-        const int32_t *tri = shell->tri + 3 * t;
+    for (int t = 0; t < adaptive->n_tri; t++) {
+        const int32_t *tri = adaptive->tri + 3 * t;
         pal_cross3(n, x + 3 * tri[1], x + 3 * tri[2]);
         sum += pal_dot3(x + 3 * tri[0], n) / 6;
     }
@@ -308,9 +308,9 @@ static void a_sphere_grows_as_a_thin_shell_does(void)
 {
     shell_scene s;
     const double pressure_Pa = 2, young_Pa = 5000, thickness_m = 0.003;
-    pal_item *item = world_sphere(&s, false);
-    pal_item_put_number(item, "pressure_Pa", pressure_Pa, NULL);
-    pal_item_put_number(item, "ramp_s", 0.1, NULL);
+    pal_config_entry *item = world_sphere(&s, false);
+    pal_entry_put_number(item, "pressure_Pa", pressure_Pa, NULL);
+    pal_entry_put_number(item, "ramp_s", 0.1, NULL);
     REQUIRE(shell_scene_start(&s));
     CHECK_INT(s.body->n_active, 450);
     for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(s.world, 1.0 / 60));
@@ -327,12 +327,12 @@ static void a_flattened_body_is_blown_up_by_its_gas(void)
     for (int anchors = 0; anchors < 2; anchors++) {
         shell_scene s;
         double least = 1;
-        pal_item *item = world_sphere(&s, anchors);
-        pal_item_put_text(item, "kind", "gas", NULL);
-        pal_item_put_number(item, "absolute_Pa", 2000, NULL);
+        pal_config_entry *item = world_sphere(&s, anchors);
+        pal_entry_put_text(item, "kind", "gas", NULL);
+        pal_entry_put_number(item, "absolute_Pa", 2000, NULL);
         REQUIRE(shell_scene_start(&s));
         for (int i = 2; i < 3 * s.body->n_dof; i += 3) s.body->x[i] *= 0.01;
-        pal_world_moved(s.world, 0);
+        pal_world_invalidate_limits(s.world, 0);
         double rest_m3 = world_volume(&s, s.body->x_rest), energy_J = pal_world_energy_J(s.world);
         for (int i = 0; i < 120; i++) {
             REQUIRE(!pal_world_step(s.world, 1.0 / 60));
@@ -341,9 +341,9 @@ static void a_flattened_body_is_blown_up_by_its_gas(void)
             least = fmin(least, world_volume(&s, s.body->x) / rest_m3);
         }
         printf("  volume %.6f of rest, least %.3f, %.2e of the size from rest\n", world_volume(&s, s.body->x) / rest_m3,
-               least, shell_scene_rms(&s) / s.body->size_m);
+               least, shell_scene_rms(&s) / s.body->length_scale_m);
         CHECK_NEAR(world_volume(&s, s.body->x), rest_m3, 0.01 * rest_m3);
-        if (anchors) CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->size_m);
+        if (anchors) CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->length_scale_m);
         shell_scene_close(&s);
     }
 }
@@ -359,8 +359,8 @@ static void check_refused(const char *key, double number, const char *text, cons
     else
         shell_row_number(&r, key, number);
     CHECK_INT(shell_row_make(&r), PAL_ERR_REFUSED);
-    printf("  %s\n", r.note.text);
-    CHECK(strstr(r.note.text, wanted));
+    printf("  %s\n", r.diag.text);
+    CHECK(strstr(r.diag.text, wanted));
     shell_row_close(&r);
 }
 
@@ -374,13 +374,13 @@ static void refuses_what_makes_no_sense(void)
     check_refused("bulk_Pa", 20000, NULL, "gas", "bulk_Pa");
     check_refused("kind", 0, "steam", NULL, "\"steam\"");
     pal_body solid = {0};
-    pal_note note;
-    pal_build build = {.body = &solid, .note = &note};
-    pal_item item;
+    pal_diagnostic diag;
+    pal_build build = {.body = &solid, .diag = &diag};
+    pal_config_entry item;
     void *self;
-    pal_item_init(&item, "effects[0]", "inflate");
+    pal_entry_init(&item, "effects[0]", "inflate");
     CHECK_INT(pal_effect_inflate.make(&item, &build, &self), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "adaptive_springs"));
+    CHECK(strstr(diag.text, "adaptive_springs"));
 }
 
 static void refuses_an_open_surface_with_the_number_of_its_open_edges(void)
@@ -390,8 +390,8 @@ static void refuses_an_open_surface_with_the_number_of_its_open_edges(void)
     REQUIRE(!pal_sheet_make(5, 4, 0.1, 0.1, &sheet, NULL));
     REQUIRE(shell_row_open(&r, &sheet, 2, 0, "inflate"));
     CHECK_INT(shell_row_make(&r), PAL_ERR_REFUSED);
-    printf("  %s\n", r.note.text);
-    CHECK(strstr(r.note.text, "14 open edges"));
+    printf("  %s\n", r.diag.text);
+    CHECK(strstr(r.diag.text, "14 open edges"));
     shell_row_close(&r);
 }
 

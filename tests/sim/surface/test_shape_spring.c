@@ -1,6 +1,6 @@
 /* Anchors of adaptive surfaces (C eq. 10; errata C6, C7): they hold the shape and nothing else, whatever is refined. */
-#include "tests/fixtures/shell_rows.h"
-#include "tests/fixtures/shells.h"
+#include "tests/fixtures/adaptive_components.h"
+#include "tests/fixtures/adaptive_worlds.h"
 
 static const double k_N_m = 2.5, c_Ns_m = 0.03, no_move[3] = {0};
 
@@ -30,10 +30,10 @@ static void is_silent_at_rest_on_every_mixture_of_levels(void)
         REQUIRE(open_sphere(&r, 3, world ? "world" : "body", c_Ns_m));
         for (int turn = 0; turn < 4; turn++) {
             shell_row_run(&r, 1);
-            CHECK_LE(shell_row_largest(&r), 1e-14 * k_N_m * r.body.size_m);
+            CHECK_LE(shell_row_largest(&r), 1e-14 * k_N_m * r.body.length_scale_m);
             CHECK_LE(shell_row_energy(&r), 1e-26 * k_N_m);
             if (turn < 2) shell_row_mix(&r, 25);
-            if (turn == 2) pal_shell_level(r.shell, &r.body, 2), pal_shell_update(r.shell, &r.body);
+            if (turn == 2) pal_adaptive_set_level(r.adaptive, &r.body, 2), pal_adaptive_update(r.adaptive, &r.body);
         }
         shell_row_close(&r);
     }
@@ -111,9 +111,9 @@ static void damping_takes_power_and_leaves_rigid_motion(void)
     CHECK_LE(pal_norm3(rigid), 1e-14 * shell_row_largest(&r) * r.body.n_active);
     shell_row_check_balance(&r, 1e-13);
     /* radial breathing v = b r moves no frame: f = -c'/m_0 m v exactly */
-    double rate = c_Ns_m / r.shell->level_mass_kg[0], worst = 0;
-    pal_shell_frame frame = {.quat = {1}};
-    pal_shell_fit_frame(r.shell, &r.body, &frame);
+    double rate = c_Ns_m / r.adaptive->level_mass_kg[0], worst = 0;
+    pal_rigid_fit frame = {.quat = {1}};
+    pal_adaptive_fit_rigid(r.adaptive, &r.body, &frame);
     for (int k = 0; k < r.body.n_active; k++) {
         size_t i = 3 * (size_t)r.body.active[k];
         pal_sub3(r.body.v + i, r.body.x + i, frame.centre_m);
@@ -133,8 +133,8 @@ static void refinement_changes_neither_sum_nor_frequency_of_anchors(void)
 {
     shell_row r;
     REQUIRE(open_sphere(&r, 3, "world", 0));
-    const double u[3] = {1e-3, -2e-3, 3e-3}, w2 = k_N_m / r.shell->level_mass_kg[0];
-    const double total = w2 * r.shell->options.mass_kg;
+    const double u[3] = {1e-3, -2e-3, 3e-3}, w2 = k_N_m / r.adaptive->level_mass_kg[0];
+    const double total = w2 * r.adaptive->options.mass_kg;
     CHECK_NEAR(total, k_N_m * PAL_SPHERE_VERTEX, 1e-12 * total);
     for (int turn = 0; turn < 4; turn++) {
         double force[3] = {0}, bound = 0, worst = 0;
@@ -155,7 +155,7 @@ static void refinement_changes_neither_sum_nor_frequency_of_anchors(void)
         free(sum);
         CHECK_NEAR(bound, total, 1e-12 * total);
         if (turn < 2) shell_row_mix(&r, 30);
-        if (turn == 2) pal_shell_level(r.shell, &r.body, 2), pal_shell_update(r.shell, &r.body);
+        if (turn == 2) pal_adaptive_set_level(r.adaptive, &r.body, 2), pal_adaptive_update(r.adaptive, &r.body);
     }
     CHECK_INT(r.body.n_active, 1794);
     shell_row_close(&r);
@@ -170,7 +170,7 @@ static void its_stiffness_is_what_it_says(void)
         double bound = shell_row_bound(&r), found = shell_row_stiffest(&r, 1, 1e-7, 40);
         CHECK_LE(found, (1 + 1e-6) * bound);
         CHECK_LE(0.999 * bound, found);
-        r.shell->shape_ramp = 0.25;
+        r.adaptive->shape_ramp = 0.25;
         CHECK_NEAR(shell_row_bound(&r), 0.25 * bound, 1e-12 * bound);
         CHECK_NEAR(shell_row_stiffest(&r, 1, 1e-7, 40), 0.25 * found, 1e-3 * bound);
         shell_row_close(&r);
@@ -184,7 +184,7 @@ static void a_switch_of_level_is_ramped_alike_in_force_and_energy(void)
     shell_row_shake(&r, 0.01, 0);
     shell_row_run(&r, 1);
     double force = shell_row_largest(&r), before = shell_row_energy(&r);
-    r.shell->shape_ramp = 0.5;
+    r.adaptive->shape_ramp = 0.5;
     shell_row_run(&r, 1);
     CHECK_NEAR(shell_row_largest(&r), 0.5 * force, 1e-12 * force);
     CHECK_NEAR(shell_row_energy(&r), 0.5 * before, 1e-12 * before);
@@ -209,8 +209,8 @@ static void collapsed_bodies_are_pulled_open(void)
         CHECK(isfinite(shell_row_energy(&r)));
         shell_row_check_balance(&r, 1e-12);
         /* the way it pulls is downhill: work over the way to rest in the row's own frame is 2 E */
-        pal_shell_frame frame = {.quat = {1}};
-        pal_shell_fit_frame(r.shell, &r.body, &frame);
+        pal_rigid_fit frame = {.quat = {1}};
+        pal_adaptive_fit_rigid(r.adaptive, &r.body, &frame);
         for (int k = 0; k < r.body.n_active; k++) {
             size_t i = 3 * (size_t)r.body.active[k];
             double at[3];
@@ -281,7 +281,7 @@ static bool open_world(shell_scene *s, const char *frame, int start_level)
     shell_scene_number(s, "k_shape_N_m", k_N_m);
     shell_scene_number(s, "c_shape_Ns_m", 0);
     shell_scene_text(s, "frame", frame);
-    if (pal_item_put_bool(shell_scene_model(s), "refine", false, NULL)) return false;
+    if (pal_entry_put_bool(shell_scene_model(s), "refine", false, NULL)) return false;
     return shell_scene_start(s);
 }
 
@@ -293,12 +293,12 @@ static void a_shifted_body_swings_with_its_analytic_period(void)
         shell_scene s;
         REQUIRE(open_world(&s, "world", kind == 1));
         pal_body *body = s.body;
-        for (int32_t face = 0; face < 40 && kind == 2; face++) pal_shell_split(body->shell, body, face, 0);
-        pal_shell_update(body->shell, body);
+        for (int32_t face = 0; face < 40 && kind == 2; face++) pal_adaptive_split(body->adaptive, body, face, 0);
+        pal_adaptive_update(body->adaptive, body);
         CHECK(kind == 0 ? body->n_active == 114 : kind == 1 ? body->n_active == 450 : body->n_active > 150);
-        double period = 2 * M_PI * sqrt(body->shell->level_mass_kg[0] / k_N_m);
+        double period = 2 * M_PI * sqrt(body->adaptive->level_mass_kg[0] / k_N_m);
         for (int k = 0; k < body->n_active; k++) body->x[3 * body->active[k]] += u;
-        pal_world_moved(s.world, 0);
+        pal_world_invalidate_limits(s.world, 0);
         for (int quarter = 0; quarter < 4; quarter++) {
             double worst = 0;
             for (int i = 0; i < 25; i++) REQUIRE(!pal_world_step(s.world, period / 100));
@@ -321,8 +321,8 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         shell_scene s;
         REQUIRE(open_world(&s, world ? "world" : "body", 0));
         pal_body *body = s.body;
-        pal_shell_frame frame = {.quat = {1}};
-        pal_shell_fit_frame(body->shell, body, &frame);
+        pal_rigid_fit frame = {.quat = {1}};
+        pal_adaptive_fit_rigid(body->adaptive, body, &frame);
         for (int k = 0; k < body->n_active; k++) {
             size_t i = 3 * (size_t)body->active[k];
             pal_sub3(arm, body->x + i, frame.centre_m);
@@ -335,7 +335,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         for (int turn = 0; turn < 2; turn++) {
             double *spin = turn == 0 ? first : last;
             for (int i = 0; i < 60 && turn == 1; i++) REQUIRE(!pal_world_step(s.world, 1.0 / 60));
-            pal_shell_fit_frame(body->shell, body, &frame);
+            pal_adaptive_fit_rigid(body->adaptive, body, &frame);
             for (int k = 0; k < body->n_active; k++) {
                 size_t i = 3 * (size_t)body->active[k];
                 double part[3];
@@ -346,7 +346,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         }
         pal_body_momentum(body, momentum);
         pal_sub3(way, frame.centre_m, way);
-        pal_axpy3(momentum, -body->shell->options.mass_kg, V);
+        pal_axpy3(momentum, -body->adaptive->options.mass_kg, V);
         pal_sub3(way, way, V); /* of one second */
         pal_sub3(last, last, first);
         double lost = pal_norm3(last) / pal_norm3(first);
@@ -368,13 +368,13 @@ static double stiffness_after(pal_material *material, double k_given_N_m, double
     shell_row r;
     if (pal_sphere_make(0.05, &sphere) || !shell_row_open(&r, &sphere, 1, 0, "shape_spring")) return NAN;
     if (k_given_N_m > 0) shell_row_number(&r, "k_N_m", k_given_N_m);
-    pal_item *model = &r.scene->body[0].model;
-    if (k_spring_N_m > 0) pal_item_put_number(model, "k_spring_N_m", k_spring_N_m, NULL);
-    pal_item_put_number(model, "thickness_m", 0.004, NULL);
+    pal_config_entry *model = &r.scene->body[0].model;
+    if (k_spring_N_m > 0) pal_entry_put_number(model, "k_spring_N_m", k_spring_N_m, NULL);
+    pal_entry_put_number(model, "thickness_m", 0.004, NULL);
     r.scene->body[0].material.young_Pa = 8000;
     if (shell_row_make(&r)) return NAN;
     if (material) r.effect->material(r.self, &r.body, material, NULL);
-    double k = shell_row_bound(&r) * r.shell->level_mass_kg[0];
+    double k = shell_row_bound(&r) * r.adaptive->level_mass_kg[0];
     shell_row_close(&r);
     return k;
 }
@@ -398,7 +398,7 @@ static void damping_is_a_ratio_of_three_tenths(void)
     REQUIRE(!pal_sphere_make(0.05, &sphere) && shell_row_open(&r, &sphere, 2, 0, "shape_spring"));
     shell_row_number(&r, "k_N_m", k_N_m);
     REQUIRE(!shell_row_make(&r));
-    double w = sqrt(k_N_m / r.shell->level_mass_kg[0]);
+    double w = sqrt(k_N_m / r.adaptive->level_mass_kg[0]);
     shell_row_mix(&r, 10);
     r.effect->damping(r.self, &r.body, sum);
     for (int k = 0; k < r.body.n_active; k++) {
@@ -418,8 +418,8 @@ static void check_refused(const char *key, double number, const char *text, cons
     else
         shell_row_number(&r, key, number);
     CHECK_INT(shell_row_make(&r), PAL_ERR_REFUSED);
-    printf("  %s\n", r.note.text);
-    CHECK(strstr(r.note.text, wanted));
+    printf("  %s\n", r.diag.text);
+    CHECK(strstr(r.diag.text, wanted));
     shell_row_close(&r);
 }
 
@@ -432,13 +432,13 @@ static void refuses_what_makes_no_sense(void)
     check_refused("frame", 0, "moon", "\"moon\"");
     check_refused("stiff", 1, NULL, "stiff");
     pal_body solid = {0};
-    pal_note note;
-    pal_build build = {.body = &solid, .note = &note};
-    pal_item item;
+    pal_diagnostic diag;
+    pal_build build = {.body = &solid, .diag = &diag};
+    pal_config_entry item;
     void *self;
-    pal_item_init(&item, "effects[0]", "shape_spring");
+    pal_entry_init(&item, "effects[0]", "shape_spring");
     CHECK_INT(pal_effect_shape_spring.make(&item, &build, &self), PAL_ERR_REFUSED);
-    CHECK(strstr(note.text, "adaptive_springs"));
+    CHECK(strstr(diag.text, "adaptive_springs"));
 }
 
 int main(void)

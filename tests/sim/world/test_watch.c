@@ -19,7 +19,7 @@ static void nobody_looks_and_all_moves_the_same(void)
         CHECK(model_scene_steps(&seen, 20) && model_scene_steps(&unseen, 20));
         CHECK_INT(outputs(&seen), 21);
         CHECK_INT(outputs(&unseen), 1);
-        CHECK_INT(pal_world_effect(unseen.world, model_scene_row(&unseen, "surface_out"))->n_run, 1);
+        CHECK_INT(pal_world_component(unseen.world, model_scene_row(&unseen, "surface_output"))->n_run, 1);
         /* tools touch what is shown: there it is needed */
         CHECK(model_scene_touch(&seen, 0, 25) && model_scene_touch(&unseen, 0, 25));
         CHECK(outputs(&unseen) > 20 && outputs(&unseen) < 27);

@@ -9,13 +9,13 @@
 
 #include <pthread.h>
 
-static pal_note note;
+static pal_diagnostic diag;
 
 static bool has_row(const pal_world *world, const char *name)
 {
-    for (int i = 0; i < pal_world_rows(world); i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         if (!strcmp(info.name, name)) return true;
     }
     return false;
@@ -27,7 +27,7 @@ static void sags_and_comes_to_rest_under_its_weight(void)
     REQUIRE(!box_make(6, 4, 4, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     for (int i = 0; i < 240; i++) CHECK_INT(pal_world_step(world, scene->step_s), 0);
     pal_body *body = pal_world_body(world, 0);
     double low = 0;
@@ -46,10 +46,10 @@ static void has_rows_only_for_what_the_scene_calls_for(void)
     pal_prepared box;
     REQUIRE(!box_make(2, 2, 2, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, false);
-    pal_item_put_number(&scene->body[0].model, "k_area_J", 0, NULL);
+    pal_entry_put_number(&scene->body[0].model, "k_area_J", 0, NULL);
     scene->body[0].material.damping_1_s = 0;
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     CHECK(has_row(world, "edge_distance"));
     CHECK(has_row(world, "tet_volume"));
     CHECK(has_row(world, "verlet"));
@@ -67,9 +67,9 @@ static void spring_scenes_pay_nothing_for_finite_elements(void)
     static const struct {
         const char *name;
         size_t n_byte;
-    } was[] = {{"tool_push", 1785152}, {"tool_grab", 5568},  {"edge_distance", 14464}, {"face_area", 22272},
-               {"tet_volume", 11008},  {"viscous", 64},      {"gravity", 64},          {"verlet", 1344},
-               {"finite_guard", 3904}, {"surface_out", 4800}};
+    } was[] = {{"tool_push", 1785152}, {"tool_grasp", 5568},    {"edge_distance", 14464}, {"face_area", 22272},
+               {"tet_volume", 11008},  {"viscous", 64},         {"gravity", 64},          {"verlet", 1344},
+               {"finite_guard", 3904}, {"surface_output", 4800}};
     enum { N_ROW = sizeof was / sizeof was[0], WORLD = 2725000, POINTERS = 256 };
     pal_prepared box;
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -79,15 +79,15 @@ static void spring_scenes_pay_nothing_for_finite_elements(void)
     scene->n_body = 1;
     pal_body_default(&scene->body[0], "box", &box);
     /* what untangles springs is theirs, and is not there where it is not asked for */
-    pal_item_put_bool(&scene->body[0].model, "untangle", false, NULL);
-    pal_item_init(&scene->body[0].output, "output", "surface_out");
+    pal_entry_put_bool(&scene->body[0].model, "recover", false, NULL);
+    pal_entry_init(&scene->body[0].output, "output", "surface_output");
     pal_tools_default(scene, 3);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
-    REQUIRE(pal_world_rows(world) == N_ROW);
+    REQUIRE(!pal_world_create(scene, &diag, &world));
+    REQUIRE(pal_world_component_count(world) == N_ROW);
     for (int i = 0; i < N_ROW; i++) {
-        pal_row_info info;
-        pal_world_row(world, i, &info);
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
         CHECK(!strcmp(info.name, was[i].name));
         CHECK(info.n_byte <= was[i].n_byte + POINTERS);
         if (info.n_byte != was[i].n_byte)
@@ -108,14 +108,14 @@ static pal_world *open_touched(pal_prepared *box, pal_scene **scene)
     if (box_make(6, 4, 4, 0.01, box)) return NULL;
     *scene = box_scene(box, true, true);
     pal_body_def *def = &(*scene)->body[0];
-    pal_item_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
-    pal_item_init(&def->effect[def->n_effect++], "effects[3]", "tool_grab");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[2]", "tool_push");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(*scene, 2);
     (*scene)->tool[0].radius_m = (*scene)->tool[1].radius_m = 0.008;
     pal_world *world;
-    pal_note why;
-    if (!pal_world_create(*scene, &why, &world)) return world;
-    printf("  %s\n", why.text);
+    pal_diagnostic reason;
+    if (!pal_world_create(*scene, &reason, &world)) return world;
+    printf("  %s\n", reason.text);
     return NULL;
 }
 
@@ -136,7 +136,7 @@ static void touches_no_heap_in_a_step_with_tools_pressing(void)
     REQUIRE(world);
     pal_frame *frame = pal_frame_create(world);
     REQUIRE(frame);
-    bool touched = false, held = false;
+    bool touched = false, fixed = false;
     /* the counter counts */
     counting = true;
     void *volatile one = malloc(1);
@@ -154,10 +154,10 @@ static void touches_no_heap_in_a_step_with_tools_pressing(void)
         CHECK_INT(err, 0);
         CHECK(hash != 0);
         touched = touched || frame->tool[0].touching;
-        held = held || frame->tool[1].holding;
+        fixed = fixed || frame->tool[1].holding;
     }
     CHECK(touched);
-    CHECK(held);
+    CHECK(fixed);
     CHECK_INT(n_heap_call, 0);
     pal_frame_destroy(frame);
     pal_world_destroy(world);
@@ -224,14 +224,14 @@ static void derives_constants_again_after_a_material_edit(void)
     pal_scene *scene = box_scene(&box, true, true);
     double sag[2];
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     for (int turn = 0; turn < 2; turn++) {
         for (int i = 0; i < 300; i++) REQUIRE(!pal_world_step(world, scene->step_s));
         const pal_body *body = pal_world_body(world, 0);
         sag[turn] = body->x_rest[3 * body->n_dof - 1] - body->x[3 * body->n_dof - 1];
         pal_material stiff = scene->body[0].material;
         stiff.young_Pa *= 10;
-        REQUIRE(!pal_world_material(world, 0, &stiff, &note));
+        REQUIRE(!pal_world_material(world, 0, &stiff, &diag));
     }
     CHECK_NEAR(sag[0] / sag[1], 10, 0.5);
     pal_world_destroy(world);
@@ -250,12 +250,12 @@ static void an_edited_material_is_that_of_a_world_made_with_it(void)
             pal_scene *scene = box_scene(&box, true, true);
             pal_material first = scene->body[0].material, then = first;
             then.young_Pa *= 3, then.poisson = 0.3, then.damping_1_s = 7;
-            if (without) pal_item_put_number(&scene->body[0].model, "k_area_J", 0, NULL);
+            if (without) pal_entry_put_number(&scene->body[0].model, "k_area_J", 0, NULL);
             /* edited; made so; left as it was */
             if (k == 1) scene->body[0].material = then;
             pal_world *world;
-            REQUIRE(!pal_world_create(scene, &note, &world));
-            if (k == 0) CHECK_INT(pal_world_material(world, 0, &then, &note), 0);
+            REQUIRE(!pal_world_create(scene, &diag, &world));
+            if (k == 0) CHECK_INT(pal_world_material(world, 0, &then, &diag), 0);
             for (int i = 0; i < 30; i++) REQUIRE(!pal_world_step(world, scene->step_s));
             hash[k] = pal_world_hash(world);
             pal_world_destroy(world);
@@ -310,16 +310,16 @@ static void refuses_scenes_by_the_name_of_the_entry(void)
                                              "bodies: 0, wanted 1 to 8"};
         pal_scene *scene = box_scene(&box, true, true);
         pal_body_def *def = &scene->body[0];
-        if (kind == 0) pal_item_init(&def->effect[0], "effects[0]", "gravitation");
-        if (kind == 1) pal_item_put_number(&def->effect[0], "stronger", 1, NULL);
+        if (kind == 0) pal_entry_init(&def->effect[0], "effects[0]", "gravitation");
+        if (kind == 1) pal_entry_put_number(&def->effect[0], "stronger", 1, NULL);
         if (kind == 2) def->effect[def->n_effect++] = def->effect[0];
-        if (kind == 3) pal_item_init(&def->output, "output", "viscous");
-        if (kind == 4) pal_item_init(&def->model, "model", "jelly");
+        if (kind == 3) pal_entry_init(&def->output, "output", "viscous");
+        if (kind == 4) pal_entry_init(&def->model, "model", "jelly");
         if (kind == 5) def->material.young_Pa = -1;
         if (kind == 6) scene->step_s = 0;
         if (kind == 7) scene->n_body = 0;
-        CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
-        if (!strstr(note.text, expect[kind])) CHECK_TEXT(note.text, expect[kind]);
+        CHECK_INT(pal_world_create(scene, &diag, &world), PAL_ERR_REFUSED);
+        if (!strstr(diag.text, expect[kind])) CHECK_TEXT(diag.text, expect[kind]);
         free(scene);
     }
     CHECK(!world);
@@ -334,13 +334,13 @@ static void prints_its_plan_in_the_order_of_a_step(void)
     pal_arena *arena = pal_arena_create(1 << 16, true);
     pal_plan plan;
     char text[2048], cut[10];
-    REQUIRE(!pal_plan_build(scene, arena, &note, &plan));
+    REQUIRE(!pal_plan_build(scene, arena, &diag, &plan));
     size_t wanted = pal_plan_print(&plan, text, sizeof text);
     CHECK_INT(wanted, strlen(text));
     CHECK_INT(pal_plan_print(&plan, cut, sizeof cut), wanted);
     CHECK_INT(strlen(cut), sizeof cut - 1);
     const char *order[] = {"edge_distance", "face_area", "tet_volume",   "viscous",
-                           "gravity",       "verlet",    "finite_guard", "surface_out"};
+                           "gravity",       "verlet",    "finite_guard", "surface_output"};
     const char *at = text;
     for (int i = 0; i < 8 && at; i++) {
         at = strstr(at, order[i]);
@@ -363,9 +363,9 @@ static void shows_two_bodies_in_the_frame_of_the_first(void)
     scene->body[1] = scene->body[0];
     scene->body[1].mesh = &two;
     pal_world *world;
-    CHECK_INT(pal_world_create(scene, &note, &world), PAL_ERR_REFUSED);
+    CHECK_INT(pal_world_create(scene, &diag, &world), PAL_ERR_REFUSED);
     snprintf(scene->body[1].name, PAL_NAME, "other");
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     REQUIRE(!pal_world_step(world, scene->step_s));
     pal_frame *frame = pal_frame_create(world);
     pal_world_frame(world, frame);
@@ -392,19 +392,19 @@ static void goes_on_where_another_world_was(void)
     REQUIRE(!box_make(3, 3, 3, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
     pal_world *alone, *before, *next;
-    REQUIRE(!pal_world_create(scene, &note, &alone));
-    REQUIRE(!pal_world_create(scene, &note, &before));
-    REQUIRE(!pal_world_create(scene, &note, &next));
+    REQUIRE(!pal_world_create(scene, &diag, &alone));
+    REQUIRE(!pal_world_create(scene, &diag, &before));
+    REQUIRE(!pal_world_create(scene, &diag, &next));
     for (int i = 0; i < 30; i++) CHECK_INT(pal_world_step(alone, scene->step_s), 0);
     for (int i = 0; i < 12; i++) CHECK_INT(pal_world_step(before, scene->step_s), 0);
     CHECK(pal_world_hash(before) != pal_world_hash(next));
-    pal_world_follow(next, before, -1, NULL, NULL);
+    pal_world_transfer(next, before, -1, NULL, NULL);
     CHECK(pal_world_hash(before) == pal_world_hash(next));
     for (int i = 0; i < 18; i++) CHECK_INT(pal_world_step(next, scene->step_s), 0);
     CHECK(pal_world_hash(alone) == pal_world_hash(next));
     /* a body of another state: as given */
     pal_body *body = pal_world_body(before, 0);
-    pal_world_follow(next, alone, 0, body->x, NULL);
+    pal_world_transfer(next, alone, 0, body->x, NULL);
     pal_body *to = pal_world_body(next, 0);
     CHECK(!memcmp(to->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof));
     pal_world_destroy(alone);
@@ -421,27 +421,27 @@ static void a_sliver_bears_less_of_a_lasting_load(void)
     REQUIRE(!box_make(3, 3, 3, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, false);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     int thin = -1, full = -1;
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->held[i]) continue;
+        if (body->fixed[i]) continue;
         if (thin < 0 || body->mass_kg[i] < body->mass_kg[thin]) thin = i;
         if (full < 0 || body->mass_kg[i] > body->mass_kg[full]) full = i;
     }
     const double h = 0.01, cap_N = 10 * scene->body[0].material.young_Pa * h * h;
-    CHECK_NEAR(body->corner_kg, scene->body[0].material.density_kg_m3 * h * h * h / 8, 1e-15);
-    CHECK_NEAR(body->mass_kg[thin] / body->corner_kg, 1.0 / 3, 1e-9);
+    CHECK_NEAR(body->full_corner_kg, scene->body[0].material.density_kg_m3 * h * h * h / 8, 1e-15);
+    CHECK_NEAR(body->mass_kg[thin] / body->full_corner_kg, 1.0 / 3, 1e-9);
     REQUIRE(!pal_world_load(world, 0, thin, (const double[3]){1e6, 0, 0}));
     REQUIRE(!pal_world_load(world, 0, full, (const double[3]){0, 0, -1e6}));
     REQUIRE(!pal_world_step(world, 1e-4));
     CHECK_NEAR(body->load[3 * thin] / cap_N, 1.0 / 3, 1e-9);
     CHECK_NEAR(body->load[3 * full + 2] / cap_N, -1, 1e-9);
-    CHECK(body->rescue.n_capped >= 2);
+    CHECK(body->safeguards.n_capped >= 2);
     /* twice as dense and as stiff: the part stays, the cap goes with E */
     pal_material to = scene->body[0].material;
     to.density_kg_m3 *= 2, to.young_Pa *= 2;
-    REQUIRE(!pal_world_material(world, 0, &to, &note));
+    REQUIRE(!pal_world_material(world, 0, &to, &diag));
     REQUIRE(!pal_world_step(world, 1e-4));
     CHECK_NEAR(body->load[3 * thin] / cap_N, 2.0 / 3, 1e-9);
     pal_world_destroy(world);
@@ -468,18 +468,18 @@ static void nodes_of_springs_bear_what_their_edges_stand_for(void)
         double factor[3];
         REQUIRE(box_bench_make(&b, (const int[3]){3, 4, 3}, 0.01, true, false));
         pal_material to = b.scene->body[0].material;
-        pal_item *model = &b.scene->body[0].model;
+        pal_config_entry *model = &b.scene->body[0].model;
         const double unit_N = 10 * to.young_Pa * 1e-4;
         pal_spring_factors(to.poisson, false, factor);
         if (cases[k].kind >= 0) {
             const double k_J = cases[k].times * factor[cases[k].kind] * to.young_Pa * 1e-6;
-            REQUIRE(!pal_item_put_number(model, key[cases[k].kind], k_J, NULL));
-            REQUIRE(!pal_item_put_text(model, "weights", "volume", NULL));
+            REQUIRE(!pal_entry_put_number(model, key[cases[k].kind], k_J, NULL));
+            REQUIRE(!pal_entry_put_text(model, "weights", "volume", NULL));
         }
         REQUIRE(box_bench_start(&b));
         CHECK_NEAR(b.body->load_cap_N / unit_N, cases[k].cap[0], 1e-12 * cases[k].cap[0]);
         to.young_Pa *= 4;
-        REQUIRE(!pal_world_material(b.world, 0, &to, &note));
+        REQUIRE(!pal_world_material(b.world, 0, &to, &diag));
         CHECK_NEAR(b.body->load_cap_N / unit_N, cases[k].cap[1], 1e-12 * cases[k].cap[1]);
         box_bench_close(&b);
     }
@@ -490,8 +490,9 @@ static double borne_at(pal_world *world, int node, double far_S)
 {
     pal_body *body = pal_world_body(world, 0);
     memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = body->x_rest[i] + (i % 3 == 1 ? far_S * body->size_m : 0);
-    pal_world_moved(world, 0);
+    for (int i = 0; i < 3 * body->n_dof; i++)
+        body->x[i] = body->x_rest[i] + (i % 3 == 1 ? far_S * body->length_scale_m : 0);
+    pal_world_invalidate_limits(world, 0);
     CHECK(!pal_world_step(world, 1e-5) && pal_world_substeps(world) == 1);
     return body->load[3 * node] / body->load_cap_N;
 }
@@ -503,24 +504,24 @@ static void a_node_that_strays_bears_less_of_a_lasting_load(void)
     REQUIRE(!box_make(3, 3, 3, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, false);
     pal_world *world;
-    REQUIRE(!pal_world_create(scene, &note, &world));
+    REQUIRE(!pal_world_create(scene, &diag, &world));
     pal_body *body = pal_world_body(world, 0);
     int full = 0;
     for (int i = 0; i < body->n_dof; i++)
-        if (!body->held[i] && body->mass_kg[i] >= body->corner_kg) full = i;
+        if (!body->fixed[i] && body->mass_kg[i] >= body->full_corner_kg) full = i;
     REQUIRE(!pal_world_load(world, 0, full, (const double[3]){1e6, 0, 0}));
     CHECK_NEAR(borne_at(world, full, 1.99), 1, 1e-9);
     CHECK_NEAR(borne_at(world, full, 2.5), 0.75, 1e-9);
     CHECK_NEAR(borne_at(world, full, 3), 0.5, 1e-9);
     CHECK_NEAR(borne_at(world, full, 6), 0.01, 1e-9);
     /* one that is led, or held by nothing, may be anywhere */
-    int held = 0;
-    while (!body->held[held]) held++;
-    body->held[held] = 2;
+    int fixed = 0;
+    while (!body->fixed[fixed]) fixed++;
+    body->fixed[fixed] = 2;
     CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
-    for (int i = 0; i < body->n_dof; i++) body->held[i] = 0;
+    for (int i = 0; i < body->n_dof; i++) body->fixed[i] = 0;
     CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
-    body->held[held] = 1;
+    body->fixed[fixed] = 1;
     CHECK_NEAR(borne_at(world, full, 3), 0.5, 1e-9);
     /* what is little is borne wherever it is */
     REQUIRE(!pal_world_load(world, 0, full, (const double[3]){0.009 * body->load_cap_N, 0, 0}));

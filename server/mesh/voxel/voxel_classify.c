@@ -1,0 +1,404 @@
+/* Which voxels are inside, and by which method.
+ *
+ * scanline: the surface is closed (or every edge is shared evenly): one axis suffices, since crossings are exact and
+ * all axes agree. Rows that go in and out in turn need no more; otherwise the parts of the surface are told apart: a
+ * part counts as inside where its own winding number is not 0, copies and overlaps join, inward shells within are
+ * empty. vote: open surface: every axis has its say where its row makes sense; two unopposed votes settle a voxel.
+ * Where few voxels are left, the majority settles them. winding: where many are left (large openings), the winding
+ * number settles those. flood: the paper's own, in voxel_flood.c, when asked for. */
+#include "server/mesh/voxel/voxel_scanline.h"
+
+#include "server/base/clock.h"
+#include "server/mesh/geometry/box_tree.h"
+#include "server/mesh/voxel/surface_parts.h"
+#include "server/mesh/voxel/voxel_flood.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* the majority settles up to this share of the voxels that are settled already */
+#define FEW_DISPUTED 0.05
+/* an open surface must enclose beyond doubt (by two axes or this winding number) at least this share of its inside
+ * voxels, and of those that two axes claim */
+#define SURE_SHARE   0.5
+#define SURE_WINDING 0.75
+/* length of the sum of area normals over the area: 0 closed, 1 flat */
+#define MOST_ONE_SIDED 0.8
+
+bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
+{
+    int32_t first = 0;
+    int64_t n_pair = 0, n_flat = 0;
+    for (int row = 0; row < crossings->n_row; row++) {
+        const pal_crossing *item = crossings->item + crossings->start[row];
+        int64_t n = crossings->start[row + 1] - crossings->start[row];
+        if (n == 0) continue;
+        if (n & 1) return false;
+        if (first == 0) first = item[0].sign;
+        uint64_t *word = inside->word + (size_t)inside->n_word * (size_t)row;
+        for (int64_t i = 0; i < n; i += 2) {
+            if (item[i].sign != first || item[i + 1].sign == first) return false;
+            pal_bits_set_run(word, item[i].place, item[i + 1].place);
+            n_flat += item[i + 1].depth - item[i].depth < PAL_SCAN_ONE / 16;
+            n_pair++;
+        }
+    }
+    /* a copy turned inside out pairs up with its twin instead of with the far wall */
+    return 2 * n_flat <= n_pair;
+}
+
+/* all that the methods share */
+typedef struct decision {
+    const pal_surface *surface;
+    const pal_voxels *grid;
+    pal_scan_surface *scan;
+    pal_bits *inside;
+    pal_voxel_report *report;
+    pal_diagnostic *diag;
+    pal_parts parts;
+    pal_surface facing; /* the surface with its parts outward and cavities inward; shares x */
+    pal_box_tree *tree; /* of facing */
+    double most_winding;
+    int64_t n_sure, n_claimed; /* see SURE_SHARE */
+} decision;
+
+static void clear_inside(decision *d)
+{
+    size_t n = (size_t)d->inside->n_word * (size_t)d->inside->n[1] * (size_t)d->inside->n[2];
+    memset(d->inside->word, 0, n * sizeof *d->inside->word);
+}
+
+/* crossings along one axis of the parts, cavities found along the first */
+static pal_err scan_parts(decision *d, int axis, pal_crossings *rows)
+{
+    PAL_TRY(pal_scan_axis(d->scan, d->grid->n, axis, rows));
+    pal_err err = axis == 0 ? pal_parts_nest(&d->parts, rows) : PAL_ERR_OK;
+    if (err) pal_crossings_free(rows);
+    return err;
+}
+
+static void set_word_run(void *self, int from, int to)
+{
+    pal_bits_set_run(self, from, to);
+}
+
+/* every part closed or even */
+static pal_err by_scanline(decision *d)
+{
+    pal_crossings rows;
+    PAL_TRY(scan_parts(d, 0, &rows));
+    pal_parts_work *work = pal_parts_work_create(&d->parts);
+    for (int row = 0; work && row < rows.n_row; row++)
+        pal_parts_row(&d->parts, work, rows.item + rows.start[row], rows.start[row + 1] - rows.start[row], set_word_run,
+                      d->inside->word + (size_t)d->inside->n_word * (size_t)row);
+    strcpy(d->report->method, "scanline");
+    pal_err err = work ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_parts_work_destroy(work);
+    pal_crossings_free(&rows);
+    return err;
+}
+
+/* votes of the three axes: low four bits inside, high four abstained; the rest say outside */
+typedef struct ballot {
+    uint8_t *vote;
+    size_t step, first; /* between voxels of the row, and its first voxel */
+    int n;
+    uint8_t amount;
+} ballot;
+
+static void vote_run(void *self, int from, int to)
+{
+    ballot *b = self;
+    for (int k = from; k < to; k++) b->vote[b->first + b->step * (size_t)k] += b->amount;
+}
+
+/* a row that does not make sense abstains on every voxel that its sound parts do not claim: it abstains on all, and
+ * the claim takes that back */
+static void vote_row(const pal_parts *parts, pal_parts_work *work, const pal_crossing *item, int64_t n, ballot *b)
+{
+    b->amount = 1;
+    if (pal_parts_row(parts, work, item, n, vote_run, b)) return;
+    b->amount = 16;
+    vote_run(b, 0, b->n);
+    b->amount = (uint8_t)-16;
+    pal_parts_row(parts, work, item, n, vote_run, b);
+}
+
+static pal_err vote_axis(decision *d, int axis, uint8_t *vote)
+{
+    const int *n = d->grid->n;
+    size_t step[3] = {1, (size_t)n[0], (size_t)n[0] * (size_t)n[1]};
+    int p = axis == 0 ? 1 : 0, q = axis == 2 ? 1 : 2;
+    pal_crossings rows;
+    PAL_TRY(scan_parts(d, axis, &rows));
+    pal_parts_work *work = pal_parts_work_create(&d->parts);
+    for (int row = 0; work && row < rows.n_row; row++) {
+        int64_t n_item = rows.start[row + 1] - rows.start[row];
+        if (n_item == 0) continue;
+        ballot b = {vote, step[axis], step[p] * (size_t)(row % n[p]) + step[q] * (size_t)(row / n[p]), n[axis], 0};
+        vote_row(&d->parts, work, rows.item + rows.start[row], n_item, &b);
+    }
+    pal_err err = work ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_parts_work_destroy(work);
+    pal_crossings_free(&rows);
+    return err;
+}
+
+/* the surface as the parts are faced now, and its tree; parts that cannot be faced (Moebius) have no winding number */
+static pal_err plant_tree(decision *d)
+{
+    if (d->tree) return PAL_ERR_OK;
+    double began = pal_clock_s();
+    const pal_scan_surface *scan = d->scan;
+    d->facing = *d->surface;
+    d->facing.n_tri = 0;
+    d->facing.tri = malloc((scan->n_tri ? (size_t)scan->n_tri : 1) * 3 * sizeof *d->facing.tri);
+    if (!d->facing.tri) return PAL_ERR_MEMORY;
+    for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
+        const int32_t *from = scan->tri + 3 * t;
+        const pal_part *part = &d->parts.part[scan->part[t]];
+        if (!part->coherent) continue;
+        bool turn = part->cavity;
+        int32_t *to = d->facing.tri + 3 * (size_t)d->facing.n_tri++;
+        to[0] = from[0], to[1] = from[turn ? 2 : 1], to[2] = from[turn ? 1 : 2];
+    }
+    pal_err err = pal_box_tree_create(&d->facing, &d->tree);
+    d->report->tree_s += pal_clock_s() - began;
+    return err;
+}
+
+static double winding_at(decision *d, int x, int y, int z)
+{
+    const pal_voxels *g = d->grid;
+    double p[3] = {g->low_m[0] + g->edge_m * (x + 0.5), g->low_m[1] + g->edge_m * (y + 0.5),
+                   g->low_m[2] + g->edge_m * (z + 0.5)};
+    double w = pal_box_tree_winding(d->tree, p);
+    if (w > d->most_winding) d->most_winding = w;
+    return w;
+}
+
+static void set_inside(decision *d, int x, int y, int z)
+{
+    pal_bits_row(d->inside, y, z)[x >> 6] |= (uint64_t)1 << (x & 63);
+}
+
+/* what the three axes say together */
+typedef enum verdict { OUTSIDE, INSIDE, DISPUTED } verdict;
+
+static verdict judge(uint8_t vote)
+{
+    int in = vote & 15, out = 3 - in - (vote >> 4);
+    if (in == 0 && out >= 2) return OUTSIDE;
+    if (out == 0 && in >= 2) return INSIDE;
+    return DISPUTED;
+}
+
+/* one voxel that two axes do not settle */
+static void settle(decision *d, uint8_t vote, bool by_winding, int x, int y, int z)
+{
+    int in = vote & 15, out = 3 - in - (vote >> 4);
+    if (!by_winding && in != out) {
+        if (in > out) set_inside(d, x, y, z), d->n_sure++;
+        return;
+    }
+    double w = winding_at(d, x, y, z);
+    if (w >= 0.5) set_inside(d, x, y, z);
+    d->n_sure += w >= SURE_WINDING;
+}
+
+static pal_err count_votes(decision *d, const uint8_t *vote)
+{
+    const int *n = d->grid->n;
+    size_t n_cell = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
+    int64_t n_inside = 0, n_disputed = 0, n_tie = 0;
+    for (size_t i = 0; i < n_cell; i++) {
+        if (!vote[i]) continue;
+        verdict v = judge(vote[i]);
+        n_inside += v == INSIDE;
+        n_disputed += v == DISPUTED;
+        n_tie += v == DISPUTED && 2 * (vote[i] & 15) == 3 - (vote[i] >> 4);
+        d->n_claimed += (vote[i] & 15) >= 2;
+    }
+    bool by_winding = (double)n_disputed > FEW_DISPUTED * (double)n_inside;
+    strcpy(d->report->method, by_winding ? "winding" : "vote");
+    d->report->n_disagree = n_disputed;
+    d->n_sure = n_inside;
+    if (n_tie || (by_winding && n_disputed)) PAL_TRY(plant_tree(d));
+    const uint8_t *at = vote;
+    for (int z = 0; z < n[2]; z++)
+        for (int y = 0; y < n[1]; y++)
+            for (int x = 0; x < n[0]; x++, at++) {
+                if (!*at) continue;
+                verdict v = judge(*at);
+                if (v == INSIDE) set_inside(d, x, y, z);
+                if (v == DISPUTED) settle(d, *at, by_winding, x, y, z);
+            }
+    return PAL_ERR_OK;
+}
+
+static pal_err by_vote(decision *d)
+{
+    const int *n = d->grid->n;
+    uint8_t *vote = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], 1);
+    pal_err err = vote ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    for (int axis = 0; !err && axis < 3; axis++) err = vote_axis(d, axis, vote);
+    if (!err) err = count_votes(d, vote);
+    free(vote);
+    return err;
+}
+
+/* every voxel by its winding number */
+static pal_err by_winding(decision *d)
+{
+    pal_crossings rows;
+    PAL_TRY(scan_parts(d, 0, &rows));
+    pal_crossings_free(&rows);
+    PAL_TRY(plant_tree(d));
+    for (int z = 1; z < d->grid->n[2] - 1; z++)
+        for (int y = 1; y < d->grid->n[1] - 1; y++)
+            for (int x = 1; x < d->grid->n[0] - 1; x++) {
+                double w = winding_at(d, x, y, z);
+                if (w >= 0.5) set_inside(d, x, y, z);
+                d->n_sure += w >= SURE_WINDING;
+            }
+    strcpy(d->report->method, "winding");
+    return PAL_ERR_OK;
+}
+
+static pal_err by_flood(decision *d)
+{
+    double began = pal_clock_s();
+    pal_err err = pal_box_tree_create(d->surface, &d->tree);
+    d->report->tree_s = pal_clock_s() - began;
+    if (err) return err;
+    strcpy(d->report->method, "flood");
+    return pal_voxels_flood(d->surface, d->tree, d->grid, d->inside, d->diag);
+}
+
+/* |sum of area normals| over the area */
+static double one_sided(const decision *d, double *area_out)
+{
+    double sum[3] = {0}, area = 0;
+    for (size_t t = 0; t < (size_t)d->scan->n_tri; t++) {
+        const int32_t *c = d->scan->tri + 3 * t;
+        const double *a = d->surface->x + 3 * (size_t)c[0], *b = d->surface->x + 3 * (size_t)c[1],
+                     *e = d->surface->x + 3 * (size_t)c[2];
+        double u[3], v[3], normal[3];
+        for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = e[k] - a[k];
+        for (int k = 0; k < 3; k++) {
+            int i = (k + 1) % 3, j = (k + 2) % 3;
+            normal[k] = (u[i] * v[j] - u[j] * v[i]) / 2;
+            sum[k] += normal[k];
+        }
+        area += sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    }
+    *area_out = area;
+    return area > 0 ? sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / area : 1;
+}
+
+/* volume of the parts, cavities taken off */
+static double parts_volume(const decision *d)
+{
+    double sum = 0, unit = d->grid->edge_m / PAL_SCAN_ONE;
+    for (int i = 0; i < d->parts.n; i++)
+        sum += d->parts.part[i].cavity ? -d->parts.part[i].volume : d->parts.part[i].volume;
+    return sum * unit * unit * unit;
+}
+
+/* is a volume meant? Three reasons why not: 1 no extent (voxels.c), 2 closed but thinner than the voxels, 3 open and
+ * enclosing nothing */
+static pal_err check_meant(decision *d, bool open, int resolution)
+{
+    int64_t n_inside = pal_bits_count(d->inside);
+    double area, sided = one_sided(d, &area);
+    if (open) {
+        if (n_inside > 0 && sided <= MOST_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside &&
+            (double)d->n_sure >= SURE_SHARE * (double)d->n_claimed)
+            return PAL_ERR_OK;
+        return pal_diagnostic_set(
+            d->diag, PAL_ERR_REFUSED,
+            "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
+            "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
+            "are inside beyond doubt, two axes claim %lld",
+            d->scan->n_tri, sided, MOST_ONE_SIDED, d->most_winding, (long long)d->n_sure, (long long)n_inside,
+            (long long)d->n_claimed);
+    }
+    if (n_inside > 0) return PAL_ERR_OK;
+    double volume = d->report->surface_volume_m3, thick = area > 0 ? 2 * volume / area : 0;
+    double needed = thick > 0 ? ceil(resolution * d->grid->edge_m / thick) : INFINITY;
+    if (needed > 1024)
+        return pal_diagnostic_set(
+            d->diag, PAL_ERR_REFUSED,
+            "no volume (reason 2): the closed surface of %d triangles encloses %.3g m3, %.3g m thick", d->scan->n_tri,
+            volume, thick);
+    return pal_diagnostic_set(
+        d->diag, PAL_ERR_REFUSED,
+        "no volume (reason 2): no centre of a %.3g m voxel lies inside the closed surface, which is "
+        "about %.3g m thick: resolution %d may do",
+        d->grid->edge_m, thick, (int)needed);
+}
+
+/* the method asked for, or the first that serves */
+static pal_err run_method(decision *d, const char *method, bool *open)
+{
+    bool any = !method;
+    pal_crossings rows;
+    double volume = fabs(pal_surface_volume(d->surface));
+    d->report->surface_volume_m3 = d->scan->closed && isfinite(volume) ? volume : 0;
+    if (!any && !strcmp(method, "flood")) return by_flood(d);
+    if (d->scan->closed && (any || !strcmp(method, "scanline"))) {
+        PAL_TRY(pal_scan_axis(d->scan, d->grid->n, 0, &rows));
+        bool plain = pal_scan_plain(&rows, d->inside);
+        pal_crossings_free(&rows);
+        strcpy(d->report->method, "scanline");
+        if (plain) return PAL_ERR_OK;
+        clear_inside(d);
+    }
+    PAL_TRY(pal_scan_drop_copies(d->scan, d->surface->n_vertex));
+    PAL_TRY(pal_parts_find(d->scan, &d->parts));
+    pal_err err;
+    bool even = d->scan->even;
+    if (any ? even : !strcmp(method, "scanline"))
+        err = by_scanline(d);
+    else if (!any && !strcmp(method, "winding"))
+        err = by_winding(d);
+    else
+        err = by_vote(d);
+    /* a scanline that was asked for is taken at its word */
+    *open = !even && strcmp(d->report->method, "scanline") != 0;
+    d->report->surface_volume_m3 = parts_volume(d);
+    d->report->open = !even;
+    return err;
+}
+
+static bool known_method(const char *method)
+{
+    static const char *const KNOWN[] = {"flood", "scanline", "vote", "winding"};
+    for (int k = 0; k < 4; k++)
+        if (!strcmp(method, KNOWN[k])) return true;
+    return false;
+}
+
+pal_err pal_voxels_classify(const pal_surface *surface, const pal_voxel_options *options, const pal_voxels *grid,
+                            pal_bits *inside, pal_voxel_report *report, pal_diagnostic *diag)
+{
+    if (options->method && !known_method(options->method))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "method \"%.40s\" is none of flood, scanline, vote, winding",
+                                  options->method);
+    pal_scan_surface scan;
+    PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
+    decision d = {.surface = surface, .grid = grid, .scan = &scan, .inside = inside, .report = report, .diag = diag};
+    bool open = false;
+    pal_err err = run_method(&d, options->method, &open);
+    if (err == PAL_ERR_BUDGET)
+        pal_diagnostic_set(diag, err,
+                           "the surface of %d triangles crosses the rows of the %d x %d x %d grid too often: noise?",
+                           scan.n_tri, grid->n[0], grid->n[1], grid->n[2]);
+    if (!err) err = check_meant(&d, open, options->resolution);
+    pal_box_tree_destroy(d.tree);
+    free(d.facing.tri);
+    pal_parts_free(&d.parts);
+    pal_scan_surface_free(&scan);
+    return err;
+}

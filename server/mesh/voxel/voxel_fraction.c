@@ -1,0 +1,357 @@
+/* Which share of a voxel lies inside a surface.
+ *
+ * A point lies inside a closed outward surface when a ray from it along +x goes out once more often than in. Summed
+ * over a voxel: every piece of a triangle, cut by the voxel planes, adds its projected area times its distance from the
+ * voxel's low side, and its projected area to each voxel before it in the row. That is the divergence theorem voxel by
+ * voxel, and exact for triangles: a sampled share would be off by up to half a sample layer at every flat face.
+ *
+ * Where the winding number may be other than 0 and 1 (overlapping or doubled parts) or has no meaning (open surfaces),
+ * samples on a finer grid are decided in the way the voxels themselves are, and counted. */
+#include "server/mesh/voxel/voxel_fraction.h"
+
+#include "server/mesh/geometry/polygon.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* shares this near to 0 or 1 are rounding */
+#define ROUNDING 1e-6
+/* samples per axis and in all that the fallback may lay out */
+enum { MOST_SAMPLE_AXIS = 2040, MOST_SAMPLE = 1 << 28 };
+/* farthest corner that exact crossings allow, grid units (voxel_scanline.c) */
+enum { MOST_PLACE = 1 << 27 };
+
+typedef struct sweep {
+    const pal_scan_surface *scan;
+    const int *n;
+    double sign;   /* +1, or -1 for a surface that faces inward                */
+    int32_t *tri;  /* triangles by their first layer              [n_tri]      */
+    int32_t *from; /* where a layer's triangles begin             [n2+2]       */
+    int32_t *live; /* triangles that reach into the layer         [n_tri]      */
+    double *own;   /* of pieces in the voxel itself               [n1][n0]     */
+    double *pass;  /* of pieces behind: for all voxels before it  [n1][n0+1]   */
+} sweep;
+
+static double place(int32_t p)
+{
+    return (double)p / PAL_SCAN_ONE;
+}
+
+static int clamp_int(double value, int low, int high)
+{
+    return value < low ? low : value > high ? high : (int)value;
+}
+
+/* projected area of a piece and its moment along x about `at` */
+static void add_piece(const sweep *s, const pal_polygon *p, int x, int y)
+{
+    double area = 0, moment = 0;
+    for (int i = 1; i + 1 < p->n; i++) {
+        const double *a = p->x[0], *b = p->x[i], *c = p->x[i + 1];
+        double part = ((b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])) / 2;
+        area += part;
+        moment += part * ((a[0] + b[0] + c[0]) / 3 - x);
+    }
+    size_t row = (size_t)y * (size_t)s->n[0];
+    if (x < s->n[0]) s->own[row + (size_t)x] += moment;
+    s->pass[row + (size_t)y + (size_t)x] += area;
+}
+
+/* a polygon within one layer and one row of voxels, cut along x; what lies before the row counts for nothing */
+static void add_row(const sweep *s, pal_polygon *p, int y)
+{
+    double least, most;
+    if (p->n < 3) return;
+    pal_polygon_range(p, 0, &least, &most);
+    if (most <= 0) return;
+    pal_polygon low, high;
+    if (least < 0) {
+        pal_polygon_cut_axis(p, 0, 0, NULL, &high);
+        *p = high;
+    }
+    int from = clamp_int(floor(least), 0, s->n[0]), to = clamp_int(ceil(most) - 1, from, s->n[0]);
+    for (int x = from; x < to; x++) {
+        pal_polygon_cut_axis(p, 0, x + 1, &low, &high);
+        if (low.n >= 3) add_piece(s, &low, x, y);
+        *p = high;
+        if (p->n < 3) return;
+    }
+    add_piece(s, p, to, y);
+}
+
+static void add_triangle(const sweep *s, size_t t, int z)
+{
+    pal_polygon p = {.n = 3}, low, high;
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            p.x[c][k] = place(s->scan->point[3 * (size_t)s->scan->tri[3 * t + (size_t)c] + (size_t)k]);
+    double least, most;
+    pal_polygon_range(&p, 2, &least, &most);
+    if (least < z) {
+        pal_polygon_cut_axis(&p, 2, z, NULL, &high);
+        p = high;
+    }
+    if (most > z + 1 && p.n >= 3) {
+        pal_polygon_cut_axis(&p, 2, z + 1, &low, NULL);
+        p = low;
+    }
+    if (p.n < 3) return;
+    pal_polygon_range(&p, 1, &least, &most);
+    if (most <= 0 || least >= s->n[1]) return;
+    int from = clamp_int(floor(least), 0, s->n[1] - 1), to = clamp_int(ceil(most) - 1, from, s->n[1] - 1);
+    if (least < 0) {
+        pal_polygon_cut_axis(&p, 1, 0, NULL, &high);
+        p = high;
+    }
+    for (int y = from; y <= to && p.n >= 3; y++) {
+        pal_polygon_cut_axis(&p, 1, y + 1, &low, &high);
+        add_row(s, &low, y);
+        p = high;
+    }
+}
+
+/* first and last layer a triangle reaches into; false when it is seen edge-on from the rows or beside the grid */
+static bool find_layers(const sweep *s, size_t t, int *from, int *to)
+{
+    const int32_t *c = s->scan->tri + 3 * t, *a = s->scan->point + 3 * (size_t)c[0],
+                  *b = s->scan->point + 3 * (size_t)c[1], *e = s->scan->point + 3 * (size_t)c[2];
+    if (((int64_t)b[1] - a[1]) * ((int64_t)e[2] - a[2]) == ((int64_t)b[2] - a[2]) * ((int64_t)e[1] - a[1]))
+        return false;
+    int32_t least = a[2] < b[2] ? a[2] : b[2], most = a[2] < b[2] ? b[2] : a[2];
+    least = e[2] < least ? e[2] : least;
+    most = e[2] > most ? e[2] : most;
+    if (most <= 0 || least >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
+    *from = clamp_int(floor(place(least)), 0, s->n[2] - 1);
+    *to = clamp_int(ceil(place(most)) - 1, *from, s->n[2] - 1);
+    return true;
+}
+
+/* deals the triangles to their first layers */
+static void deal_triangles(const sweep *s)
+{
+    int from, to;
+    for (size_t t = 0; t < (size_t)s->scan->n_tri; t++)
+        if (find_layers(s, t, &from, &to)) s->from[from + 2]++;
+    for (int z = 0; z < s->n[2]; z++) s->from[z + 2] += s->from[z + 1];
+    for (size_t t = 0; t < (size_t)s->scan->n_tri; t++)
+        if (find_layers(s, t, &from, &to)) s->tri[s->from[from + 1]++] = (int32_t)t;
+}
+
+/* sums the pieces to shares, in place of own */
+static void close_layer(const sweep *s)
+{
+    size_t n_x = (size_t)s->n[0];
+    for (size_t y = 0; y < (size_t)s->n[1]; y++) {
+        double *own = s->own + n_x * y, *pass = s->pass + (n_x + 1) * y, behind = pass[n_x];
+        for (size_t x = n_x; x-- > 0;) {
+            double share = s->sign * (own[x] + behind);
+            behind += pass[x];
+            own[x] = share < ROUNDING ? 0 : share > 1 - ROUNDING ? 1 : share;
+        }
+    }
+}
+
+static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
+{
+    size_t n_plane = (size_t)s->n[0] * (size_t)s->n[1];
+    int n_live = 0;
+    deal_triangles(s);
+    for (int z = 0; z < s->n[2]; z++) {
+        memset(s->own, 0, n_plane * sizeof *s->own);
+        memset(s->pass, 0, (n_plane + (size_t)s->n[1]) * sizeof *s->pass);
+        for (int32_t i = s->from[z]; i < s->from[z + 1]; i++) s->live[n_live++] = s->tri[i];
+        int n_left = 0;
+        for (int i = 0; i < n_live; i++) {
+            int from, to;
+            size_t t = (size_t)s->live[i];
+            add_triangle(s, t, z);
+            if (find_layers(s, t, &from, &to) && to > z) s->live[n_left++] = (int32_t)t;
+        }
+        n_live = n_left;
+        close_layer(s);
+        take(self, z, s->own);
+    }
+}
+
+static pal_err share_exactly(const pal_scan_surface *scan, const pal_voxels *grid, double sign, pal_fraction_layer take,
+                             void *self)
+{
+    size_t n_plane = (size_t)grid->n[0] * (size_t)grid->n[1], n_tri = scan->n_tri ? (size_t)scan->n_tri : 1;
+    sweep s = {.scan = scan, .n = grid->n, .sign = sign};
+    s.tri = malloc(n_tri * sizeof *s.tri);
+    s.live = malloc(n_tri * sizeof *s.live);
+    s.from = calloc((size_t)grid->n[2] + 2, sizeof *s.from);
+    s.own = malloc(n_plane * sizeof *s.own);
+    s.pass = malloc((n_plane + (size_t)grid->n[1]) * sizeof *s.pass);
+    bool ok = s.tri && s.live && s.from && s.own && s.pass;
+    if (ok) sweep_layers(&s, take, self);
+    free(s.tri);
+    free(s.live);
+    free(s.from);
+    free(s.own);
+    free(s.pass);
+    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* volume of a closed surface in grid units */
+static double closed_volume(const pal_scan_surface *scan)
+{
+    double sum = 0;
+    for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
+        double x[3][3];
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                x[c][k] = place(scan->point[3 * (size_t)scan->tri[3 * t + (size_t)c] + (size_t)k]);
+        sum += (x[0][0] + x[1][0] + x[2][0]) *
+               ((x[1][1] - x[0][1]) * (x[2][2] - x[0][2]) - (x[1][2] - x[0][2]) * (x[2][1] - x[0][1])) / 6;
+    }
+    return sum;
+}
+
+/* is the winding number 0 and 1 (or 0 and -1) throughout, as far as the rows of centres see? */
+static pal_err find_plain(const pal_scan_surface *scan, const pal_voxels *grid, bool *plain)
+{
+    *plain = false;
+    if (!scan->closed) return PAL_ERR_OK;
+    pal_bits inside;
+    pal_crossings rows;
+    PAL_TRY(pal_bits_create(grid->n, &inside));
+    pal_err err = pal_scan_axis(scan, grid->n, 0, &rows);
+    if (!err) {
+        *plain = pal_scan_plain(&rows, &inside);
+        pal_crossings_free(&rows);
+    }
+    pal_bits_free(&inside);
+    return err;
+}
+
+/* counts the set samples of every voxel of layer z */
+static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int z, double *share)
+{
+    double one = 1.0 / ((double)n_sub * n_sub * n_sub);
+    for (int y = 0; y < n[1]; y++)
+        for (int x = 0; x < n[0]; x++) {
+            int count = 0;
+            for (int k = 0; k < n_sub; k++)
+                for (int j = 0; j < n_sub; j++)
+                    for (int i = 0; i < n_sub; i++)
+                        count += pal_bits_get(sample, n_sub * x + i, n_sub * y + j, n_sub * z + k);
+            share[(size_t)y * (size_t)n[0] + (size_t)x] = one * count;
+        }
+}
+
+/* a finer grid that the surface refuses (a sheet that encloses a few samples only) gives way to a coarser one */
+static pal_err share_by_samples(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
+                                pal_fraction_layer take, void *self, pal_diagnostic *diag)
+{
+    const int *n = grid->n;
+    double n_cell = (double)n[0] * n[1] * n[2];
+    int longest = n[0] > n[1] ? n[0] : n[1];
+    longest = n[2] > longest ? n[2] : longest;
+    while (n_sub > 1 && (n_sub * longest > MOST_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MOST_SAMPLE)) n_sub--;
+    double *share = malloc((size_t)n[0] * (size_t)n[1] * sizeof *share);
+    pal_err err = share ? PAL_ERR_REFUSED : PAL_ERR_MEMORY;
+    for (; err == PAL_ERR_REFUSED && n_sub > 0; n_sub--) {
+        pal_voxel_options options = {.resolution = n_sub * longest, .method = method};
+        pal_voxel_report report = {0};
+        pal_voxels fine = {.n = {n_sub * n[0], n_sub * n[1], n_sub * n[2]}, .edge_m = grid->edge_m / n_sub};
+        pal_bits sample;
+        memcpy(fine.low_m, grid->low_m, sizeof fine.low_m);
+        err = pal_bits_create(fine.n, &sample);
+        if (err) break;
+        err = pal_voxels_classify(surface, &options, &fine, &sample, &report, diag);
+        for (int z = 0; !err && z < n[2]; z++) {
+            count_samples(&sample, n, n_sub, z, share);
+            take(self, z, share);
+        }
+        pal_bits_free(&sample);
+    }
+    free(share);
+    return err;
+}
+
+/* every finite corner lies where crossings are exact */
+static bool fits(const pal_surface *surface, const pal_voxels *grid)
+{
+    double most = MOST_PLACE / PAL_SCAN_ONE * grid->edge_m;
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++)
+        for (size_t k = 0; k < 3; k++) {
+            double away = fabs(surface->x[3 * (size_t)surface->tri[i] + k] - grid->low_m[k]);
+            if (away > most && isfinite(away)) return false;
+        }
+    return true;
+}
+
+pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
+                            pal_fraction_layer take, void *self, bool *exact, pal_diagnostic *diag)
+{
+    pal_scan_surface scan;
+    bool plain = false;
+    if (!fits(surface, grid))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the surface reaches %d voxels of %g m beyond the mesh",
+                                  MOST_PLACE / PAL_SCAN_ONE, grid->edge_m);
+    PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
+    pal_err err = find_plain(&scan, grid, &plain);
+    if (!err && plain) err = share_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
+    pal_scan_surface_free(&scan);
+    if (exact) *exact = plain;
+    if (err || plain) return err;
+    return share_by_samples(surface, grid, method, n_sub > 0 ? n_sub : PAL_FRACTION_SUBSAMPLES, take, self, diag);
+}
+
+typedef struct dropper {
+    pal_bits *border;
+    double least;
+    int64_t n_dropped;
+} dropper;
+
+static void drop_layer(void *self, int z, const double *share)
+{
+    dropper *d = self;
+    for (int y = 0; y < d->border->n[1]; y++) {
+        uint64_t *row = pal_bits_row(d->border, y, z);
+        for (int w = 0; w < d->border->n_word; w++)
+            for (uint64_t left = row[w]; left; left &= left - 1) {
+                int x = 64 * w + __builtin_ctzll(left);
+                if (share[(size_t)y * (size_t)d->border->n[0] + (size_t)x] >= d->least) continue;
+                row[w] &= ~((uint64_t)1 << (x & 63));
+                d->n_dropped++;
+            }
+    }
+}
+
+/* lattice edges around which two kept voxels lie across from one another and the other two are not kept */
+static int64_t count_edge_only(const pal_bits *inside, const pal_bits *border)
+{
+    int64_t count = 0;
+    int n_word = inside->n_word;
+    for (int z = 1; z < inside->n[2]; z++)
+        for (int y = 1; y < inside->n[1]; y++) {
+            uint64_t before[4] = {0};
+            for (int w = 0; w < n_word; w++) {
+                uint64_t k[4], l[4];
+                for (int i = 0; i < 4; i++) {
+                    int at_y = y - (i & 1), at_z = z - (i >> 1);
+                    k[i] = pal_bits_row(inside, at_y, at_z)[w] | pal_bits_row(border, at_y, at_z)[w];
+                    l[i] = k[i] << 1 | before[i] >> 63;
+                    before[i] = k[i];
+                }
+                uint64_t along_x = (k[0] & k[3] & ~k[1] & ~k[2]) | (k[1] & k[2] & ~k[0] & ~k[3]);
+                uint64_t along_y = (k[0] & l[2] & ~k[2] & ~l[0]) | (k[2] & l[0] & ~k[0] & ~l[2]);
+                uint64_t along_z = (k[0] & l[1] & ~k[1] & ~l[0]) | (k[1] & l[0] & ~k[0] & ~l[1]);
+                count += __builtin_popcountll(along_x) + __builtin_popcountll(along_y) + __builtin_popcountll(along_z);
+            }
+        }
+    return count;
+}
+
+pal_err pal_voxels_drop(const pal_surface *surface, const pal_voxel_options *options, const pal_voxels *grid,
+                        const pal_bits *inside, pal_bits *border, pal_voxel_report *report, pal_diagnostic *diag)
+{
+    dropper d = {.border = border, .least = options->min_fill};
+    PAL_TRY(pal_voxels_fraction(surface, grid, options->method, 0, drop_layer, &d, NULL, diag));
+    report->n_dropped = d.n_dropped;
+    report->n_edge_only = count_edge_only(inside, border);
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,392 @@
+/* Exact scanline crossings of a surface with rows of voxel centres.
+ *
+ * Corners are rounded to 1/65536 of a voxel. Grid positions are below 2^27, edge functions below 2^53: they are exact
+ * in 64 bits. Ties are broken by a symbolic shift of the centres (Edelsbrunner & Muecke 1990), which is a half-open
+ * edge rule in the plane of the row's ends and its continuation along the row. */
+#include "server/mesh/voxel/voxel_scanline.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+__extension__ typedef __int128 wide;
+
+/* a surface that means a body crosses a row a few times; noise whose triangles span the box would cross without bound
+ */
+enum { CROSSINGS_PER_ROW = 64, CROSSINGS_PER_TRI = 16 };
+/* rows of at least this many centres are narrowed to the triangle by division before they are walked */
+enum { WIDE_ROW = 8 };
+
+/* the axes across a row, in ascending order: the first is shifted more by the symbolic shift */
+static const int ACROSS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
+
+void pal_scan_surface_free(pal_scan_surface *scan)
+{
+    free(scan->point);
+    free(scan->tri);
+    free(scan->part);
+    memset(scan, 0, sizeof *scan);
+}
+
+static uint64_t hash_point(const int32_t p[3])
+{
+    uint64_t h = (uint64_t)(uint32_t)p[0] | (uint64_t)(uint32_t)p[1] << 32;
+    h = (h ^ ((uint64_t)(uint32_t)p[2] * 0xD6E8FEB86659FD93u)) * 0x9E3779B97F4A7C15u;
+    h ^= h >> 32;
+    return h * 0xD6E8FEB86659FD93u;
+}
+
+static uint64_t hash_pair(uint64_t a, uint64_t b, int *sign)
+{
+    if (a == b) {
+        *sign = 1;
+        return 0;
+    }
+    uint64_t low = a < b ? a : b, high = a < b ? b : a;
+    *sign = a < b ? 1 : -1;
+    uint64_t h = (low ^ (high << 23 | high >> 41)) * 0xFF51AFD7ED558CCDu;
+    h ^= h >> 33;
+    return h * 0xC4CEB9FE1A85EC53u;
+}
+
+uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign)
+{
+    return hash_pair(hash_point(a), hash_point(b), sign);
+}
+
+/* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or; hash of
+ * each vertex */
+static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
+{
+    uint64_t sum = 0, odd = 0;
+    for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
+        const int32_t *c = scan->tri + 3 * t;
+        for (int k = 0; k < 3; k++) {
+            int sign;
+            uint64_t h = hash_pair(hash[c[k]], hash[c[k == 2 ? 0 : k + 1]], &sign);
+            sum += sign > 0 ? h : 0 - h;
+            odd ^= h;
+        }
+    }
+    scan->closed = sum == 0;
+    scan->even = odd == 0;
+}
+
+typedef struct numbered {
+    uint64_t key;
+    int32_t tri;
+} numbered;
+
+static int compare_numbered(const void *a, const void *b)
+{
+    const numbered *s = a, *t = b;
+    if (s->key != t->key) return s->key < t->key ? -1 : 1;
+    return s->tri < t->tri ? -1 : s->tri > t->tri;
+}
+
+pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
+{
+    size_t n = (size_t)scan->n_tri;
+    pal_scan_surface fewer = *scan;
+    fewer.tri = malloc((n ? n : 1) * 3 * sizeof *fewer.tri);
+    uint64_t *hash = malloc((n_vertex ? (size_t)n_vertex : 1) * sizeof *hash);
+    numbered *list = malloc((n ? n : 1) * sizeof *list);
+    if (!fewer.tri || !hash || !list) {
+        free(fewer.tri);
+        free(hash);
+        free(list);
+        return PAL_ERR_MEMORY;
+    }
+    for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    for (size_t t = 0; t < n; t++) {
+        const int32_t *c = scan->tri + 3 * t;
+        /* the same for the three corners in any order */
+        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]];
+        list[t] = (numbered){(a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u, (int32_t)t};
+    }
+    qsort(list, n, sizeof *list, compare_numbered);
+    /* sorting back by number leaves the first of each set in the order of the file */
+    size_t n_kept = 0;
+    for (size_t i = 0; i < n; i++)
+        if (n_kept == 0 || list[i].key != list[n_kept - 1].key) list[n_kept++] = list[i];
+    for (size_t i = 0; i < n_kept; i++) list[i].key = 0;
+    qsort(list, n_kept, sizeof *list, compare_numbered);
+    for (size_t i = 0; i < n_kept; i++)
+        memcpy(fewer.tri + 3 * i, scan->tri + 3 * (size_t)list[i].tri, 3 * sizeof *fewer.tri);
+    fewer.n_tri = (int)n_kept;
+    find_closed(&fewer, hash);
+    bool better = fewer.even || !scan->even;
+    free(hash);
+    free(list);
+    free(better ? scan->tri : fewer.tri);
+    if (better) *scan = fewer;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out)
+{
+    size_t n_vertex = (size_t)surface->n_vertex, n_tri = (size_t)surface->n_tri;
+    pal_scan_surface scan = {.n_tri = 0};
+    scan.point = malloc((n_vertex ? n_vertex : 1) * 3 * sizeof *scan.point);
+    scan.tri = malloc((n_tri ? n_tri : 1) * 3 * sizeof *scan.tri);
+    uint64_t *hash = malloc((n_vertex ? n_vertex : 1) * sizeof *hash);
+    if (!scan.point || !scan.tri || !hash) {
+        free(hash);
+        pal_scan_surface_free(&scan);
+        return PAL_ERR_MEMORY;
+    }
+    double scale = PAL_SCAN_ONE / h;
+    for (size_t v = 0; v < n_vertex; v++) {
+        const double *x = surface->x + 3 * v;
+        int32_t *p = scan.point + 3 * v;
+        for (int k = 0; k < 3; k++) {
+            double g = (x[k] - low[k]) * scale + 0.5;
+            p[k] = g > -1e9 && g < 1e9 ? (int32_t)floor(g) : INT32_MIN;
+        }
+        hash[v] = hash_point(p);
+    }
+    for (size_t t = 0; t < n_tri; t++) {
+        const int32_t *c = surface->tri + 3 * t;
+        bool finite = true;
+        for (int k = 0; k < 3; k++)
+            for (int d = 0; d < 3; d++) finite &= scan.point[3 * (size_t)c[k] + (size_t)d] != INT32_MIN;
+        if (!finite) continue;
+        memcpy(scan.tri + 3 * (size_t)scan.n_tri++, c, 3 * sizeof *c);
+    }
+    find_closed(&scan, hash);
+    free(hash);
+    *out = scan;
+    return PAL_ERR_OK;
+}
+
+/* crossings in the order they are found, with their rows */
+typedef struct scanner {
+    int n_p, n_q, n_place, axis; /* n_place: voxels along the axis */
+    int64_t n, cap, most;        /* crossings, room, budget */
+    pal_crossing *item;
+    int32_t *row;
+} scanner;
+
+static bool scanner_grow(scanner *s)
+{
+    int64_t cap = s->cap ? 2 * s->cap : 4096;
+    if (cap > s->most) cap = s->most;
+    if (cap <= s->n) return false;
+    pal_crossing *item = realloc(s->item, (size_t)cap * sizeof *item);
+    if (!item) return false;
+    s->item = item;
+    int32_t *row = realloc(s->row, (size_t)cap * sizeof *row);
+    if (!row) return false;
+    s->row = row;
+    s->cap = cap;
+    return true;
+}
+
+/* room for one more crossing, in the given row; NULL: out of memory or beyond the budget */
+static inline pal_crossing *scanner_next(scanner *s, int32_t row)
+{
+    if (s->n == s->cap && !scanner_grow(s)) return NULL;
+    s->row[s->n] = row;
+    return &s->item[s->n++];
+}
+
+/* does the shifted centre lie behind a crossing exactly at the centre? The surface near there moves along the axis by
+ * -(normal across . shift) / normal along */
+static bool tie_is_behind(const int32_t *a, const int32_t *b, const int32_t *c, int axis)
+{
+    int64_t e[3], f[3], normal[3];
+    for (int k = 0; k < 3; k++) e[k] = (int64_t)b[k] - a[k], f[k] = (int64_t)c[k] - a[k];
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        normal[k] = e[i] * f[j] - e[j] * f[i];
+    }
+    /* axes before this one are shifted more than the centre itself, axes after it less */
+    for (int k = 0; k < axis; k++)
+        if (normal[k] != 0) return (normal[k] > 0) == (normal[axis] > 0);
+    return true;
+}
+
+/* first voxel whose centre is behind the crossing, and the crossing's depth; weights of b and c over area */
+static int32_t find_place(const int32_t *a, const int32_t *b, const int32_t *c, int axis, int64_t weight_b,
+                          int64_t weight_c, int64_t area, int32_t *depth)
+{
+    int64_t to_b = (int64_t)b[axis] - a[axis], to_c = (int64_t)c[axis] - a[axis];
+    double t = ((double)weight_b * (double)to_b + (double)weight_c * (double)to_c) / (double)area + (double)a[axis];
+    *depth = (int32_t)floor(t);
+    double in_voxels = (t - PAL_SCAN_HALF) / PAL_SCAN_ONE, whole = floor(in_voxels + 0.5);
+    if (fabs(in_voxels - whole) > 1e-7) return (int32_t)floor(in_voxels) + 1;
+
+    /* close to a centre: compare in whole numbers */
+    int32_t place = (int32_t)whole;
+    wide rise = (wide)weight_b * to_b + (wide)weight_c * to_c;
+    wide centre = ((wide)place * PAL_SCAN_ONE + PAL_SCAN_HALF - a[axis]) * area;
+    if (rise != centre) return rise < centre ? place : place + 1;
+    return tie_is_behind(a, b, c, axis) ? place : place + 1;
+}
+
+/* edge function from u to v at (p, q) and its tie rule as a bias, so that inside is value + bias >= 0 */
+typedef struct edge_rule {
+    int64_t dp, dq, at, bias;
+} edge_rule;
+
+static edge_rule edge_make(const int32_t *u, const int32_t *v, int p, int q, int64_t at_p, int64_t at_q)
+{
+    edge_rule e = {.dp = (int64_t)v[p] - u[p], .dq = (int64_t)v[q] - u[q]};
+    e.at = e.dp * (at_q - u[q]) - e.dq * (at_p - u[p]);
+    e.bias = e.dq < 0 || (e.dq == 0 && e.dp > 0) ? 0 : -1;
+    return e;
+}
+
+/* narrows from..to, counted from the edge's place, to the centres of a row on the edge's inner side */
+static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
+{
+    int64_t value = e->at + e->bias, step = e->dq * PAL_SCAN_ONE;
+    if (step == 0) {
+        if (value < 0) *to = *from - 1;
+    } else if (step > 0) {
+        int64_t last = value < 0 ? -1 : value / step;
+        if (last < *to) *to = last;
+    } else if (value < 0) {
+        int64_t first = (-value - step - 1) / -step;
+        if (first > *from) *from = first;
+    }
+}
+
+static int32_t least3(int32_t a, int32_t b, int32_t c)
+{
+    int32_t m = a < b ? a : b;
+    return m < c ? m : c;
+}
+
+static int32_t most3(int32_t a, int32_t b, int32_t c)
+{
+    int32_t m = a > b ? a : b;
+    return m > c ? m : c;
+}
+
+/* first and last centre in low..high, within 0..n-1 */
+static bool centre_range(int32_t low, int32_t high, int n, int *from, int *to)
+{
+    *from = (low - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
+    *to = (high - PAL_SCAN_HALF) >> 16;
+    if (*from < 0) *from = 0;
+    if (*to > n - 1) *to = n - 1;
+    return *from <= *to;
+}
+
+static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const int32_t *c, int32_t part)
+{
+    int p = ACROSS[s->axis][0], q = ACROSS[s->axis][1], p0, p1, q0, q1;
+    if (!centre_range(least3(a[p], b[p], c[p]), most3(a[p], b[p], c[p]), s->n_p, &p0, &p1)) return true;
+    if (!centre_range(least3(a[q], b[q], c[q]), most3(a[q], b[q], c[q]), s->n_q, &q0, &q1)) return true;
+    int64_t area = ((int64_t)b[p] - a[p]) * ((int64_t)c[q] - a[q]) - ((int64_t)b[q] - a[q]) * ((int64_t)c[p] - a[p]);
+    if (area == 0) return true;
+
+    /* seen along the axis the projected area is the normal's component for axes 0 and 2, its opposite for axis 1; the
+     * row goes in where the outward normal points against it */
+    int32_t sign = (area < 0) == (s->axis != 1) ? 1 : -1;
+    if (area < 0) {
+        const int32_t *swap = b;
+        b = c, c = swap;
+        area = -area;
+    }
+    int64_t at_p = (int64_t)p0 * PAL_SCAN_ONE + PAL_SCAN_HALF, at_q = (int64_t)q0 * PAL_SCAN_ONE + PAL_SCAN_HALF;
+    edge_rule ab = edge_make(a, b, p, q, at_p, at_q), bc = edge_make(b, c, p, q, at_p, at_q),
+              ca = edge_make(c, a, p, q, at_p, at_q);
+    for (int j = q0; j <= q1; j++) {
+        int64_t from = 0, to = p1 - p0;
+        if (to >= WIDE_ROW) {
+            narrow(&ab, &from, &to);
+            narrow(&bc, &from, &to);
+            narrow(&ca, &from, &to);
+        }
+        int64_t value_ab = ab.at - from * ab.dq * PAL_SCAN_ONE, value_bc = bc.at - from * bc.dq * PAL_SCAN_ONE,
+                value_ca = ca.at - from * ca.dq * PAL_SCAN_ONE;
+        for (int64_t i = p0 + from; i <= p0 + to; i++) {
+            if (((value_ab + ab.bias) | (value_bc + bc.bias) | (value_ca + ca.bias)) >= 0) {
+                pal_crossing *c_out = scanner_next(s, (int32_t)(j * (int64_t)s->n_p + i));
+                if (!c_out) return false;
+                int32_t place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
+                c_out->place = place < 0 ? 0 : place > s->n_place ? s->n_place : place;
+                c_out->part = part;
+                c_out->sign = sign;
+            }
+            value_ab -= ab.dq * PAL_SCAN_ONE;
+            value_bc -= bc.dq * PAL_SCAN_ONE;
+            value_ca -= ca.dq * PAL_SCAN_ONE;
+        }
+        ab.at += ab.dp * PAL_SCAN_ONE;
+        bc.at += bc.dp * PAL_SCAN_ONE;
+        ca.at += ca.dp * PAL_SCAN_ONE;
+    }
+    return true;
+}
+
+static bool comes_before(const pal_crossing *a, const pal_crossing *b)
+{
+    if (a->place != b->place) return a->place < b->place;
+    if (a->depth != b->depth) return a->depth < b->depth;
+    if (a->part != b->part) return a->part < b->part;
+    return a->sign < b->sign;
+}
+
+static int compare_crossings(const void *a, const void *b)
+{
+    return comes_before(a, b) ? -1 : comes_before(b, a);
+}
+
+static void sort_row(pal_crossing *item, int64_t n)
+{
+    if (n > 64) {
+        qsort(item, (size_t)n, sizeof *item, compare_crossings);
+        return;
+    }
+    for (int64_t i = 1; i < n; i++) {
+        pal_crossing moved = item[i];
+        int64_t k = i;
+        for (; k > 0 && comes_before(&moved, &item[k - 1]); k--) item[k] = item[k - 1];
+        item[k] = moved;
+    }
+}
+
+/* deals the crossings to their rows and sorts each row */
+static pal_err deal_rows(const scanner *s, pal_crossings *out)
+{
+    int n_row = s->n_p * s->n_q;
+    int64_t *start = calloc((size_t)n_row + 2, sizeof *start);
+    pal_crossing *item = malloc((s->n ? (size_t)s->n : 1) * sizeof *item);
+    if (!start || !item) {
+        free(start);
+        free(item);
+        return PAL_ERR_MEMORY;
+    }
+    for (int64_t i = 0; i < s->n; i++) start[s->row[i] + 2]++;
+    for (int i = 0; i < n_row; i++) start[i + 2] += start[i + 1];
+    for (int64_t i = 0; i < s->n; i++) item[start[s->row[i] + 1]++] = s->item[i];
+    for (int i = 0; i < n_row; i++) sort_row(item + start[i], start[i + 1] - start[i]);
+    *out = (pal_crossings){n_row, start, item};
+    return PAL_ERR_OK;
+}
+
+pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out)
+{
+    scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .n_place = n[axis], .axis = axis};
+    s.most = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
+    bool ok = true;
+    for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++) {
+        const int32_t *c = scan->tri + 3 * t;
+        ok = scan_triangle(&s, scan->point + 3 * (size_t)c[0], scan->point + 3 * (size_t)c[1],
+                           scan->point + 3 * (size_t)c[2], scan->part ? scan->part[t] : 0);
+    }
+    pal_err err = ok ? deal_rows(&s, out) : s.n == s.most ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
+    free(s.item);
+    free(s.row);
+    return err;
+}
+
+void pal_crossings_free(pal_crossings *crossings)
+{
+    free(crossings->start);
+    free(crossings->item);
+    memset(crossings, 0, sizeof *crossings);
+}

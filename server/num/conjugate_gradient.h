@@ -1,0 +1,23 @@
+/* Preconditioned conjugate gradients for symmetric positive definite systems (Hestenes & Stiefel 1952), with the
+ * preconditioner given as a function. beta is Polak and Ribiere's, so that a preconditioner which is not quite the same
+ * from call to call (single precision) does no harm. No heap. Thread: any, one per struct. */
+#ifndef PAL_NUM_CONJUGATE_GRADIENT_H
+#define PAL_NUM_CONJUGATE_GRADIENT_H
+
+typedef struct pal_conjugate_gradient {
+    int n;                                                          /* unknowns */
+    void (*multiply)(void *user, const double *p, double *out);     /* out = A p                      */
+    void (*precondition)(void *user, const double *r, double *out); /* out ~ A^-1 r                    */
+    void *user;
+    double *r;         /* in: b - A x for the first guess x, out: of the last [n] */
+    double *z, *p, *q; /* work [n]                                                */
+    double residual;   /* out: |r|, Euclidean                                     */
+} pal_conjugate_gradient;
+
+/* improves x until |r| <= target, with at least `least` iterations (unless r = 0) and at most `most`; stops where a
+ * number is not finite or a direction has no positive curvature. Returns the iterations. */
+int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int least, int most);
+
+/* sums over n numbers in a fixed order, 8 at a time: the same bits everywhere */
+double pal_dot_product(int n, const double *a, const double *b);
+#endif

@@ -1,0 +1,28 @@
+/* Disjoint sets of the numbers 0 to n - 1 (union-find, paths halved on the way). The least number of a set is its root,
+ * whatever the order of joins, so that roots come before their members. root [n]: a forest of the caller's. No memory,
+ * no errors. Thread: [any], one at a time. */
+#ifndef PAL_NUM_UNION_FIND_H
+#define PAL_NUM_UNION_FIND_H
+#include <stdint.h>
+
+/* every number is a set of its own */
+static inline void pal_union_find_init(int32_t *root, int n)
+{
+    for (int i = 0; i < n; i++) root[i] = i;
+}
+
+static inline int32_t pal_union_find_root(int32_t *root, int32_t i)
+{
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return i;
+}
+
+static inline void pal_union_find_join(int32_t *root, int32_t a, int32_t b)
+{
+    a = pal_union_find_root(root, a), b = pal_union_find_root(root, b);
+    if (a < b)
+        root[b] = a;
+    else
+        root[a] = b;
+}
+#endif

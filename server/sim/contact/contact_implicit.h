@@ -1,0 +1,105 @@
+/* One tool's contact with tissue in a sub-step of an implicit solver, which is as long as the whole step.
+ *
+ * Each point near the tool is a tie (contact_spring.h) of stiffness k along `away`. One that touches acts: its load at
+ * the start of the sub-step is k d, the solver takes k back as tissue gives way, and the force that is left is k (d -
+ * m), m the tissue's motion along `away`. Those that came out pulling should not have acted, and tissue that would have
+ * come through the sphere should: where that is a noticeable part of the forces they are changed and the solver solves
+ * again, at most twice; then again only where contact would pull as a whole. Coulomb friction is two more ties across
+ * the mean direction, as stiff as all contacts together, on the mean of their points weighted by their loads; where
+ * they would pass friction times the normal force, they give that constant force instead.
+ *
+ * Caps. The sum of the settled forces is bounded by the tool's cap at its ramp and by the node's load_cap_N. When the
+ * solve left more, all ties of the tool become constant forces shortened to the cap, and the solver solves once more
+ * (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped. So a
+ * sub-step ends on the very forces that it was solved with, and the tool feels those, with what ties still pull.
+ *
+ * What a tool feels: pal_haptic_stiffness keeps, for each direction of contact, the tangent stiffness that the solver's
+ * compliance gives (haptics.md 2.3 step 3 a). Thread: [sim], makes [load]. */
+#ifndef PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
+#define PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
+#include "server/sim/contact/contact_patch.h"
+#include "server/sim/contact/contact_spring.h"
+
+enum {
+    PAL_CONTACT_IMPLICIT_MAX = 512
+}; /* points of one tool; of more, every second, third ... stands for its neighbours */
+
+typedef struct pal_contact_implicit {
+    int first, n_contact; /* rows of the contacts in pal_contact_springs                                  */
+    int across;           /* first of the two rows of friction, -1: none                       */
+    double friction_N_m;  /* their stiffness while they stick                                  */
+    double *force_N;      /* of the loads now in body->load, by row from `first` [PAL_CONTACT_IMPLICIT_MAX + 2] */
+    double *share;        /* scratch [PAL_CONTACT_IMPLICIT_MAX]                                          */
+    double t[2][3];       /* unit directions across                                            */
+    bool constant;        /* the loads stay as they are whatever tissue does                   */
+    uint8_t *active;      /* contacts that act [PAL_CONTACT_IMPLICIT_MAX]                                */
+    int round;            /* solves of this sub-step that were settled, while ties give way    */
+    bool settled;         /* total_N is part of the tool's force                               */
+    bool staged;          /* the solver has several stages                                     */
+    double total_N[3];    /* on the tool                                                       */
+    double uncapped_N;    /* what it was before caps                                           */
+    double allowed_N;     /* what caps leave of it, or would                                   */
+    bool capped;          /* it was more                                                       */
+    /* friction: how far its spring is stretched at the start and end of the sub-step, tool minus tissue, m */
+    double slip_m[3], next_slip_m[3], tool_move_m[3], normal_N;
+    bool slides, next_slides;
+} pal_contact_implicit;
+
+pal_err pal_contact_implicit_make(pal_arena *arena, pal_contact_implicit *out);
+void pal_contact_implicit_reset(pal_contact_implicit *press);
+/* keeps at most PAL_CONTACT_IMPLICIT_MAX contacts, stiffer for those left out; returns how many */
+int pal_contact_implicit_thin(pal_contact *contact, int n);
+/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that touch into body->load;
+ * move_m: the tool's own way in this sub-step (friction only) */
+void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *contact_springs,
+                                pal_contact_points *touch, pal_body *body, const pal_contact *contact, int n,
+                                double friction, const double move_m[3]);
+/* after a stage that is not the last, ties->motion_m taken. True: beyond a cap, loads changed */
+bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body, pal_tool *tool,
+                      pal_contact *contact);
+/* after the last stage: force of every contact, total on the tool. True: loads changed */
+bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+                                 pal_tool *tool, pal_contact *contact, double friction);
+
+/* tangent stiffness in a direction, found when it is asked for and has changed */
+typedef struct pal_haptic_stiffness_entry {
+    bool used, contact;
+    double normal[3], at_m[3], force_N, gap_m, k_N_m;
+    int step; /* when it was found */
+} pal_haptic_stiffness_entry;
+typedef struct pal_haptic_stiffness {
+    pal_haptic_stiffness_entry entry[PAL_CONTACT_PATCH_MAX];
+    int turn, step; /* entry to be replaced next; steps of the world */
+} pal_haptic_stiffness;
+
+/* contacts within 75 degrees of a patch's direction belong to it */
+#define PAL_CONTACT_GROUP_COSINE 0.25
+/* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
+ */
+bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *contact_group);
+
+/* the nearest tissue, of points x [n_point][3] within radius + near of a sphere's centre, not in the direction of an
+ * earlier blob (beside a contact: only what faces it, since the tissue around a dent goes along with the tool);
+ * directions of what is about as near are averaged. False: there is none */
+bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                            const pal_contact_group *earlier, int n_earlier, pal_contact_group *contact_group);
+
+/* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
+ * more than `min_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
+bool pal_haptic_stiffness_find(const pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
+                               const double at_m[3], double min_m);
+/* Finds it again. Ties do not know that the direction of a contact turns when tissue slips round the sphere: with r the
+ * tool's motion relative to tissue across `away`, a contact of force f loses f r / distance of its part along the
+ * normal, which is taken off. Rows are those of the press's contacts that bear force and belong to the blob, or, for a
+ * blob without contact, points near with weights (sum 1) and the contact stiffness k_N_m behind them */
+void pal_haptic_stiffness_contact(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
+                                  const double at_m[3], pal_contact_implicit *press,
+                                  pal_contact_springs *contact_springs, const pal_contact_points *touch,
+                                  const pal_body *body, const pal_contact *contact, double radius_m,
+                                  pal_arena *scratch);
+void pal_haptic_stiffness_near(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
+                               const double at_m[3], const pal_contact_points *touch, const pal_body *body,
+                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch);
+/* scratch that these need in a sub-step */
+size_t pal_haptic_stiffness_scratch(const pal_body *body);
+#endif

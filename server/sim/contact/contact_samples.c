@@ -1,0 +1,243 @@
+/* The contact points themselves: fixed and passing samples of triangles, fans, areas.
+ *
+ * A body that adapts (sim/adaptive_surface.h) draws other triangles from time to time, and only its active vertices are
+ * points then. Its fixed samples, fans and areas are made again when body->revision has changed, at the cost of what is
+ * drawn now. */
+#include "server/sim/contact/contact_samples.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/surface/adaptive_surface.h"
+
+#include <math.h>
+#include <string.h>
+
+/* passing samples of a step, and parts that an edge is cut into for them */
+enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
+
+static double longest_edge(const pal_surface *surface, int tri)
+{
+    const int32_t *corner = surface->tri + 3 * (size_t)tri;
+    double longest = 0;
+    for (int k = 0; k < 3; k++) {
+        const double *a = surface->x + 3 * (size_t)corner[k], *b = surface->x + 3 * (size_t)corner[(k + 1) % 3];
+        longest = fmax(longest, pal_dist3(a, b));
+    }
+    return longest;
+}
+
+static int cuts_of(double longest_m, double spacing_m)
+{
+    double n = ceil(longest_m / spacing_m);
+    return n < 2 ? 1 : (int)fmin(n, 1000);
+}
+
+static int cuts(const pal_surface *surface, int tri, double spacing_m)
+{
+    return cuts_of(longest_edge(surface, tri), spacing_m);
+}
+
+/* most samples that a mixture of levels can have: of every face those of its own or of its children, whichever are
+ * more. A face beside a finer one is drawn in up to 3 triangles as long as itself */
+static int64_t most_of_family(const pal_levels *levels, double spacing_m, int32_t face)
+{
+    enum { PIECES = 3 };
+    double longest = 0;
+    for (int k = 0; k < 3; k++) {
+        const int32_t *end = levels->edge[levels->face_edge[3 * (size_t)face + (size_t)k]].vertex;
+        longest = fmax(longest, pal_dist3(levels->x + 3 * (size_t)end[0], levels->x + 3 * (size_t)end[1]));
+    }
+    int64_t n = cuts_of(longest, spacing_m), below = 0;
+    n = n > 1 ? PIECES * n * n : 0;
+    /* children are about half as long: below this there are no more of them */
+    if (pal_levels_face_child(levels, face, 0) < 0 || n == 0) return n;
+    for (int k = 0; k < 4; k++) below += most_of_family(levels, spacing_m, pal_levels_face_child(levels, face, k));
+    return n > below ? n : below;
+}
+
+static int64_t count_samples(const pal_body *body, double spacing_m)
+{
+    const pal_surface *surface = body->surface;
+    int64_t n = 0;
+    const pal_levels *levels = body->adaptive ? &body->adaptive->levels : NULL;
+    for (int32_t f = 0; levels && f < levels->first_face[1]; f++) n += most_of_family(levels, spacing_m, f);
+    if (levels) return n;
+    for (int t = 0; t < surface->n_tri; t++) {
+        int64_t c = cuts(surface, t, spacing_m);
+        if (c > 1) n += c * c;
+    }
+    return n;
+}
+
+static double tri_area(const pal_surface *surface, int tri)
+{
+    const int32_t *corner = surface->tri + 3 * (size_t)tri;
+    double e[3], f[3];
+    const double *a = surface->x + 3 * (size_t)corner[0];
+    pal_sub3(e, surface->x + 3 * (size_t)corner[1], a);
+    pal_sub3(f, surface->x + 3 * (size_t)corner[2], a);
+    pal_cross3(e, e, f);
+    return 0.5 * pal_norm3(e);
+}
+
+/* centroids of the n^2 equal triangles that a triangle cut into n parts an edge has */
+static int sample(int32_t *corner_out, float *share_out, const int32_t *corner, int n)
+{
+    int k = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n - i; j++)
+            for (int half = 0; half < 2 && (half == 0 || j < n - i - 1); half++) {
+                double third = half ? 2.0 / 3 : 1.0 / 3, u = (i + third) / n, w = (j + third) / n;
+                memcpy(corner_out + 3 * (size_t)k, corner, 3 * sizeof *corner);
+                float *share = share_out + 3 * (size_t)k++;
+                share[0] = (float)(1 - u - w), share[1] = (float)u, share[2] = (float)w;
+            }
+    return k;
+}
+
+static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pal_contact_points *t)
+{
+    size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
+    size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0;
+    size_t n_tri = (size_t)(body->adaptive ? body->adaptive->n_slot : body->surface->n_tri),
+           room = (size_t)n_sample + PASSING_MAX;
+    t->corner = PAL_NEW(arena, int32_t, 3 * room);
+    t->share = PAL_NEW(arena, float, 3 * room);
+    t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
+    t->fan_start = PAL_NEW(arena, int32_t, n_vertex + 2);
+    t->fan_end = body->adaptive ? PAL_NEW(arena, int32_t, n_vertex) : t->fan_start + 1;
+    if (body->adaptive) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
+    t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
+    t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
+    t->live = PAL_NEW(arena, int32_t, n_vertex);
+    t->frame = PAL_NEW(arena, int32_t, n_frame);
+    t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
+    t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
+    t->x = PAL_NEW(arena, double, 3 * n_vertex);
+    t->v = PAL_NEW(arena, double, 3 * n_vertex);
+    size_t n_slot = body->skin ? n_frame : n_node;
+    t->slot = PAL_NEW(arena, int32_t, n_slot);
+    t->node = PAL_NEW(arena, int32_t, n_node);
+    t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->node_mark = PAL_NEW(arena, uint32_t, n_node);
+    t->turning = PAL_NEW(arena, pal_frame_spin, n_frame);
+    t->spin_mark = PAL_NEW(arena, uint32_t, n_frame);
+    t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->seen = PAL_NEW(arena, uint32_t, n_vertex);
+    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
+    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
+    t->force = PAL_NEW(arena, double, 3 * n_node);
+    bool all = t->fan_end && (t->run || !body->adaptive) && t->corner && t->share && t->area_m2 && t->fan_start &&
+               t->fan && t->tri_mark && t->live && t->frame && t->live_mark && t->frame_mark && t->x && t->v &&
+               t->slot && t->node && t->slot_mark && t->node_mark && t->slot_force && t->slot_torque && t->force &&
+               t->turning && t->spin_mark && t->tool_mark && t->seen;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static void make_fans(const pal_surface *surface, pal_contact_points *t)
+{
+    /* starts are built one place ahead, so that filling leaves them in place */
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) t->fan_start[surface->tri[i] + 2]++;
+    for (int i = 0; i < t->n_vertex; i++) t->fan_start[i + 2] += t->fan_start[i + 1];
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++)
+        t->fan[t->fan_start[surface->tri[i] + 1]++] = (int32_t)(i / 3);
+}
+
+/* fixed samples, and the rest area of samples and vertices; returns how many samples. Those that have no room any more
+ * are left to the vertices */
+static int make_samples(const pal_surface *surface, pal_contact_points *t)
+{
+    int k = 0, room = t->max_point - PASSING_MAX - t->n_vertex;
+    t->n_run = 0;
+    for (int i = 0; i < surface->n_tri; i++) {
+        const int32_t *corner = surface->tri + 3 * (size_t)i;
+        double area = tri_area(surface, i);
+        int n = cuts(surface, i, t->spacing_m);
+        if (n == 1 || n * n > room - k) {
+            for (int c = 0; c < 3; c++) t->area_m2[corner[c]] += area / 3;
+            continue;
+        }
+        if (t->run) t->run[t->n_run++] = k;
+        int made = sample(t->corner + 3 * (size_t)k, t->share + 3 * (size_t)k, corner, n);
+        for (int j = 0; j < made; j++) t->area_m2[t->n_vertex + k + j] = area / made;
+        k += made;
+    }
+    if (t->run) t->run[t->n_run] = k;
+    return k;
+}
+
+/* all of that for the triangles that a body that adapts draws now; what vertices out of use have is never looked at */
+static void make_active(const pal_body *body, pal_contact_points *t)
+{
+    const pal_surface *surface = body->surface;
+    size_t n_corner = 3 * (size_t)surface->n_tri;
+    int32_t at = 0;
+    for (int k = 0; k < body->n_active; k++) t->area_m2[body->active[k]] = t->fan_end[body->active[k]] = 0;
+    for (size_t i = 0; i < n_corner; i++) t->fan_end[surface->tri[i]]++;
+    for (int k = 0; k < body->n_active; k++) {
+        int32_t vertex = body->active[k], n = t->fan_end[vertex];
+        t->fan_start[vertex] = t->fan_end[vertex] = at;
+        at += n;
+    }
+    for (size_t i = 0; i < n_corner; i++) t->fan[t->fan_end[surface->tri[i]]++] = (int32_t)(i / 3);
+    t->n_fixed = t->n_point = t->n_vertex + make_samples(surface, t);
+    t->revision = body->revision;
+}
+
+pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
+                                pal_contact_points *out)
+{
+    const pal_surface *surface = body->surface;
+    if (!surface || body->n_shown <= 0 || surface->n_vertex != body->n_shown || !(spacing_m > 0))
+        return PAL_ERR_REFUSED;
+    int64_t n_sample = count_samples(body, spacing_m);
+    while (n_sample > max_sample) {
+        spacing_m *= 1.25;
+        n_sample = count_samples(body, spacing_m);
+    }
+    pal_contact_points t = {.n_vertex = body->n_shown, .spacing_m = spacing_m};
+    t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
+    t.max_point = t.n_fixed + PASSING_MAX;
+    PAL_TRY(allocate(body, arena, (int)n_sample, &t));
+    if (body->adaptive) {
+        make_active(body, &t);
+    } else {
+        make_fans(surface, &t);
+        make_samples(surface, &t);
+    }
+    *out = t;
+    return PAL_ERR_OK;
+}
+
+bool pal_contact_points_update_topology(pal_contact_points *touch, const pal_body *body)
+{
+    if (!body->adaptive || touch->revision == body->revision) return false;
+    make_active(body, touch);
+    return true;
+}
+
+void pal_contact_points_sample_stretched(pal_contact_points *touch, const pal_body *body, const int32_t *list, int n)
+{
+    double spacing2 = touch->spacing_m * touch->spacing_m;
+    for (int i = 0; i < n; i++)
+        for (int k = touch->fan_start[list[i]]; k < touch->fan_end[list[i]]; k++) {
+            int32_t tri = touch->fan[k];
+            const int32_t *corner = body->surface->tri + 3 * (size_t)tri;
+            if (touch->tri_mark[tri] == touch->mark) continue;
+            touch->tri_mark[tri] = touch->mark;
+            double longest2 = 0;
+            for (int c = 0; c < 3; c++) {
+                const float *p = body->shown + 3 * (size_t)corner[c],
+                            *q = body->shown + 3 * (size_t)corner[(c + 1) % 3];
+                double x = (double)(p[0] - q[0]), y = (double)(p[1] - q[1]), z = (double)(p[2] - q[2]);
+                double length2 = x * x + y * y + z * z;
+                if (length2 > longest2) longest2 = length2;
+            }
+            if (!(longest2 > spacing2) || cuts(body->surface, tri, touch->spacing_m) > 1) continue;
+            int cut = (int)fmin(ceil(sqrt(longest2 / spacing2)), PASSING_CUTS);
+            if (touch->n_point + cut * cut > touch->max_point) return;
+            size_t at = (size_t)(touch->n_point - touch->n_vertex);
+            int made = sample(touch->corner + 3 * at, touch->share + 3 * at, corner, cut);
+            double area = tri_area(body->surface, tri) / made;
+            for (int j = 0; j < made; j++) touch->area_m2[touch->n_point++] = area;
+        }
+}

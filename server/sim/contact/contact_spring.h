@@ -1,0 +1,78 @@
+/* Ties: springs between tools and tissue as an implicit solver takes them. One tie measures the motion of a contact
+ * point (or of the mean of several) along a direction, linear in the nodes' displacement since the sub-step began:
+ *     m_i = J_i u,   K = sum k_i J_i' J_i,   loads sum f_i J_i' .
+ *
+ * J_i is the exact derivative of the skinned point at the start of the sub-step, turning of its frames included
+ * (sim/contact_points.h, sim/frame_spin.h), so loads, stiffness and the motion that settles a force belong together:
+ * total force and torque are those of the contact and K is symmetric and positive semi-definite whatever is left out.
+ * It is applied in two halves, nodes -> velocity and spin of each slot in use -> points, which costs 6 products a slot
+ * and point instead of 3 for each of the 20 to 60 nodes around.
+ *
+ * Fixed room: max_row ties; a slot beyond `most_slot` or a frame beyond max_face faces is left out (the tie is
+ * refused, the frame does not turn). Memory: the world's arena. Thread: [sim], pal_contact_springs_make [load]. */
+#ifndef PAL_SIM_CONTACT_CONTACT_SPRING_H
+#define PAL_SIM_CONTACT_CONTACT_SPRING_H
+#include "server/sim/contact/contact_points.h"
+
+/* a slot's part in a tie: motion += linear . v_slot + angular . spin_slot */
+typedef struct pal_contact_spring_part {
+    int32_t slot; /* index into pal_contact_springs.frame */
+    double linear[3], angular[3];
+} pal_contact_spring_part;
+
+/* a slot in use: its node, and how it spins when the nodes around it move */
+typedef struct pal_contact_spring_frame {
+    int32_t slot, node, end, first_face, n_face; /* end -1: it does not turn */
+    double tilt[9], twist[3], Z[3];              /* spin = tilt sum(a' x b + a x b') + twist (Z . e') */
+} pal_contact_spring_frame;
+
+typedef struct pal_contact_spring_face {
+    int32_t a, b;
+    double to_a[3], to_b[3]; /* from the frame's node */
+} pal_contact_spring_face;
+
+typedef struct pal_contact_springs {
+    int n_row, n_part, n_frame, n_face, n_node;
+    int max_row, most_part, max_frame, max_face;
+    int32_t *start;   /* first part of each row [max_row + 1]             */
+    double *k_N_m;    /* [max_row]                                        */
+    double *motion_m; /* J u of the last pal_contact_springs_motion [max_row]        */
+    pal_contact_spring_part *part;
+    pal_contact_spring_frame *frame;
+    pal_contact_spring_face *face;
+    double *state; /* v and spin, or force and torque, of frames in use [max_frame][6] */
+    int32_t *local;
+    uint32_t *local_mark, *node_mark, turn; /* by slot, by node                                       */
+    int32_t *node;                          /* nodes that any row touches [body n_node]               */
+    double *force;                          /* scratch of pal_contact_springs_max_force_N, by node [body n_node][3]  */
+} pal_contact_springs;
+
+/* room for max_row ties in all; MEMORY */
+pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out);
+/* a new sub-step: no ties */
+void pal_contact_springs_begin(pal_contact_springs *contact_springs);
+/* one point along a unit direction, at the state of the last pal_contact_points_update; its row, -1: no room */
+int pal_contact_springs_add(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
+                            int point, const double direction[3], double k_N_m);
+/* the mean of n contacts' points, weights [n] with sum 1 */
+int pal_contact_springs_add_mean(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
+                                 const pal_contact *contact, const double *weight, int n, const double direction[3],
+                                 double k_N_m);
+/* motion_m of every row for displacements u [n_node][3] */
+void pal_contact_springs_motion(pal_contact_springs *contact_springs, const double *u);
+/* out += s K u; u, out [n_node][3] */
+void pal_contact_springs_multiply(pal_contact_springs *contact_springs, double s, const double *u, double *out);
+/* to += s sum of force_N[i] J_(first+i)', i < n; to [n_node][3] */
+void pal_contact_springs_load(pal_contact_springs *contact_springs, double s, const double *force_N, int first, int n,
+                              double *to);
+/* the largest node force of such a sum, N */
+double pal_contact_springs_max_force_N(pal_contact_springs *contact_springs, const double *force_N, int first, int n);
+
+/* Tangent stiffness that a tool feels which moves rows[i] by share[i] for each metre it goes itself, the tissue behind
+ * them answering statically: 1^T-form  share' (1/k + J W J')^-1 share,  W = body->compliance (haptics.md 2.3 step 3 a).
+ * `passes` steps of conjugate gradients with k as preconditioner, one back-substitution each; every pass comes closer
+ * from below (the first is the answer of an even pressure, 8 % low under a round contact). scratch: 2 [n_node][3] and 4
+ * [n]. answer [n_node][3], may be NULL: how tissue moves for each metre. 0: not known */
+double pal_contact_springs_stiffness(pal_contact_springs *contact_springs, const pal_body *body, const int32_t *rows,
+                                     const double *share, int n, int passes, double *answer, pal_arena *scratch);
+#endif

@@ -1,0 +1,146 @@
+/* A tool's contact handed over from body to body (tool_contact.h). */
+#include "server/sim/contact/tool_contact.h"
+
+#include "server/base/vec3.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void pal_tool_contact_end_blend(pal_tool_contact *h)
+{
+    h->hold.acts = h->hold.friction_due = false;
+    h->hold.share = h->hold.part = 0;
+    pal_set3(h->hold.now_N, 0, 0, 0);
+}
+
+void pal_tool_contact_free(pal_tool_contact *h)
+{
+    free(h->hold.node);
+    free(h->hold.force_N);
+    h->hold = (pal_contact_blend){.acts = false};
+}
+
+/* ---- the force of before ---- */
+
+/* old nodes' forces to the new nodes that lie there */
+static void add_node(const pal_interpolation *place, int32_t node, double scale, const double force_N[3], double *sum)
+{
+    if (!place) pal_axpy3(sum + 3 * (size_t)node, scale, force_N);
+    for (int32_t k = place ? place->start[node] : 0; place && k < place->start[node + 1]; k++)
+        pal_axpy3(sum + 3 * (size_t)place->point[k], scale * place->weight[k], force_N);
+}
+
+/* sum [body n_node][3] of the contacts' forces, and of what was held itself */
+static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *touch,
+                      const pal_interpolation *place, double *sum)
+{
+    pal_contact_points_force_begin(touch);
+    for (int i = 0; i < from->n_contact; i++)
+        pal_contact_points_add_force(touch, old, from->contact[i].point, from->contact[i].force);
+    (void)pal_contact_points_assemble(touch, old);
+    for (int i = 0; i < touch->n_node; i++)
+        add_node(place, touch->node[i], 1, touch->force + 3 * (size_t)touch->node[i], sum);
+    for (int i = 0; i < from->hold.n_node && from->hold.acts; i++)
+        add_node(place, from->hold.node[i], from->hold.part, from->hold.force_N + 3 * (size_t)i, sum);
+}
+
+static bool keep_nodes(pal_contact_blend *hold, const double *sum, int n_node)
+{
+    int n = 0;
+    for (int i = 0; i < n_node; i++) n += pal_dot3(sum + 3 * (size_t)i, sum + 3 * (size_t)i) > 0;
+    hold->node = malloc(sizeof *hold->node * (size_t)(n + 1));
+    hold->force_N = malloc(3 * sizeof *hold->force_N * (size_t)(n + 1));
+    if (!hold->node || !hold->force_N) return false;
+    for (int i = 0; i < n_node; i++) {
+        const double *f = sum + 3 * (size_t)i;
+        if (!(pal_dot3(f, f) > 0)) continue;
+        pal_copy3(hold->force_N + 3 * (size_t)hold->n_node, f);
+        hold->node[hold->n_node++] = i;
+    }
+    return true;
+}
+
+static void take_force(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from, const pal_body *old,
+                       pal_contact_points *touch, const pal_interpolation *place)
+{
+    double *sum = calloc(3 * (size_t)body->n_node + 1, sizeof *sum);
+    if (sum && pal_finite3(from->total) && pal_norm3(from->total) > 0) {
+        sum_nodes(from, old, touch, place, sum);
+        to->hold.acts = keep_nodes(&to->hold, sum, body->n_node);
+    }
+    free(sum);
+    if (!to->hold.acts) return;
+    to->hold.friction_due = true;
+    pal_set3(to->hold.total_N, 0, 0, 0);
+    for (int i = 0; i < to->hold.n_node; i++)
+        pal_sub3(to->hold.total_N, to->hold.total_N, to->hold.force_N + 3 * (size_t)i);
+    pal_copy3(to->total, to->hold.total_N);
+}
+
+/* the same body in another world: nothing to be let go */
+static void go_on(pal_tool_contact *to, const pal_tool_contact *from)
+{
+    to->share = from->share;
+    if (!to->firm || !from->firm) return;
+    pal_copy3(to->firm->press.next_slip_m, from->firm->press.next_slip_m);
+    to->firm->press.next_slides = from->firm->press.next_slides;
+    to->firm->press.normal_N = from->firm->press.normal_N;
+    to->firm->haptic_stiffness = from->firm->haptic_stiffness;
+}
+
+void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
+                               const pal_body *old, pal_contact_points *touch, const pal_interpolation *place,
+                               double k_N_m)
+{
+    pal_tool_contact_free(to);
+    to->active = from->active;
+    to->proxy = from->proxy;
+    to->ease = from->ease;
+    to->time_behind_s = from->time_behind_s;
+    to->uncapped_N = from->uncapped_N;
+    to->patches = from->patches;
+    pal_copy3(to->slip, from->slip);
+    if (!from->active) return;
+    if (to->firm) {
+        pal_copy3(to->firm->last_m, from->firm ? from->firm->last_m : from->limits.b);
+        to->firm->back_m = from->firm ? from->firm->back_m : 0;
+    }
+    if (!place) {
+        go_on(to, from);
+        return;
+    }
+    pal_copy3(to->hold.at_m, from->firm ? from->firm->last_m : from->limits.b);
+    to->hold.k_N_m = k_N_m;
+    take_force(to, body, from, old, touch, place);
+}
+
+void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool, const double here_m[3])
+{
+    pal_contact_blend *hold = &h->hold;
+    double back[3], size = pal_norm3(hold->total_N);
+    if (!hold->acts) return;
+    if (step->sub == 0 && hold->n_done++ == 0) hold->ramp = tool->ramp;
+    hold->share = 1 - (hold->n_done - 1 + (step->sub + 1.0) / step->n_sub) / PAL_CONTACT_BLEND_STEPS;
+    if (hold->share < 1e-9) {
+        pal_tool_contact_end_blend(h);
+        return;
+    }
+    pal_sub3(back, here_m, hold->at_m);
+    double less_N = hold->k_N_m * fmax(0, pal_dot3(back, hold->total_N) / size);
+    hold->part = hold->share * fmax(0, 1 - less_N / size) * (hold->ramp > 0 ? fmin(1, tool->ramp / hold->ramp) : 0);
+    for (int i = 0; i < hold->n_node; i++)
+        pal_axpy3(step->body->load + 3 * (size_t)hold->node[i], hold->part, hold->force_N + 3 * (size_t)i);
+    pal_scale3(hold->now_N, hold->part, hold->total_N);
+    pal_add3(tool->force_N, tool->force_N, hold->now_N);
+    tool->touching = tool->touching || hold->part > 0;
+}
+
+bool pal_tool_contact_friction(pal_tool_contact *h, const double along[3], double stiffness_N_m, double slip_m[3])
+{
+    if (!h->hold.friction_due || !(stiffness_N_m > 0) || !(h->hold.share < 1)) return false;
+    h->hold.friction_due = false;
+    /* on tissue, across; contact has 1 - s of its stiffness as yet */
+    pal_scale3(slip_m, -(1 - h->hold.share) / stiffness_N_m, h->hold.total_N);
+    pal_axpy3(slip_m, -pal_dot3(slip_m, along), along);
+    return true;
+}

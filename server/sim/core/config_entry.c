@@ -1,0 +1,167 @@
+/* Scene entries: typed keys with their path, read once each. */
+#include "server/sim/core/config_entry.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *kind_name(pal_config_value_kind kind)
+{
+    static const char *const names[] = {"a number", "true or false", "a text", "a list of numbers"};
+    return names[kind];
+}
+
+void pal_entry_init(pal_config_entry *item, const char *path, const char *name)
+{
+    memset(item, 0, sizeof *item);
+    snprintf(item->path, sizeof item->path, "%s", path);
+    snprintf(item->name, sizeof item->name, "%s", name);
+}
+
+static pal_config_value *find(const pal_config_entry *item, const char *key)
+{
+    for (int i = 0; i < item->n_value; i++)
+        if (!strcmp(item->value[i].key, key)) return (pal_config_value *)&item->value[i];
+    return NULL;
+}
+
+static pal_err put(pal_config_entry *item, const char *key, pal_config_value_kind kind, pal_config_value **out,
+                   pal_diagnostic *diag)
+{
+    if (!*key || strlen(key) >= PAL_ENTRY_TEXT)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: key of %zu characters, wanted 1 to %d", item->path,
+                                  strlen(key), PAL_ENTRY_TEXT - 1);
+    if (find(item, key))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: key \"%s\" is there twice", item->path, key);
+    if (item->n_value == PAL_ENTRY_KEYS)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: more than %d keys", item->path, PAL_ENTRY_KEYS);
+    pal_config_value *v = &item->value[item->n_value++];
+    memset(v, 0, sizeof *v);
+    snprintf(v->key, sizeof v->key, "%s", key);
+    v->kind = kind;
+    *out = v;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_put_number(pal_config_entry *item, const char *key, double number, pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(put(item, key, PAL_VALUE_NUMBER, &v, diag));
+    v->number[0] = number;
+    v->n_number = 1;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_put_bool(pal_config_entry *item, const char *key, bool flag, pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(put(item, key, PAL_VALUE_BOOL, &v, diag));
+    v->flag = flag;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
+{
+    if (strlen(text) >= PAL_ENTRY_TEXT)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: text of %zu characters, at most %d", item->path, key,
+                                  strlen(text), PAL_ENTRY_TEXT - 1);
+    pal_config_value *v;
+    PAL_TRY(put(item, key, PAL_VALUE_TEXT, &v, diag));
+    snprintf(v->text, sizeof v->text, "%s", text);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const double *number, int n,
+                              pal_diagnostic *diag)
+{
+    if (n < 0 || n > PAL_ENTRY_NUMBERS)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: list of %d numbers, at most %d", item->path, key, n,
+                                  PAL_ENTRY_NUMBERS);
+    pal_config_value *v;
+    PAL_TRY(put(item, key, PAL_VALUE_NUMBERS, &v, diag));
+    if (n > 0) memcpy(v->number, number, (size_t)n * sizeof *number);
+    v->n_number = n;
+    return PAL_ERR_OK;
+}
+
+bool pal_entry_has(const pal_config_entry *item, const char *key)
+{
+    return find(item, key) != NULL;
+}
+
+/* *out is NULL when the key is absent */
+static pal_err take(pal_config_entry *item, const char *key, pal_config_value_kind kind, pal_config_value **out,
+                    pal_diagnostic *diag)
+{
+    pal_config_value *v = find(item, key);
+    *out = v;
+    if (!v) return PAL_ERR_OK;
+    if (v->kind != kind)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: is %s, wanted %s", item->path, key, kind_name(v->kind),
+                                  kind_name(kind));
+    v->used = true;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_read_number(pal_config_entry *item, const char *key, double low, double high, double *out,
+                              pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(take(item, key, PAL_VALUE_NUMBER, &v, diag));
+    if (!v) return PAL_ERR_OK;
+    if (!(v->number[0] >= low && v->number[0] <= high))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %g is outside [%g, %g]", item->path, key, v->number[0],
+                                  low, high);
+    *out = v->number[0];
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_read_count(pal_config_entry *item, const char *key, int low, int high, int *out, pal_diagnostic *diag)
+{
+    double number = *out;
+    PAL_TRY(pal_entry_read_number(item, key, low, high, &number, diag));
+    if (number != floor(number))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %g is not a whole number", item->path, key, number);
+    *out = (int)number;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_read_bool(pal_config_entry *item, const char *key, bool *out, pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(take(item, key, PAL_VALUE_BOOL, &v, diag));
+    if (v) *out = v->flag;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_read_text(pal_config_entry *item, const char *key, const char **out, pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(take(item, key, PAL_VALUE_TEXT, &v, diag));
+    if (v) *out = v->text;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_read_numbers(pal_config_entry *item, const char *key, int n, double *out, pal_diagnostic *diag)
+{
+    pal_config_value *v;
+    PAL_TRY(take(item, key, PAL_VALUE_NUMBERS, &v, diag));
+    if (!v) return PAL_ERR_OK;
+    if (v->n_number != n)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %d numbers, wanted %d", item->path, key, v->n_number,
+                                  n);
+    for (int i = 0; i < n; i++)
+        if (!isfinite(v->number[i]))
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: number %d is not finite", item->path, key, i + 1);
+    memcpy(out, v->number, (size_t)n * sizeof *out);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_entry_check_unused(const pal_config_entry *item, pal_diagnostic *diag)
+{
+    for (int i = 0; i < item->n_value; i++)
+        if (!item->value[i].used)
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s (%s): unknown key \"%s\"", item->path, item->name,
+                                      item->value[i].key);
+    return PAL_ERR_OK;
+}

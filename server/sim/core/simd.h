@@ -1,0 +1,91 @@
+/* Vectors of 8 lanes for the spring kernels. Only files compiled with the room's options include this: where the
+ * processor has no such vectors the compiler splits them and the calling convention differs (-Wno-psabi), which is why
+ * everything here is inlined. Thread: [sim]. */
+#ifndef PAL_SIM_CORE_SIMD_H
+#define PAL_SIM_CORE_SIMD_H
+#include "server/sim/core/simd_blocks.h"
+
+/* 8 doubles side by side: GNU vectors, which gcc and clang turn into whatever the processor has. pal_v8_unaligned in
+ * memory may stand at any multiple of 8 bytes */
+typedef double pal_v8 __attribute__((vector_size(64)));
+typedef int64_t pal_i8 __attribute__((vector_size(64)));
+typedef double pal_v8_unaligned __attribute__((vector_size(64), aligned(8), may_alias));
+
+/* x y z 0 of a node */
+typedef double pal_quad __attribute__((vector_size(32)));
+
+PAL_INLINE pal_quad pal_quad_load(const double a[3])
+{
+    return (pal_quad){a[0], a[1], a[2], 0};
+}
+PAL_INLINE void pal_quad_store(double a[3], pal_quad q)
+{
+    a[0] = q[0], a[1] = q[1], a[2] = q[2];
+}
+PAL_INLINE double pal_quad_dot(pal_quad a, pal_quad b)
+{
+    pal_quad p = a * b;
+    return p[0] + p[1] + p[2];
+}
+
+PAL_INLINE pal_v8 pal_load8(const double *at)
+{
+    return *(const pal_v8_unaligned *)at;
+}
+PAL_INLINE void pal_add8(double *at, pal_v8 a)
+{
+    *(pal_v8_unaligned *)at += a;
+}
+/* lane by lane: a where the mask is set, else b */
+PAL_INLINE pal_v8 pal_select8(pal_i8 mask, pal_v8 a, pal_v8 b)
+{
+    return (pal_v8)((mask & (pal_i8)a) | (~mask & (pal_i8)b));
+}
+/* 1 / sqrt(q) for positive normal q: a guess from the halved exponent and four Newton steps, within a few units of the
+ * last place. The same bits on every IEEE machine, at a third of the cost of root and division */
+PAL_INLINE pal_v8 pal_inverse_sqrt8(pal_v8 q)
+{
+    pal_v8 half = 0.5 * q, r = (pal_v8)(0x5fe6eb50c7b537a9 - ((pal_i8)q >> 1));
+    r = r * (1.5 - half * r * r);
+    r = r * (1.5 - half * r * r);
+    r = r * (1.5 - half * r * r);
+    return r * (1.5 - half * r * r);
+}
+
+/* sqrt(q) for q >= 0, to a few units of the last place */
+PAL_INLINE pal_v8 pal_sqrt8(pal_v8 q)
+{
+    const pal_v8 floor = 1e-300 - (pal_v8){0};
+    return q * pal_inverse_sqrt8(pal_select8(q < floor, floor, q));
+}
+/* length of the cross product a x b */
+PAL_INLINE pal_v8 pal_cross_length8(const pal_v8 a[3], const pal_v8 b[3])
+{
+    pal_v8 x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    return pal_sqrt8(x * x + y * y + z * z);
+}
+PAL_INLINE pal_v8 pal_length8(const pal_v8 a[3])
+{
+    return pal_sqrt8(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+}
+
+/* coordinates of a loose block's corners, slots node [n_corner][8] */
+PAL_INLINE void pal_loose_load(const pal_node_order *node_order, const int32_t *node, int n_corner,
+                               double at[][3][PAL_LANES])
+{
+    for (int c = 0; c < n_corner; c++)
+        for (int d = 0; d < 3; d++)
+            for (int l = 0; l < PAL_LANES; l++)
+                at[c][d][l] = node_order->x[d * node_order->n_slot + node[c * PAL_LANES + l]];
+}
+/* the forces on corners 1, 2, 3 into slots->f, minus their sum on corner 0, lane by lane */
+PAL_INLINE void pal_loose_add(pal_node_order *node_order, const int32_t *node, int n_corner, pal_v8 f[][3])
+{
+    for (int c = 1; c < n_corner; c++)
+        for (int l = 0; l < PAL_LANES; l++)
+            for (int d = 0; d < 3; d++) {
+                node_order->f[d * node_order->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
+                node_order->f[d * node_order->n_slot + node[l]] -= f[c - 1][d][l];
+            }
+}
+#endif

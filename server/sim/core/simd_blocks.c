@@ -1,0 +1,204 @@
+/* Slots and strips. */
+#include "server/sim/core/simd_blocks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* a strip with fewer constraints than this costs more than its lanes are worth */
+enum { LEAST_LANES = 2, TILE = 128 };
+
+typedef struct lattice {
+    double low[3];
+    int n[3], axis[3];    /* nodes along x, y, z; axes from the longest to the shortest */
+    int half[3], n_class; /* half of the nodes along each sorted axis; their product  */
+} lattice;
+
+/* false: the nodes stand on no lattice of edge h, or on one that is nearly empty */
+static bool find_lattice(const double *x, int n_node, double edge_m, lattice *to)
+{
+    double high[3];
+    for (int c = 0; c < 3; c++) to->low[c] = INFINITY, high[c] = -INFINITY;
+    for (int i = 0; i < 3 * n_node; i++) {
+        to->low[i % 3] = fmin(to->low[i % 3], x[i]);
+        high[i % 3] = fmax(high[i % 3], x[i]);
+    }
+    double n_finest = 1;
+    for (int c = 0; c < 3; c++) {
+        double n = floor((high[c] - to->low[c]) / edge_m + 1.5);
+        if (!(n >= 1 && n < 1e5)) return false;
+        to->n[c] = (int)n;
+        n_finest *= n + 1;
+    }
+    if (n_finest > 16.0 * n_node + 1000) return false;
+    for (int i = 0; i < 3 * n_node; i++) {
+        double g = (x[i] - to->low[i % 3]) / edge_m;
+        if (fabs(g - floor(g + 0.5)) > 1e-3) return false;
+    }
+    for (int c = 0; c < 3; c++) to->axis[c] = c;
+    for (int c = 0; c < 3; c++)
+        for (int d = c + 1; d < 3; d++)
+            if (to->n[to->axis[d]] > to->n[to->axis[c]]) {
+                int swap = to->axis[c];
+                to->axis[c] = to->axis[d];
+                to->axis[d] = swap;
+            }
+    for (int c = 0; c < 3; c++) to->half[c] = (to->n[to->axis[c]] + 1) / 2;
+    to->n_class = to->half[0] * to->half[1] * to->half[2];
+    return true;
+}
+
+static int slot_of(const lattice *l, const double *x, double edge_m)
+{
+    int g[3];
+    for (int c = 0; c < 3; c++) g[c] = (int)floor((x[l->axis[c]] - l->low[l->axis[c]]) / edge_m + 0.5);
+    int class = (g[0] & 1) + 2 * (g[1] & 1) + 4 * (g[2] & 1);
+    return class * l->n_class + (g[2] / 2 * l->half[1] + g[1] / 2) * l->half[0] + g[0] / 2;
+}
+
+pal_err pal_node_order_make(const double *x_rest, int n_node, double edge_m, pal_arena *arena, pal_node_order **out)
+{
+    lattice l;
+    pal_node_order *s = PAL_NEW(arena, pal_node_order, 1);
+    int32_t *slot = PAL_NEW(arena, int32_t, n_node);
+    if (!s || !slot) return PAL_ERR_MEMORY;
+    bool regular = find_lattice(x_rest, n_node, edge_m, &l);
+    int n_slot = 0;
+    for (int i = 0; i < n_node; i++) {
+        slot[i] = regular ? slot_of(&l, x_rest + 3 * i, edge_m) : i;
+        if (slot[i] >= n_slot) n_slot = slot[i] + 1;
+    }
+    /* lanes without a constraint may reach beyond the last slot */
+    n_slot = (n_slot + 2 * PAL_LANES - 1) & ~(PAL_LANES - 1);
+    *s = (pal_node_order){.n_node = n_node, .n_slot = n_slot, .slot = slot};
+    s->x = PAL_NEW(arena, double, 3 * (size_t)n_slot);
+    s->f = PAL_NEW(arena, double, 3 * (size_t)n_slot);
+    if (!s->x || !s->f) return PAL_ERR_MEMORY;
+    *out = s;
+    return PAL_ERR_OK;
+}
+
+/* a constraint on its way into a block */
+typedef struct entry {
+    int32_t slot[PAL_SIMD_CORNERS_MAX], item;
+} entry;
+
+static int compare_shape(const entry *a, const entry *b)
+{
+    for (int c = 1; c < PAL_SIMD_CORNERS_MAX; c++) {
+        int32_t da = a->slot[c] - a->slot[0], db = b->slot[c] - b->slot[0];
+        if (da != db) return da < db ? -1 : 1;
+    }
+    return 0;
+}
+
+static int compare_entries(const void *pa, const void *pb)
+{
+    const entry *a = pa, *b = pb;
+    int tile_a = a->slot[0] / TILE, tile_b = b->slot[0] / TILE;
+    if (tile_a != tile_b) return tile_a < tile_b ? -1 : 1;
+    int shape = compare_shape(a, b);
+    if (shape != 0) return shape;
+    if (a->slot[0] != b->slot[0]) return a->slot[0] < b->slot[0] ? -1 : 1;
+    return a->item < b->item ? -1 : a->item > b->item;
+}
+
+/* how many entries from e on fit a strip that begins with it */
+static int strip_length(const entry *e, const entry *end)
+{
+    int n = 1;
+    while (e + n < end && compare_shape(e, e + n) == 0 && e[n].slot[0] > e[n - 1].slot[0] &&
+           e[n].slot[0] - e[0].slot[0] < PAL_LANES)
+        n++;
+    return n;
+}
+
+/* entries in order: strips are numbered and placed, the rest is counted; with out->base, out->node filled too */
+static void place_all(const entry *first, int n_item, pal_simd_blocks *out)
+{
+    const entry *end = first + n_item;
+    int n_strip = 0, n_unsupported = 0;
+    for (const entry *e = first; e < end;) {
+        int n = strip_length(e, end);
+        bool strip = n >= LEAST_LANES;
+        for (int i = 0; i < n; i++) {
+            if (strip) {
+                out->place[e[i].item] = PAL_LANES * n_strip + e[i].slot[0] - e->slot[0];
+                continue;
+            }
+            int lane = n_unsupported % PAL_LANES, block = n_unsupported / PAL_LANES;
+            out->place[e[i].item] = PAL_LANES * out->n_strip + n_unsupported++;
+            for (int c = 0; c < out->n_corner && out->node; c++)
+                out->node[(block * out->n_corner + c) * PAL_LANES + lane] = e[i].slot[c];
+        }
+        for (int c = 0; c < out->n_corner && strip && out->base; c++)
+            out->base[n_strip * out->n_corner + c] = e->slot[c];
+        n_strip += strip;
+        e += n;
+    }
+    out->n_strip = n_strip;
+    out->n_unsupported = (n_unsupported + PAL_LANES - 1) / PAL_LANES;
+    out->n_lane = PAL_LANES * (out->n_strip + out->n_unsupported);
+}
+
+/* insertion sort of a few nodes by slot */
+static void sort_corners(const int32_t *slot, int32_t *node, int n)
+{
+    for (int i = 1; i < n; i++)
+        for (int j = i; j > 0 && slot[node[j]] < slot[node[j - 1]]; j--) {
+            int32_t swap = node[j];
+            node[j] = node[j - 1];
+            node[j - 1] = swap;
+        }
+}
+
+pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int32_t *item, int n_item, int n_corner,
+                                     pal_arena *arena, pal_simd_blocks *out)
+{
+    *out = (pal_simd_blocks){.n_corner = n_corner};
+    out->place = PAL_NEW(arena, int32_t, n_item);
+    entry *e = calloc((size_t)n_item + 1, sizeof *e);
+    if (!out->place || !e) {
+        free(e);
+        return PAL_ERR_MEMORY;
+    }
+    for (int i = 0; i < n_item; i++) {
+        e[i].item = i;
+        for (int c = 0; c < PAL_SIMD_CORNERS_MAX; c++)
+            e[i].slot[c] = node_order->slot[item[n_corner * i + (c < n_corner ? c : 0)]];
+    }
+    qsort(e, (size_t)n_item, sizeof *e, compare_entries);
+    /* once to count, once to fill */
+    place_all(e, n_item, out);
+    out->base = PAL_NEW(arena, int32_t, out->n_strip * n_corner);
+    out->node = PAL_NEW(arena, int32_t, out->n_unsupported * n_corner * PAL_LANES);
+    if (out->base && out->node) place_all(e, n_item, out);
+    free(e);
+    return out->base && out->node ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, int n_item, int n_corner,
+                             pal_arena *arena, pal_simd_blocks *out)
+{
+    for (int i = 0; i < n_item; i++) sort_corners(node_order->slot, item + n_corner * i, n_corner);
+    return pal_simd_blocks_make_ordered(node_order, item, n_item, n_corner, arena, out);
+}
+
+void pal_node_order_load(pal_node_order *node_order, const double *x)
+{
+    double *sx = node_order->x, *sy = sx + node_order->n_slot, *sz = sy + node_order->n_slot;
+    for (int i = 0; i < node_order->n_node; i++) {
+        int s = node_order->slot[i];
+        sx[s] = x[3 * i], sy[s] = x[3 * i + 1], sz[s] = x[3 * i + 2];
+    }
+}
+
+void pal_node_order_add(pal_node_order *node_order, double *force)
+{
+    const double *fx = node_order->f, *fy = fx + node_order->n_slot, *fz = fy + node_order->n_slot;
+    for (int i = 0; i < node_order->n_node; i++) {
+        int s = node_order->slot[i];
+        force[3 * i] += fx[s], force[3 * i + 1] += fy[s], force[3 * i + 2] += fz[s];
+    }
+    memset(node_order->f, 0, 3 * sizeof(double) * (size_t)node_order->n_slot);
+}

@@ -1,0 +1,145 @@
+/* A field shown in colour: displacement, von Mises stress, strain energy density, edge stiffness, largest strain
+ * or volume distortion at the shown vertices. The row is there while somebody looks: pal_world_field adds it to a
+ * running world, or the scene has an entry for it. It takes no part in the simulation: nothing that moves reads it.
+ *
+ * All but displacement: every FORCE row that can measure adds its value times volume to the nodes of its elements, and
+ * the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of
+ * the nodes that it is skinned to, with the skin's own weights (mesh/skin.h), or is a node itself. Displacement is the
+ * distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
+ * diverged is for its guard to say.
+ *
+ * A body that adapts (sim/adaptive_surface.h) shows 0 at vertices out of use.
+ *
+ * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10): so often
+ * in simulated time it is taken anew. */
+#include "server/sim/core/effect_list.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef struct field_output {
+    pal_shown_field shown;
+    pal_field kind;
+    double period_s, next_s;
+    double *sum, *volume_m3; /* NULL: displacement [n_node] */
+    pal_body *body;
+    uint64_t revision; /* of the triangles at the last values */
+} field_output;
+
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
+{
+    pal_body *body = build->body;
+    const char *name = "";
+    double rate_hz = 10;
+    PAL_TRY(pal_entry_read_text(item, "field", &name, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "rate_hz", 0.1, 1000, &rate_hz, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    pal_field kind = pal_field_find(name);
+    if (kind == PAL_FIELD_NONE)
+        return pal_diagnostic_set(
+            build->diag, PAL_ERR_REFUSED,
+            "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, distortion)", item->path,
+            name);
+    if (body->n_shown == 0 || !body->surface)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body shows nothing that could be coloured",
+                                  item->path);
+    field_output *out = PAL_NEW(build->arena, field_output, 1);
+    float *value = PAL_NEW(build->arena, float, body->n_shown);
+    if (!out || !value) return PAL_ERR_MEMORY;
+    out->kind = kind;
+    out->shown.value = value;
+    out->period_s = 1 / rate_hz;
+    out->next_s = -INFINITY;
+    out->body = body;
+    if (kind != PAL_FIELD_DISPLACEMENT_M) {
+        out->sum = PAL_NEW(build->arena, double, body->n_node);
+        out->volume_m3 = PAL_NEW(build->arena, double, body->n_node);
+        if (!out->sum || !out->volume_m3) return PAL_ERR_MEMORY;
+    }
+    body->field[kind] = &out->shown;
+    *self = out;
+    return PAL_ERR_OK;
+}
+
+static float finite_or_0(double value)
+{
+    float narrow = (float)value;
+    return isfinite(narrow) ? narrow : 0;
+}
+
+static void displacement(const pal_body *body, float *value)
+{
+    const double *rest = body->surface->x;
+    int n = body->adaptive ? body->n_active : body->n_shown;
+    for (int k = 0; k < n; k++) {
+        int i = body->adaptive ? body->active[k] : k;
+        double sum = 0;
+        for (int c = 0; c < 3; c++) {
+            double moved = (double)body->shown[3 * (size_t)i + (size_t)c] - rest[3 * (size_t)i + (size_t)c];
+            sum += moved * moved;
+        }
+        value[i] = finite_or_0(sqrt(sum));
+    }
+}
+
+/* nodal means to shown vertices */
+static void spread(const pal_body *body, const double *nodal, float *value)
+{
+    const pal_skin *skin = body->skin;
+    for (int i = 0; i < body->n_shown && !skin; i++) value[i] = finite_or_0(nodal[body->shown_node[i]]);
+    for (int i = 0; i < body->n_shown && skin; i++) {
+        const int32_t *near = skin->near + PAL_SKIN_NEIGHBOURS * (size_t)i;
+        const float *coef = skin->coef + 4 * PAL_SKIN_NEIGHBOURS * (size_t)i;
+        double sum = 0;
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) sum += (double)coef[4 * k + 3] * nodal[skin->frame[near[k]]];
+        value[i] = finite_or_0(sum);
+    }
+}
+
+static void measured(field_output *out, const pal_step *step)
+{
+    const pal_body *body = step->body;
+    size_t n_byte = sizeof(double) * (size_t)body->n_node;
+    memset(out->sum, 0, n_byte);
+    memset(out->volume_m3, 0, n_byte);
+    for (int i = 0; i < step->n_force; i++) {
+        const pal_component *row = &step->force[i];
+        if (row->effect->measure) row->effect->measure(row->self, body, out->kind, out->sum, out->volume_m3);
+    }
+    for (int i = 0; i < body->n_node; i++) out->sum[i] = out->volume_m3[i] > 0 ? out->sum[i] / out->volume_m3[i] : 0;
+    spread(body, out->sum, out->shown.value);
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    field_output *out = self;
+    /* the step nearest to the time wanted, so that a period of whole steps stays one */
+    if (step->time_s + 0.5 * step->dt_s < out->next_s) return PAL_ERR_OK;
+    if (out->revision != step->body->revision) memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->n_shown);
+    out->revision = step->body->revision;
+    if (out->kind == PAL_FIELD_DISPLACEMENT_M)
+        displacement(step->body, out->shown.value);
+    else
+        measured(out, step);
+    out->shown.revision = ++out->body->field_revision;
+    out->shown.time_s = step->time_s;
+    out->next_s += out->period_s;
+    if (!(out->next_s > step->time_s)) out->next_s = step->time_s + out->period_s;
+    return PAL_ERR_OK;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    ((field_output *)self)->next_s = -INFINITY;
+}
+
+/* nobody looks any more: the body forgets where the field was */
+static void destroy(void *self)
+{
+    field_output *out = self;
+    if (out->body->field[out->kind] == &out->shown) out->body->field[out->kind] = NULL;
+}
+
+const pal_effect pal_effect_field_output = {
+    .name = "field_output", .stage = PAL_STAGE_OUTPUT, .make = make, .run = run, .reset = reset, .destroy = destroy};

@@ -1,0 +1,94 @@
+/* Folded bodies made straight: see elastic_tet.h. */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/sim/elements/elastic_tet_block.h"
+
+#include <string.h>
+
+/* looks, one a Newton iteration, in which a body that is getting on moves by more than this share of S */
+enum { LOOKS = 64, MOST_TURNS = 200 };
+/* how often it is straightened without so many looks of peace */
+enum { TIMES = 2, PEACE = 600 };
+static const double still_S = 1e-3;
+/* a share of the most that a node bears, 10 E h^2: what presses harder may well turn elements over for good */
+static const double pressed_share = 0.01;
+static const double least_soft = 1e-3;
+
+/* what leads the body's frame: the nodes that are held when there are three, else all */
+static bool leads(const pal_elastic_tets *t, bool by_held, int i)
+{
+    return !by_held || t->fixed[i];
+}
+
+static bool has_frame(const pal_elastic_tets *t)
+{
+    int n = 0;
+    for (int i = 0; i < t->n_node; i++) n += t->fixed[i] != 0;
+    return n >= 3;
+}
+
+/* all elements turn as the frame does */
+void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d)
+{
+    const bool by_held = has_frame(t);
+    double c[3] = {0}, o[3] = {0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, a[3], b[3];
+    int n = 0;
+    for (int i = 0; i < t->n_node; i++) {
+        if (!leads(t, by_held, i)) continue;
+        pal_add3(c, c, d + 3 * i), pal_add3(o, o, t->x_rest + 3 * i);
+        n++;
+    }
+    pal_scale3(c, 1.0 / n, c), pal_scale3(o, 1.0 / n, o);
+    for (int i = 0; i < t->n_node; i++) {
+        if (!leads(t, by_held, i)) continue;
+        pal_sub3(a, d + 3 * i, c), pal_sub3(b, t->x_rest + 3 * i, o);
+        for (int k = 0; k < 9; k++) f[k] += a[k / 3] * b[k % 3];
+    }
+    pal_polar_rotation(f, q, MOST_TURNS);
+    for (int e = 0; e < t->wish.n_tet; e++)
+        for (int i = 0; i < 4; i++) pal_lane_set(t->turn, 4, t->place[e], i, q[i]);
+}
+
+double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f)
+{
+    double sum = 0, torque[3] = {0};
+    for (int e = 0; e < t->wish.n_tet; e++)
+        if (pal_lane_get(t->volume_m3, 1, t->place[e], 0) > 0) sum += pal_tet_add_element(t, e, d, f, torque);
+    /* what nothing holds does not turn itself */
+    if (f && !has_frame(t)) pal_tet_balance_torque(t, d, torque, f);
+    return sum;
+}
+
+static bool has_moved(const pal_elastic_tets *t, const pal_body *body)
+{
+    double most = still_S * body->length_scale_m;
+    for (int i = 0; i < t->n_node; i++)
+        if (pal_dist3(t->seen + 3 * i, body->d + 3 * i) > most) return true;
+    return false;
+}
+
+static bool is_pressed(const pal_body *body)
+{
+    double most = pressed_share * body->load_cap_N;
+    for (int i = 0; i < body->n_node; i++)
+        if (pal_norm3(body->load + 3 * i) > most) return true;
+    return false;
+}
+
+bool pal_elastic_tets_check_rest(pal_elastic_tets *t, const pal_body *body, bool has_inversion)
+{
+    t->n_whole = has_inversion ? 0 : t->n_whole + 1;
+    if (t->n_whole >= PEACE) t->n_single_rotation = t->n_whole = 0;
+    if (!has_inversion || t->n_single_rotation >= TIMES) return false;
+    if (t->straight || t->n_look++ % LOOKS != 0) return false;
+    bool stuck = t->n_look > 1 && !has_moved(t, body) && !is_pressed(body);
+    memcpy(t->seen, body->d, 3 * sizeof(double) * (size_t)t->n_node);
+    if (!stuck) return false;
+    double before = pal_elastic_tets_energy(t, body->d, NULL);
+    t->straight = true, t->soft = 1;
+    t->n_single_rotation++;
+    pal_tet_fit_single_rotation(t, body->d);
+    double after = pal_tet_single_rotation_force(t, body->d, NULL);
+    t->soft = after > 0 ? fmax(least_soft, fmin(1, before / after)) : 1;
+    return true;
+}

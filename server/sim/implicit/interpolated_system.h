@@ -1,0 +1,40 @@
+/* A body whose nodes are carried by control points (body.h, embed), as an implicit solver takes it: unknowns are the
+ * motions of points, rows work on nodes, and with E = embed
+ *     A = mass M~ + E' (stiff K + damp C) E .
+ * It is applied by placing a motion on the nodes, the rows' own multiply there, and pulling back (system.h).
+ *
+ * For a factor it is also wanted as numbers. They are found at rest column by column: all points that share no
+ * neighbour are moved at once by one unit along one axis, and the answer is taken apart. That asks nothing of the rows
+ * but their multiply. There are few points (60 to 400), so it takes 0.1 to 0.5 s at load; after an edit it is done a
+ * few columns a step. Memory: the world's arena. Thread: make [load], then [sim]. */
+#ifndef PAL_SIM_IMPLICIT_INTERPOLATED_SYSTEM_H
+#define PAL_SIM_IMPLICIT_INTERPOLATED_SYSTEM_H
+#include "server/sim/core/effect.h"
+
+struct pal_system;
+
+typedef struct pal_interpolated_system {
+    double *p, *q;         /* a motion and its answer at nodes                       [n_node][3] */
+    double *turn;          /* the rows' rotations at nodes                           [n_node][9] */
+    pal_block_matrix rest; /* E' K E of the rows at rest                                         */
+    double *damping;       /* E' C E of the rows at rest, in its pattern; NULL: no row damps     */
+    int n_group;           /* points moved at once: point[start[g]] .. point[start[g + 1] - 1]   */
+    int32_t *start;        /* [n_group + 1]                                                      */
+    int32_t *point;        /* free points only                                                   */
+    double *unit;          /* a move of points                                       [n_dof][3] */
+    double *answer;        /*                                                        [n_dof][3] */
+    int next, n_move;      /* moves made, of how many; equal: rest and damping are all there     */
+} pal_interpolated_system;
+
+/* work space, pattern and groups for the FORCE rows [n_force]. Points are coupled where a row couples nodes of both,
+ * for rows that do not say so where an element of body->solid has both, or else everywhere. BUDGET: moves times nodes
+ * are more than 2e7, some ten seconds' work; MEMORY. [load] */
+pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *force, int n_force, pal_arena *arena,
+                                     pal_diagnostic *diag, pal_interpolated_system **out);
+/* the numbers are out of date: rows have other material */
+void pal_interpolated_system_invalidate(pal_interpolated_system *e);
+/* at most `most` moves more; the rows are linearised at rest. True: all there. No heap */
+bool pal_interpolated_system_probe(pal_interpolated_system *e, const struct pal_system *system, int most);
+/* to += rows' sum of 9 numbers at nodes [n_node][9], pulled back to points [n_dof][9] */
+void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to);
+#endif

@@ -1,0 +1,45 @@
+/* When a change of stiffness is braked, and how much. */
+#include "server/sim/recovery/stiffening_damper.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+
+static const double least_speed_S_s = 1, least_rise = 10, still_periods = 8, hold_s = 0.1;
+
+/* sum m u^2 of what is free, and its mass */
+static double way_kg_m2(const pal_body *body, double *mass_kg)
+{
+    double way = 0, u[3];
+    *mass_kg = 0;
+    for (int k = 0; k < body->n_active; k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        if (body->fixed[i]) continue;
+        pal_sub3(u, body->x + 3 * i, body->x_rest + 3 * i);
+        *mass_kg += body->mass_kg[i];
+        way += body->mass_kg[i] * pal_dot3(u, u);
+    }
+    return way;
+}
+
+void pal_stiffening_damper_begin(pal_body *body, double before_J, double after_J)
+{
+    double mass, way = way_kg_m2(body, &mass);
+    double most = least_speed_S_s * body->length_scale_m, work = after_J - before_J;
+    if (!(after_J > least_rise * before_J * (1 + 1e-9))) return;
+    if (!(2 * work > most * most * mass) || !(way > 0) || !isfinite(work)) return;
+    double w = sqrt(2 * after_J / way);
+    /* one that is still at work goes on for as long as the stronger of both asks */
+    body->stiffening_damping_1_s = fmax(body->stiffening_damping_1_s, 2 * w);
+    body->stiffening_damping_s = fmax(body->stiffening_damping_s, still_periods / w);
+}
+
+void pal_stiffening_damper_hold(pal_body *body, double stored_J)
+{
+    double mass, way = way_kg_m2(body, &mass);
+    if (!(way > 0) || !isfinite(stored_J)) return;
+    const double c = 2 * sqrt(2 * stored_J / way);
+    /* one that is still at work goes on */
+    body->stiffening_damping_1_s = body->stiffening_damping_s > hold_s ? fmax(body->stiffening_damping_1_s, c) : c;
+    body->stiffening_damping_s = fmax(body->stiffening_damping_s, hold_s);
+}

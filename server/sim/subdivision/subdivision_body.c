@@ -1,0 +1,109 @@
+/* Masses of a body on a solid, and how easily its nodes move. */
+#include "server/sim/subdivision/subdivision_body.h"
+
+#include "server/sim/subdivision/subdivision_mass.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* beyond so many free points the ease is bounded, not found */
+enum { FACTOR_MOST = 1000 };
+/* D^-1 M~ with D its diagonal has no eigenvalue below the cube of 1/2 (trilinear), 0.1126 (cubic B-spline) */
+static const double most_hex = 8, most_cubic = 701;
+
+typedef struct mobility {
+    int n_free;
+    int32_t *place; /* of a point among the free ones, -1: held  [n_dof]                        */
+    double *factor; /* U of M~ = U'U, rows of the upper half    [n_free][n_free]; NULL: bounded */
+    double *y;      /* [n_free]                                                                 */
+} mobility;
+
+/* false: no memory, too many points or not positive definite */
+static bool factorise(const pal_mass_operator *mass, mobility *m)
+{
+    const size_t n = (size_t)m->n_free;
+    double *u = n <= FACTOR_MOST ? calloc(n * n + 1, sizeof *u) : NULL;
+    if (!u) return false;
+    m->factor = u;
+    for (int i = 0; i < mass->n_point; i++)
+        for (int32_t k = mass->start[i]; k < mass->start[i + 1] && m->place[i] >= 0; k++) {
+            int32_t j = m->place[mass->point[k]];
+            if (j >= m->place[i]) u[(size_t)m->place[i] * n + (size_t)j] = mass->mass_kg[k];
+        }
+    for (size_t k = 0; k < n; k++) {
+        double *row = u + k * n;
+        if (!(row[k] > 0)) return false;
+        const double scale = 1 / sqrt(row[k]);
+        for (size_t j = k; j < n; j++) row[j] *= scale;
+        for (size_t i = k + 1; i < n; i++) {
+            double *to = u + i * n;
+            const double c = row[i];
+            for (size_t j = i; j < n && c != 0; j++) to[j] -= c * row[j];
+        }
+    }
+    return true;
+}
+
+/* a' M~^-1 a of a node's row over the free points: |y|^2 with U'y = a */
+static double ease_of(const mobility *m, const pal_interpolation *rows, int node)
+{
+    const size_t n = (size_t)m->n_free;
+    double *y = m->y, sum = 0;
+    size_t first = n;
+    memset(y, 0, sizeof *y * n);
+    for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) {
+        if (m->place[rows->point[k]] < 0) continue;
+        size_t at = (size_t)m->place[rows->point[k]];
+        y[at] = rows->weight[k];
+        if (at < first) first = at;
+    }
+    for (size_t k = first; k < n; k++) {
+        const double *row = m->factor + k * n, c = y[k] / row[k];
+        sum += c * c;
+        for (size_t j = k + 1; j < n && c != 0; j++) y[j] -= c * row[j];
+    }
+    return sum;
+}
+
+/* what it is at most, by the diagonal of M~ */
+static double bound_of(const mobility *m, const pal_body *body, int node)
+{
+    const pal_interpolation *rows = body->interpolation;
+    const pal_mass_operator *mass = body->mass_operator;
+    double sum = 0, most = body->solid->subdivision.n_level > 0 ? most_cubic : most_hex;
+    for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) {
+        int32_t i = rows->point[k], at = mass->start[i];
+        if (m->place && m->place[i] < 0) continue;
+        while (at + 1 < mass->start[i + 1] && mass->point[at] != i) at++;
+        sum += rows->weight[k] * rows->weight[k] / mass->mass_kg[at];
+    }
+    return most * sum;
+}
+
+static void find_ease(pal_body *body)
+{
+    mobility m = {.place = malloc(sizeof *m.place * (size_t)body->n_dof + 1)};
+    for (int i = 0; i < body->n_dof && m.place; i++) m.place[i] = body->fixed[i] ? -1 : m.n_free++;
+    m.y = malloc(sizeof *m.y * (size_t)m.n_free + 1);
+    bool found = m.place && m.y && factorise(body->mass_operator, &m);
+    for (int i = 0; i < body->surface->n_vertex; i++) {
+        int node = body->shown_node[i];
+        body->node_inverse_mass_1_kg[node] = found ? ease_of(&m, body->interpolation, node) : bound_of(&m, body, node);
+    }
+    free(m.place), free(m.factor), free(m.y);
+}
+
+void pal_subdivision_solid_update_mass(pal_body *body)
+{
+    pal_subdivision_mass_fill(body->solid, body->mass_operator);
+    pal_subdivision_mass_lump(body->solid, body->mass_kg, body->node_mass_kg);
+    find_ease(body);
+}
+
+void pal_subdivision_solid_set_material(pal_body *body, const pal_material *material)
+{
+    body->solid->def.material = *material;
+    pal_subdivision_solid_sample(body->solid, &body->solid->def);
+    pal_subdivision_solid_update_mass(body);
+}

@@ -1,0 +1,53 @@
+/* A subdivided solid as finite elements (A 3.1, 3.4): the cells after subdivision, their elements, the rows of d = A p,
+ * and the material as arrays of samples at the Gauss points, so that it may vary continuously inside an element.
+ *
+ * Nodes are the vertices of the subdivided cells, then the virtual nodes in the middle of cells that are no hexahedra.
+ * A cubic element's nodes are control points of its spline: its material passes near them, not through them.
+ * One heap object per body (pal_body.solid), made by the model, freed with the world. Rest shape and material are
+ * constant between edits. Thread: make, sample [load]; reading [sim]. */
+#ifndef PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
+#define PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
+#include "server/mesh/cells/cell_elements.h"
+#include "server/mesh/cells/maccracken_joy.h"
+#include "server/num/spline.h"
+#include "server/sim/core/definition.h"
+
+/* what stands at the 64 Gauss points (num/spline.h) of the elements of one kind, all [n][64] */
+typedef struct pal_material_samples {
+    float *young_Pa, *poisson, *density_kg_m3;
+    float *damping_1_s; /* gamma of A eq. 3 over density; 0: none there */
+    double *volume_m3;  /* that the point stands for at rest: weight det J, above 0 */
+} pal_material_samples;
+
+typedef struct pal_subdivision_solid {
+    pal_subdivision subdivision; /* cells: after the last level; rows: of their vertices */
+    pal_cell_elements elements;
+    pal_interpolation rows; /* of all nodes, virtual ones last: body->embed */
+    double *node_rest;      /* rows times the control cells' x           [rows.n_row][3] */
+    pal_material_samples samples[PAL_CELL_KINDS];
+    uint64_t sampled; /* grows with every pal_subdivision_solid_sample, from 1 */
+    pal_body_def def; /* of the last pal_subdivision_solid_sample; what it borrows stays borrowed */
+    size_t n_byte;    /* memory of all arrays, about */
+} pal_subdivision_solid;
+
+/* Subdivides, chooses elements, takes the samples. REFUSED as pal_subdivision_make and pal_cell_elements_make do, or an
+ * element that is folded over at a Gauss point (det J <= 0), with its cell; BUDGET, MEMORY */
+pal_err pal_subdivision_solid_make(const pal_body_def *def, const pal_subdivision_options *options,
+                                   pal_subdivision_solid **out, pal_diagnostic *diag);
+void pal_subdivision_solid_free(pal_subdivision_solid *solid); /* NULL is fine */
+/* the samples anew from material, regions and strokes of def at the points' places at rest */
+void pal_subdivision_solid_sample(pal_subdivision_solid *solid, const pal_body_def *def);
+
+/* nodes of an element */
+static inline const int32_t *pal_subdivision_solid_nodes(const pal_subdivision_solid *s, pal_cell_kind kind,
+                                                         int element)
+{
+    return s->elements.node[kind] + (size_t)element * (size_t)pal_cell_kind_nodes(kind);
+}
+/* d(x, y, z)/d(u, v, w) of an element with nodes at x, row-major J[3 a + b] = dx_a/du_b, from gradients of
+ * pal_cell_shape; returns its determinant */
+double pal_subdivision_solid_jacobian(const double *x, const int32_t *node, int n_node, double (*g)[3], double J[9]);
+/* volume at rest by quadrature, m^3, and mass, kg */
+double pal_subdivision_solid_volume_m3(const pal_subdivision_solid *solid);
+double pal_subdivision_solid_mass_kg(const pal_subdivision_solid *solid);
+#endif

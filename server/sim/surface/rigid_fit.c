@@ -1,0 +1,92 @@
+/* The best-fit rigid motion of an adaptive surface (shape matching: Mueller et al. 2005), for anchors that let the body
+ * move (erratum C7) and for speeds measured against it.
+ *
+ * A = sum m (x - c)(x0 - c0)', R its rotation; L = sum m (x - c) x (v - V) = I Omega. One pass over the nodes, about
+ * the first of them: as sum m (x0 - c0) = 0, A needs no centre of x. */
+#include "server/sim/surface/adaptive_surface.h"
+
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/sim/surface/active_nodes.h"
+
+#include <math.h>
+
+#define SMALL 1e-10 /* of its size at rest: no more than rounding */
+
+typedef struct sums {
+    double mass, x[3], v[3]; /* x about the first node     */
+    double a[9];             /* sum m x (x0 - c0)'         */
+    double square[6];        /* sum m x x': xx yy zz xy xz yz */
+    double turn[3];          /* sum m x cross v            */
+} sums;
+
+/* one node: mass, place, place at rest, velocity */
+PAL_INLINE void add_node(sums *t, const double from[3], const double c[3], double m, const double *p, const double *r,
+                         const double *v)
+{
+    const double x = p[0] - from[0], y = p[1] - from[1], z = p[2] - from[2];
+    const double mx = m * x, my = m * y, mz = m * z, r0 = r[0] - c[0], r1 = r[1] - c[1], r2 = r[2] - c[2];
+    t->mass += m;
+    t->x[0] += mx, t->x[1] += my, t->x[2] += mz;
+    t->v[0] += m * v[0], t->v[1] += m * v[1], t->v[2] += m * v[2];
+    t->a[0] += mx * r0, t->a[1] += mx * r1, t->a[2] += mx * r2;
+    t->a[3] += my * r0, t->a[4] += my * r1, t->a[5] += my * r2;
+    t->a[6] += mz * r0, t->a[7] += mz * r1, t->a[8] += mz * r2;
+    t->square[0] += mx * x, t->square[1] += my * y, t->square[2] += mz * z;
+    t->square[3] += mx * y, t->square[4] += mx * z, t->square[5] += my * z;
+    t->turn[0] += my * v[2] - mz * v[1], t->turn[1] += mz * v[0] - mx * v[2], t->turn[2] += mx * v[1] - my * v[0];
+}
+
+/* I^-1 L; an axis about which the body has no inertia (a line, a point) does not turn */
+static void spin(const double inertia[9], const double moment[3], double least_kg_m2, double omega[3])
+{
+    double w[3], axis[9];
+    pal_set3(omega, 0, 0, 0);
+    pal_eigen3(inertia, w, axis);
+    for (int k = 0; k < 3; k++)
+        if (w[k] > 1e-9 * w[2] && w[k] > least_kg_m2)
+            pal_axpy3(omega, pal_dot3(axis + 3 * k, moment) / w[k], axis + 3 * k);
+}
+
+static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal_rigid_fit *frame)
+{
+    double *q = frame->quat, length = 0, c[3], moment[3], arm[3], size = 0;
+    for (int k = 0; k < 4; k++) length += q[k] * q[k];
+    if (!(length > 0.5 && length < 2)) q[0] = 1, q[1] = q[2] = q[3] = 0;
+    /* a body shrunk to a point has neither rotation nor spin of its own */
+    for (int k = 0; k < 9; k++) size += t.a[k] * t.a[k];
+    if (size > SMALL * SMALL * s->rest_kg_m2 * s->rest_kg_m2) pal_polar_rotation(t.a, q, 40);
+    pal_quat_matrix(q, frame->R);
+    pal_scale3(c, 1 / t.mass, t.x);
+    pal_scale3(frame->V_m_s, 1 / t.mass, t.v);
+    pal_add3(frame->centre_m, from, c);
+    pal_copy3(frame->rest_centre_m, s->rest_centre_m);
+    pal_cross3(arm, c, t.v);
+    pal_sub3(moment, t.turn, arm);
+    double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1], zz = t.square[2] - c[2] * t.x[2];
+    double xy = t.square[3] - c[0] * t.x[1], xz = t.square[4] - c[0] * t.x[2], yz = t.square[5] - c[1] * t.x[2];
+    const double inertia[9] = {yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy};
+    spin(inertia, moment, SMALL * SMALL * s->rest_kg_m2, frame->Omega_1_s);
+}
+
+void pal_adaptive_fit_rigid(const pal_adaptive_surface *s, const pal_body *body, pal_rigid_fit *frame)
+{
+    const double *from = body->x + 3 * (size_t)s->node[0];
+    sums t = {0};
+    for (int k = 0; k < s->n_node; k++) {
+        const size_t i = (size_t)s->node[k];
+        add_node(&t, from, s->rest_centre_m, body->mass_kg[i], body->x + 3 * i, body->x_rest + 3 * i, body->v + 3 * i);
+    }
+    fit(s, from, t, frame);
+}
+
+void pal_adaptive_fit_rigid_active(const pal_adaptive_surface *s, const pal_active_nodes *pack, pal_rigid_fit *frame)
+{
+    const double *from = (const double *)pack->xv;
+    sums t = {0};
+    for (int k = 0; k < s->n_node; k++) {
+        const double *x = (const double *)&pack->xv[k], *rest = (const double *)&pack->rest[k];
+        add_node(&t, from, s->rest_centre_m, rest[3], x, rest, x + 4);
+    }
+    fit(s, from, t, frame);
+}

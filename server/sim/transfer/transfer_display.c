@@ -1,0 +1,126 @@
+/* What of a carry is seen (transfer.h): how far points go, and a surface that does not jump. */
+#include "server/sim/transfer/transfer_core.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/surface/adaptive_transfer.h"
+#include "server/sim/world/world_core.h"
+
+#include <stdlib.h>
+
+/* rest places of shown vertices are the same when they differ by less than this part of the body's size */
+#define SAME_PLACE 1e-6
+
+/* does a point lie within the element whose nodes have these weights? Quadratic shape functions are as low as -1/8 */
+static bool is_inside(const pal_interpolation *rows, int i)
+{
+    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
+        if (rows->weight[k] < -0.13) return false;
+    return true;
+}
+
+/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+ */
+double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
+{
+    double most = 0;
+    int n_common = from->n_node < to->n_node ? from->n_node : to->n_node;
+    for (int i = 0; i < n_common && t->adaptive; i++)
+        if (pal_adaptive_uses(from->adaptive, i) && pal_adaptive_uses(to->adaptive, i))
+            most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
+    for (int i = 0; i < from->n_node && !t->adaptive; i++) {
+        double move[3] = {0, 0, 0};
+        if (!is_inside(&t->back, i)) continue;
+        for (int32_t k = t->back.start[i]; k < t->back.start[i + 1]; k++) {
+            const size_t j = 3 * (size_t)t->back.point[k];
+            for (size_t c = 0; c < 3; c++) move[c] += t->back.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
+        }
+        for (int c = 0; c < 3; c++) move[c] -= from->d[3 * i + c] - from->node_rest[3 * i + c];
+        most = fmax(most, pal_norm3(move));
+    }
+    return most;
+}
+
+/* ---- what is shown ---- */
+
+bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int body)
+{
+    const pal_world_part *a = &before->part[body], *b = &next->part[body];
+    double length_scale_m = next->plan.body[body].length_scale_m;
+    if (a->n_vertex != b->n_vertex) return false;
+    for (int i = 0; i < 3 * a->n_vertex; i++)
+        if (!(fabs((double)a->rest_m[i] - (double)b->rest_m[i]) <= SAME_PLACE * length_scale_m)) return false;
+    return true;
+}
+
+/* where a vertex of surface `names` was shown: itself, or between the ends of its edge */
+static void add_shown(const pal_body *from, const pal_adaptive_surface *names, int32_t i, double weight, double out[3])
+{
+    if (i < from->n_shown && pal_adaptive_uses(from->adaptive, i)) {
+        for (int c = 0; c < 3; c++) out[c] += weight * (double)from->shown[3 * (size_t)i + (size_t)c];
+        return;
+    }
+    const int32_t *end = names->levels.edge[pal_levels_vertex_parent(&names->levels, i)].vertex;
+    for (int k = 0; k < 2; k++) add_shown(from, names, end[k], 0.5 * weight, out);
+}
+
+/* where the new body's shown vertex i was shown, for a body whose vertices are nodes: within the old elements at rest
+ * as the old nodes carry it; t->place has the new nodes so */
+static void was_shown(const pal_transfer *t, const pal_body *from, const pal_body *to, bool same, int i, double out[3])
+{
+    pal_set3(out, 0, 0, 0);
+    if (t->adaptive && pal_adaptive_uses(to->adaptive, i))
+        add_shown(from, to->adaptive, i, 1, out);
+    else if (same || t->adaptive)
+        for (int c = 0; c < 3; c++) out[c] = (double)(t->adaptive ? to : from)->shown[3 * (size_t)i + (size_t)c];
+    else
+        pal_copy3(out, t->place + 3 * (size_t)to->shown_node[i]);
+}
+
+/* nodes of the new body by those of the old one as they stand, in t->place */
+static void place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to)
+{
+    for (int i = 0; i < 3 * from->n_node; i++) t->old[i] = from->d[i] - from->node_rest[i];
+    pal_interpolation_apply(&t->in, t->old, t->place);
+    for (int i = 0; i < 3 * to->n_node; i++) t->place[i] += to->node_rest[i];
+}
+
+/* the other bodies of the world, where a switch of theirs is still being let in */
+static void go_on_others(const pal_transfer *t, pal_world *next, const pal_world *before)
+{
+    for (int b = 0; b < next->plan.n_body && b < before->plan.n_body; b++) {
+        const pal_body *from = &before->plan.body[b];
+        if (b == t->body || !from->display_offset_m || from->n_shown != next->plan.body[b].n_shown) continue;
+        size_t n = 3 * (size_t)from->n_shown;
+        float *lag = malloc(sizeof *lag * n);
+        for (size_t i = 0; i < n && lag; i++)
+            lag[i] = (float)(from->display_offset_part * (double)from->display_offset_m[i]);
+        if (lag) (void)pal_world_blend_display(next, b, lag);
+        free(lag);
+    }
+}
+
+void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *before, pal_transfer_report *out)
+{
+    const pal_body *from = &before->plan.body[t->body], *to = &next->plan.body[t->body];
+    bool same = pal_transfer_same_shown(next, before, t->body) && !t->adaptive;
+    out->max_move_m = out->frame_move_m = out->body_move_m;
+    go_on_others(t, next, before);
+    if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->adaptive && to->skin)) return;
+    float *lag = malloc(3 * sizeof *lag * (size_t)to->n_shown);
+    double most = 0;
+    if (!same && !t->adaptive) place_nodes(t, from, to);
+    for (int i = 0; i < to->n_shown && lag; i++) {
+        double was[3];
+        was_shown(t, from, to, same, i, was);
+        for (int c = 0; c < 3; c++) {
+            was[c] -= (double)to->shown[3 * (size_t)i + (size_t)c];
+            lag[3 * (size_t)i + (size_t)c] = (float)was[c];
+        }
+        most = fmax(most, pal_norm3(was));
+    }
+    bool lags = lag && pal_world_blend_display(next, t->body, lag) == PAL_ERR_OK;
+    free(lag);
+    /* other vertices are shown: what the body itself moves says more */
+    if (same) out->max_move_m = most;
+    if (lags) out->frame_move_m = most / PAL_BLEND_STEPS;
+}

@@ -1,0 +1,25 @@
+/* Brushes while a world runs: rows put into its plan with the first brush of a body and taken out after the last
+ * (world.h, pal_world_brush). Between steps. [sim] */
+#ifndef PAL_SIM_WORLD_BRUSH_COMPONENTS_H
+#define PAL_SIM_WORLD_BRUSH_COMPONENTS_H
+#include "server/sim/core/brush.h"
+#include "server/sim/plan/plan.h"
+
+/* by body; zeroed: none */
+typedef struct pal_brush_components {
+    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such row */
+    void *self[PAL_BODY_MAX];
+} pal_brush_components;
+
+/* brush of kind NONE or NULL: the slot's ends. Errors as of pal_brush_make and pal_brush_set; no such body or slot */
+pal_err pal_brush_components_set(pal_brush_components *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
+                                 pal_diagnostic *diag);
+/* brushes of another world go on in this one (pal_brush_hand), those on bodies that have none are over */
+void pal_brush_components_transfer(pal_brush_components *rows, pal_plan *plan, const pal_brush_components *before,
+                                   const pal_plan *from);
+void pal_brush_components_end(pal_brush_components *rows, int slot); /* on all bodies; no heap call */
+void pal_brush_components_remove_idle(pal_brush_components *rows,
+                                      pal_plan *plan);      /* rows that do nothing any more go */
+void pal_brush_components_free(pal_brush_components *rows); /* memory only: after pal_plan_free */
+size_t pal_brush_components_bytes(const pal_brush_components *rows);
+#endif

@@ -1,0 +1,62 @@
+/* What world.c, world_edit.c, world_load.c, world_show.c, world_transfer.c and transfer_state.c share: the world's
+ * record. Private to these. */
+#ifndef PAL_SIM_WORLD_WORLD_CORE_H
+#define PAL_SIM_WORLD_WORLD_CORE_H
+#include "server/sim/plan/plan.h"
+#include "server/sim/world/blend_component.h"
+#include "server/sim/world/brush_components.h"
+#include "server/sim/world/field_components.h"
+#include "server/sim/world/world.h"
+
+/* shown surface of a body as at load */
+typedef struct pal_world_part {
+    int n_vertex, n_tri;
+    float *rest_m;
+    int32_t *tri;
+    int32_t *parent; /* of midpoints, of a body that adapts; else NULL */
+} pal_world_part;
+
+struct pal_world {
+    pal_arena *arena, *scratch;
+    pal_plan plan;
+    pal_tools tools;
+    pal_pose asked[PAL_TOOL_MAX];
+    bool has_requested_pose[PAL_TOOL_MAX];
+    uint64_t pose_ns[PAL_TOOL_MAX];
+    pal_material material[PAL_BODY_MAX];
+    pal_world_part part[PAL_BODY_MAX];
+    double step_s, time_s, limit_s, rest_limit_s;
+    int max_substep, n_substep;
+    bool unobserved; /* nobody looks: OUTPUT rows are run only where tools need them */
+    uint64_t tick, step_ns, end_ns;
+    pal_err component_err;       /* of the first row that failed in this step */
+    pal_field_components fields; /* put in while the world runs */
+    pal_brush_components brushes;
+    pal_blend_components blends;
+};
+
+/* what the rows of body b may touch, without times */
+pal_step pal_world_body_step(pal_world *world, int b);
+/* the least limit of all bodies that move, infinite when nothing limits, for sub-step `sub`; a body whose limit is no
+ * number is frozen. s */
+double pal_world_find_limit(pal_world *world, int sub);
+/* BUDGET: at rest, on the finest level, a step needs more sub-steps than the scene allows */
+pal_err pal_world_check_budget(pal_world *world, pal_diagnostic *diag);
+/* stored in the rows of a body, J */
+double pal_world_component_energy_J(const pal_world *world, int b);
+
+/* load [n_node][3] anew: the lasting ones (`outer`) */
+void pal_body_begin_loads(pal_body *body);
+/* shortens what is beyond what nodes bear (pal_body_node_load_cap_N, load_cap_N), counted as rescues; lasting: what
+ * else presses the nodes is not there yet, and nodes that stray from their rest places bear less */
+void pal_body_cap_loads(pal_body *body, bool body_arena);
+
+/* OUTPUT rows of one body, of all bodies, so that what is shown is where they are */
+void pal_world_show(pal_world *world, int b);
+void pal_world_show_all(pal_world *world);
+
+/* ", node 512 at (1, 2, 3) mm sets it": the node that the rows' bounds make responsible. Where bounds are of nodes that
+ * are not the points, and without bounds, nothing. The forces' room is free between steps */
+void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte);
+
+#endif

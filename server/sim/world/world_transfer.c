@@ -1,0 +1,112 @@
+/* A world that goes on where another is (pal_world_transfer). */
+#include "server/base/vec3.h"
+#include "server/sim/springs/spring_recovery.h"
+#include "server/sim/surface/adaptive_transfer.h"
+#include "server/sim/world/world_core.h"
+
+#include <string.h>
+
+/* lasting loads of a body that is the same one in both worlds; without memory it has none */
+static void copy_loads(pal_world *w, pal_body *to, const pal_body *from)
+{
+    size_t n = 3 * (size_t)to->n_node;
+    if (!from->external_force || to->n_node != from->n_node) return;
+    if (!to->external_force) to->external_force = PAL_NEW(w->arena, double, n);
+    if (to->external_force) memcpy(to->external_force, from->external_force, n * sizeof *to->external_force);
+}
+
+/* the node nearest to a place at rest, scene frame */
+static int nearest_node(const pal_body *body, const double at_m[3])
+{
+    double x[3], least = INFINITY;
+    int best = 0;
+    pal_sub3(x, at_m, body->offset_m);
+    for (int i = 0; i < body->n_node; i++) {
+        double far = pal_dist3(body->node_rest + 3 * (size_t)i, x);
+        if (far < least) least = far, best = i;
+    }
+    return best;
+}
+
+void pal_world_transfer_loads(pal_world *w, int b, const pal_world *before)
+{
+    const pal_body *from = &before->plan.body[b];
+    pal_body *to = &w->plan.body[b];
+    size_t n = 3 * (size_t)to->n_node;
+    if (!from->external_force || n == 0) return;
+    if (!to->external_force) to->external_force = PAL_NEW(w->arena, double, n);
+    if (!to->external_force) return;
+    memset(to->external_force, 0, n * sizeof *to->external_force);
+    for (int i = 0; i < from->n_node; i++) {
+        const double *force = from->external_force + 3 * (size_t)i;
+        double at[3];
+        if (pal_dot3(force, force) == 0) continue;
+        pal_add3(at, from->node_rest + 3 * (size_t)i, from->offset_m);
+        double *sum = to->external_force + 3 * (size_t)nearest_node(to, at);
+        pal_add3(sum, sum, force);
+    }
+}
+
+static bool same_shell(const pal_body *a, const pal_body *b)
+{
+    return a->adaptive && b->adaptive && a->n_dof == b->n_dof &&
+           a->adaptive->levels.n_level == b->adaptive->levels.n_level && a->adaptive->n_slot == b->adaptive->n_slot;
+}
+
+/* a surface as it is refined and stands there */
+static void follow_shell(pal_world *w, int b, const pal_world *before)
+{
+    const pal_body *from = &before->plan.body[b];
+    pal_body *to = &w->plan.body[b];
+    if (w->plan.n_of[PAL_STAGE_ADAPT][b] > 0) pal_adaptive_copy_refinement(to, from);
+    pal_adaptive_transfer_state(to, from, to->x, to->v);
+    to->adaptive->spring_ramp = from->adaptive->spring_ramp;
+    to->adaptive->shape_ramp = from->adaptive->shape_ramp;
+    for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
+        const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
+        const pal_component *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
+        if (row->effect == was->effect && row->effect->hand)
+            row->effect->hand(row->self, to, was->self, &(pal_component_transfer){.from = from});
+    }
+}
+
+static void follow_body(pal_world *w, int b, const pal_body *from, const double *x, const double *v)
+{
+    pal_body *to = &w->plan.body[b];
+    size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
+    if (x) memcpy(to->x, x, n_byte);
+    if (v) memcpy(to->v, v, n_byte);
+    /* what is held from now on stands still */
+    for (int i = 0; i < to->n_dof; i++)
+        if (to->fixed[i] == 1) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
+    pal_body_update_nodes(to);
+    to->frozen = from->frozen;
+    memcpy(to->reason, from->reason, sizeof to->reason);
+    to->safeguards = from->safeguards;
+    to->stiffening_damping_1_s = from->stiffening_damping_1_s, to->stiffening_damping_s = from->stiffening_damping_s;
+    const bool same = to->recovery && from->recovery && to->n_node == from->n_node;
+    if (same && !memcmp(to->x_rest, from->x_rest, n_byte)) pal_spring_recovery_transfer(to->recovery, from->recovery);
+    pal_world_invalidate_limits(w, b);
+}
+
+void pal_world_transfer(pal_world *world, const pal_world *before, int edited, const double *x, const double *v)
+{
+    pal_world *w = world;
+    w->time_s = before->time_s, w->tick = before->tick, w->end_ns = before->end_ns;
+    w->tools = before->tools;
+    memcpy(w->asked, before->asked, sizeof w->asked);
+    memcpy(w->has_requested_pose, before->has_requested_pose, sizeof w->has_requested_pose);
+    memcpy(w->pose_ns, before->pose_ns, sizeof w->pose_ns);
+    for (int b = 0; b < w->plan.n_body && b < before->plan.n_body; b++) {
+        const pal_body *from = &before->plan.body[b];
+        /* changed while this world was made */
+        if (memcmp(&w->material[b], &before->material[b], sizeof w->material[b]) != 0)
+            (void)pal_world_material(w, b, &before->material[b], NULL);
+        bool other = b != edited, adaptive = other && same_shell(&w->plan.body[b], from),
+             same = other && !w->plan.body[b].adaptive && w->plan.body[b].n_dof == from->n_dof;
+        if (adaptive) follow_shell(w, b, before);
+        if (adaptive || same) copy_loads(w, &w->plan.body[b], from);
+        follow_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);
+    }
+    pal_world_show_all(w);
+}

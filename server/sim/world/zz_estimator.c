@@ -1,0 +1,132 @@
+/* Recovery of stress at nodes, and what it tells of the error. */
+#include "server/sim/world/zz_estimator.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_MATERIAL = 16 };
+static const double same = 1.25;
+
+/* one pass over all stress points after another */
+typedef struct recovery {
+    double mu[MOST_MATERIAL], lambda[MOST_MATERIAL];
+    int n_material, material; /* material: the one that is looked at */
+    double *sum, *volume;     /* [n_node][9], [n_node]                */
+    double *share;            /* NULL: not wanted                     */
+    double error2, solution2;
+} recovery;
+
+static double apart(double a, double b)
+{
+    return a > b ? a / b : b / a;
+}
+
+/* the material of a point, a new one when there is room; lambda may be next to 0 or below */
+static int material_of(recovery *r, const pal_stress_point *p)
+{
+    double least = INFINITY, kappa = p->lambda_Pa + 2 * p->mu_Pa / 3;
+    int nearest = 0;
+    for (int k = 0; k < r->n_material; k++) {
+        double off = fmax(apart(p->mu_Pa, r->mu[k]), apart(kappa, r->lambda[k] + 2 * r->mu[k] / 3));
+        if (off < least) least = off, nearest = k;
+    }
+    if (least <= same || r->n_material == MOST_MATERIAL) return nearest;
+    r->mu[r->n_material] = p->mu_Pa, r->lambda[r->n_material] = p->lambda_Pa;
+    return r->n_material++;
+}
+
+static void list_materials(void *user, const pal_stress_point *p)
+{
+    (void)material_of(user, p);
+}
+
+/* every point of an element counts alike for all of its nodes: together they are the element's mean */
+static void gather(void *user, const pal_stress_point *p)
+{
+    recovery *r = user;
+    if (material_of(r, p) != r->material) return;
+    for (int c = 0; c < p->n_corner; c++) {
+        double *sum = r->sum + 9 * (size_t)p->node[c];
+        for (int i = 0; i < 9; i++) sum[i] += p->volume_m3 * p->stress[i];
+        r->volume[p->node[c]] += p->volume_m3;
+    }
+}
+
+/* s : C^-1 : s */
+static double complementary(const double s[9], double mu, double lambda)
+{
+    double trace = s[0] + s[4] + s[8], square = 0;
+    for (int i = 0; i < 9; i++) {
+        double deviator = s[i] - (i % 4 == 0 ? trace / 3 : 0);
+        square += deviator * deviator;
+    }
+    return square / (2 * mu) + trace * trace / (9 * (lambda + 2 * mu / 3));
+}
+
+static void compare(void *user, const pal_stress_point *p)
+{
+    recovery *r = user;
+    double off[9];
+    if (material_of(r, p) != r->material) return;
+    for (int i = 0; i < 9; i++) off[i] = -p->stress[i];
+    for (int c = 0; c < p->n_corner; c++)
+        for (int i = 0; i < 9; i++) off[i] += p->shape[c] * r->sum[9 * (size_t)p->node[c] + (size_t)i];
+    double error2 = p->volume_m3 * complementary(off, p->mu_Pa, p->lambda_Pa);
+    r->error2 += error2;
+    r->solution2 += p->volume_m3 * complementary(p->stress, p->mu_Pa, p->lambda_Pa);
+    if (r->share) r->share[p->element] += error2;
+}
+
+static void recover(recovery *r, const pal_component *row, const pal_body *body)
+{
+    size_t n = (size_t)body->n_node;
+    (void)row->effect->energy(row->self, body); /* rows take their rotations with it */
+    row->effect->stress(row->self, body, list_materials, r);
+    for (r->material = 0; r->material < r->n_material; r->material++) {
+        memset(r->sum, 0, 9 * n * sizeof *r->sum);
+        memset(r->volume, 0, n * sizeof *r->volume);
+        row->effect->stress(row->self, body, gather, r);
+        for (size_t i = 0; i < 9 * n; i++)
+            if (r->volume[i / 9] > 0) r->sum[i] /= r->volume[i / 9];
+        row->effect->stress(row->self, body, compare, r);
+    }
+}
+
+/* the first row of the body that gives stress; NULL: none */
+static const pal_component *stress_row(const pal_world *world, const pal_body *body)
+{
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        if (info.body == body->name && pal_world_component(world, i)->effect->stress)
+            return pal_world_component(world, i);
+    }
+    return NULL;
+}
+
+pal_err pal_zz_estimate(const pal_world *world, int body, double *share_J, pal_zz_error *out, pal_diagnostic *diag)
+{
+    const pal_body *at = pal_world_view_body(world, body);
+    const pal_component *row = stress_row(world, at);
+    *out = (pal_zz_error){.error = NAN, .solution = NAN, .percent = NAN};
+    if (!row)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": none of its rows gives stress in elements",
+                                  at->name);
+    recovery r = {.share = share_J};
+    r.sum = malloc(9 * sizeof *r.sum * (size_t)at->n_node);
+    r.volume = malloc(sizeof *r.volume * (size_t)at->n_node);
+    pal_err err =
+        r.sum && r.volume ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to recover stress");
+    if (!err) {
+        recover(&r, row, at);
+        double all = r.error2 + r.solution2;
+        *out = (pal_zz_error){.error = sqrt(r.error2),
+                              .solution = sqrt(r.solution2),
+                              .percent = all > 0 ? 100 * sqrt(r.error2 / all) : 0,
+                              .n_material = r.n_material};
+    }
+    free(r.sum);
+    free(r.volume);
+    return err;
+}

@@ -1,0 +1,252 @@
+/* Elements of subdivided solids that are turned over, and what they run on then: node by node, without a world. */
+#include "tests/fixtures/cell_bodies.h"
+
+/* as force and energy of a row, after a look */
+static bool look(cell_body *b)
+{
+    return cell_effect->recover(b->row, &(pal_step){.body = &b->body}) & PAL_INVERSION_CHANGED;
+}
+
+static double edge_m(const cell_body *b)
+{
+    return cbrt(pal_subdivision_solid_volume_m3(b->solid) / pal_cell_elements_count(&b->solid->elements));
+}
+
+/* turned, and shaken so that elements are turned over */
+static void recovery(cell_body *b, int i, uint64_t seed)
+{
+    double turn[9];
+    cell_nth(b, i);
+    cell_rotation(1.2, turn);
+    cell_map(b, turn, 0.3);
+    cell_shake(b, (i == 0 ? 3 : 0.9) * edge_m(b), seed);
+}
+
+static void elements_that_are_not_turned_over_stay_what_they_are(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++) {
+        cell_body b;
+        double turn[9];
+        cell_nth(&b, i);
+        cell_rotation(2.2, turn);
+        turn[0] *= 1.2, turn[1] *= 1.2, turn[2] *= 1.2;
+        cell_map(&b, turn, 0.3);
+        cell_shake(&b, 0.05 * edge_m(&b), 4);
+        CHECK(!look(&b) && !look(&b));
+        CHECK_INT(b.row->recovery.n_patch, 0);
+        CHECK(b.row->recovery.n_inversion == 0);
+        /* the volume that was seen is that of the map */
+        for (int e = 0; e < b.row->recovery.n_cell; e++) {
+            CHECK_LE(b.row->recovery.ratio[0][e], 1.2);
+            CHECK(b.row->recovery.ratio[0][e] > 0.6);
+        }
+        cell_free(&b);
+    }
+}
+
+static void a_patch_begins_with_no_more_energy_than_its_elements(void)
+{
+    int n_patch = 0;
+    for (int i = 0; i < CELL_BODIES; i++)
+        for (uint64_t seed = 1; seed <= 5; seed++) {
+            cell_body b;
+            recovery(&b, i, seed);
+            const double before = cell_energy(&b);
+            if (look(&b)) CHECK_LE(cell_energy(&b), before * (1 + 1e-12));
+            n_patch += b.row->recovery.n_patch;
+            CHECK((b.row->recovery.n_patch > 0) == (b.row->recovery.n_away > 0));
+            /* what is there: the same again */
+            CHECK(!look(&b));
+            cell_free(&b);
+        }
+    CHECK(n_patch >= 15);
+}
+
+/* along random directions, by central differences */
+static double worst_gradient(cell_body *b, int n_try)
+{
+    const int n = 3 * b->body.n_node;
+    double *p = malloc(sizeof *p * (size_t)n), *x = malloc(sizeof *x * (size_t)n), worst = 0;
+    memcpy(x, b->body.d, sizeof *x * (size_t)n);
+    for (int t = 0; t < n_try; t++) {
+        const double h = 1e-5;
+        double e[2];
+        for (int i = 0; i < n; i++) p[i] = 2 * pal_random_unit((uint64_t)t + 11, (uint64_t)i) - 1;
+        const double *f = cell_force(b), work = -cell_dot(f, p, n), of = sqrt(cell_dot(f, f, n) * cell_dot(p, p, n));
+        for (int s = 0; s < 2; s++) {
+            for (int i = 0; i < n; i++) b->body.d[i] = x[i] + (s ? h : -h) * p[i];
+            e[s] = cell_energy(b);
+        }
+        memcpy(b->body.d, x, sizeof *x * (size_t)n);
+        worst = fmax(worst, fabs((e[1] - e[0]) / (2 * h) - work) / of);
+    }
+    free(p), free(x);
+    return worst;
+}
+
+/* patches beside elements: the exact gradient, no net force, no net torque */
+static void forces_of_patches_are_a_gradient_and_sum_up_to_nothing(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++) {
+        cell_body b;
+        double force, torque;
+        recovery(&b, i, 3);
+        CHECK(look(&b));
+        CHECK_LE(worst_gradient(&b, 4), 1e-6);
+        cell_net(&b, &force, &torque);
+        CHECK_LE(force, 1e-12);
+        CHECK_LE(torque, 1e-12);
+        cell_free(&b);
+    }
+}
+
+/* the tangent with rotations held: symmetric, never below 0, nothing for a push of all */
+static void the_tangent_of_patches_is_symmetric_and_never_negative(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++) {
+        cell_body b;
+        recovery(&b, i, 3);
+        CHECK(look(&b));
+        const int n = 3 * b.body.n_node;
+        double *p = calloc(4 * (size_t)n, sizeof *p), *q = p + n, *kp = q + n, *kq = kp + n;
+        cell_effect->tangent->linearise(b.row, &b.body);
+        for (int k = 0; k < n; k++)
+            p[k] = pal_random_unit(7, (uint64_t)k) - 0.5, q[k] = pal_random_unit(8, (uint64_t)k) - 0.5;
+        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, q, kq);
+        CHECK_NEAR(cell_dot(p, kq, n) / cell_dot(p, kp, n), cell_dot(q, kp, n) / cell_dot(p, kp, n), 1e-6);
+        CHECK(cell_dot(p, kp, n) > 0 && cell_dot(q, kq, n) > 0);
+        for (int k = 0; k < n; k++) p[k] = 1, kq[k] = 0;
+        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kq);
+        CHECK_LE(cell_largest(kq, n), 1e-9 * cell_largest(kp, n));
+        free(p);
+        cell_free(&b);
+    }
+}
+
+/* put back to where nothing is turned over, elements take over again, to the bit; a reset does the same at once */
+static void elements_come_back_when_nothing_is_turned_over(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++)
+        for (int reset = 0; reset < 2; reset++) {
+            cell_body b, same;
+            double turn[9];
+            recovery(&b, i, 3);
+            CHECK(look(&b));
+            cell_rotation(1.2, turn);
+            cell_map(&b, turn, 0.3);
+            if (reset)
+                cell_effect->reset(b.row, &b.body);
+            else
+                CHECK(look(&b));
+            CHECK_INT(b.row->recovery.n_away, 0);
+            cell_nth(&same, i);
+            cell_map(&same, turn, 0.3);
+            cell_shake(&b, 0.05, 6), cell_shake(&same, 0.05, 6);
+            const double *f = cell_force(&b), *g = cell_force(&same);
+            double most = 0;
+            for (int k = 0; k < 3 * b.body.n_node; k++) most = fmax(most, fabs(f[k] - g[k]));
+            /* the rotations' iterations began elsewhere */
+            CHECK_LE(most, 1e-9 * cell_largest(g, 3 * b.body.n_node));
+            cell_free(&b), cell_free(&same);
+        }
+}
+
+/* down the slope of their energy, patches have no rest but the shape at rest, turned: mirrored, flat, on one point */
+static void patches_have_no_other_rest(void)
+{
+    static const double map[][9] = {{-1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 0, 0, 0, 1, 0, 0, 0, 0}, {0}};
+    for (int i = 0; i < CELL_BODIES; i++)
+        for (int k = 0; k < 3; k++) {
+            cell_body b;
+            cell_nth(&b, i);
+            const int n = b.body.n_node;
+            cell_map(&b, map[k], 0);
+            CHECK(look(&b));
+            CHECK_INT(b.row->recovery.n_away, b.row->recovery.n_cell);
+            CHECK_INT(b.row->recovery.n_patch, 1);
+            /* at G X with the G of the patch there is no force */
+            const pal_cell_region *patch = &b.row->recovery.of[0];
+            CHECK_NEAR(fabs(patch->turn[0] * (patch->turn[4] * patch->turn[8] - patch->turn[5] * patch->turn[7]) -
+                            patch->turn[1] * (patch->turn[3] * patch->turn[8] - patch->turn[5] * patch->turn[6]) +
+                            patch->turn[2] * (patch->turn[3] * patch->turn[7] - patch->turn[4] * patch->turn[6])),
+                       1, 1e-9);
+            const double *f = cell_force(&b), first = cell_energy(&b);
+            CHECK(k < 2 || first > 0);
+            if (i != 1 && k == 0) CHECK(cell_largest(f, 3 * n) > 0);
+            /* half way to it there is a quarter of the energy: one bowl, with its bottom there */
+            for (int m = 0; m < n; m++)
+                for (int c = 0; c < 3; c++)
+                    b.body.d[3 * m + c] =
+                        0.5 * (b.body.d[3 * m + c] + pal_dot3(patch->turn + 3 * c, b.body.node_rest + 3 * m));
+            CHECK_NEAR(cell_energy(&b) / first, 0.25, 1e-9);
+            cell_free(&b);
+        }
+}
+
+/* half blocks of nothing but patches are not run: of numbers that are none there is nothing in the forces. A look asks
+ * for all */
+static void elements_in_patches_cost_nothing(void)
+{
+    for (int i = 0; i < CELL_BODIES; i++) {
+        cell_body b;
+        cell_nth(&b, i);
+        const size_t n = 3 * (size_t)b.body.n_node;
+        cell_map(&b, (double[9]){-1, 0, 0, 0, 1, 0, 0, 0, 0}, 0);
+        CHECK(look(&b));
+        CHECK_INT(b.row->recovery.n_away, b.row->recovery.n_cell);
+        double *f = malloc(sizeof *f * n), *p = calloc(2 * n, sizeof *p), *kp = p + n;
+        for (size_t k = 0; k < n; k++) p[k] = pal_random_unit(7, k) - 0.5;
+        memcpy(f, cell_force(&b), sizeof *f * n);
+        const double energy_J = cell_energy(&b);
+        cell_effect->tangent->linearise(b.row, &b.body);
+        for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+            const pal_cell_group *g = &b.row->group[kind];
+            const size_t n_lane = (size_t)g->n_block * PAL_LANES;
+            for (size_t k = 0; k < n_lane * (size_t)g->n_node * 3; k++) g->rest[k] = NAN;
+            for (size_t k = 0; k < n_lane * 9; k++) g->turn[k] = NAN;
+        }
+        CHECK(!memcmp(f, cell_force(&b), sizeof *f * n));
+        CHECK(cell_energy(&b) == energy_J);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+        CHECK(isfinite(cell_dot(kp, kp, (int)n)) && cell_dot(p, kp, (int)n) > 0);
+        (void)look(&b);
+        CHECK(isnan(b.row->recovery.of[0].element_J));
+        free(f), free(p);
+        cell_free(&b);
+    }
+}
+
+static void held_parts_say_where_a_whole_body_turns_to(void)
+{
+    cell_body b;
+    double turn[9];
+    cell_nth(&b, 1);
+    pal_body *body = &b.body;
+    body->length_scale_m = 5;
+    cell_rotation(2, turn);
+    for (int i = 0; i < body->n_dof; i++) {
+        pal_copy3(body->x_rest + 3 * i, b.cells.x + 3 * i);
+        for (int c = 0; c < 3; c++) body->x[3 * i + c] = pal_dot3(turn + 3 * c, b.cells.x + 3 * i);
+        body->fixed[i] = b.cells.x[3 * i] < 0.5;
+    }
+    cell_map(&b, (double[9]){0}, 0);
+    CHECK(look(&b));
+    CHECK_INT(b.row->recovery.n_patch, 1);
+    CHECK(b.row->recovery.of[0].fixed);
+    for (int i = 0; i < 9; i++) CHECK_NEAR(b.row->recovery.of[0].turn[i], turn[i], 1e-9);
+    cell_free(&b);
+}
+
+int main(void)
+{
+    RUN(elements_that_are_not_turned_over_stay_what_they_are);
+    RUN(a_patch_begins_with_no_more_energy_than_its_elements);
+    RUN(forces_of_patches_are_a_gradient_and_sum_up_to_nothing);
+    RUN(the_tangent_of_patches_is_symmetric_and_never_negative);
+    RUN(elements_come_back_when_nothing_is_turned_over);
+    RUN(patches_have_no_other_rest);
+    RUN(elements_in_patches_cost_nothing);
+    RUN(held_parts_say_where_a_whole_body_turns_to);
+    return check_report();
+}

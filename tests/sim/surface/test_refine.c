@@ -1,0 +1,652 @@
+/* Row refine: where, when and how often levels switch, and what a switch keeps. */
+#include "server/sim/surface/refine_measure.h"
+#include "tests/fixtures/adaptive_worlds.h"
+#include "tests/stability/hard_case.h"
+
+static const double radius_m = 0.1;
+static const double pole[3] = {0, 0, 0.1}, south[3] = {0, 0, -0.1}, side[3] = {0.05, 0, 0.05}, none[3] = {0, 0, 0};
+
+static void take_sphere(shell_scene *s)
+{
+    pal_surface surface;
+    if (pal_sphere_make(radius_m, &surface)) abort();
+    shell_scene_take(s, &surface);
+    shell_scene_number(s, "levels", 3);
+}
+
+/* held at the rings and caps of its two openings */
+static void take_stomach(shell_scene *s)
+{
+    pal_stomach stomach;
+    if (pal_stomach_make(&stomach)) abort();
+    double box[2][2][3];
+    for (int o = 0; o < 2; o++) {
+        const int32_t *ring = o ? stomach.duodenum : stomach.oesophagus;
+        pal_copy3(box[o][0], stomach.surface.x + 3 * ring[0]);
+        pal_copy3(box[o][1], box[o][0]);
+        for (int k = 0; k <= PAL_STOMACH_RING; k++) {
+            int32_t v = k < PAL_STOMACH_RING ? ring[k] : o ? stomach.duodenum_cap : stomach.oesophagus_cap;
+            for (int c = 0; c < 3; c++) {
+                box[o][0][c] = fmin(box[o][0][c], stomach.surface.x[3 * v + c] - 1e-6);
+                box[o][1][c] = fmax(box[o][1][c], stomach.surface.x[3 * v + c] + 1e-6);
+            }
+        }
+    }
+    shell_scene_take(s, &stomach.surface);
+    shell_scene_number(s, "levels", 2);
+    /* on the rigid frame it would swing about its openings */
+    shell_scene_text(s, "frame", "world");
+    for (int o = 0; o < 2; o++) shell_scene_hold(s, box[o][0], box[o][1]);
+}
+
+/* an entry refine with these thresholds; negative: the default */
+static pal_config_entry *thresholds(shell_scene *s, double force_N, double speed_m_s, double curvature_1_m)
+{
+    pal_config_entry *item = shell_scene_effect(s, "refine");
+    if (force_N >= 0) pal_entry_put_number(item, "force_N", force_N, NULL);
+    if (speed_m_s >= 0) pal_entry_put_number(item, "speed_m_s", speed_m_s, NULL);
+    if (curvature_1_m >= 0) pal_entry_put_number(item, "curvature_1_m", curvature_1_m, NULL);
+    return item;
+}
+
+static const pal_refine_history *report_of(const shell_scene *s)
+{
+    for (int i = 0; i < pal_world_component_count(s->world); i++) {
+        pal_component_info info;
+        pal_world_component_info(s->world, i, &info);
+        if (!strcmp(info.name, "refine")) return pal_refine_report(pal_world_component(s->world, i)->self);
+    }
+    return NULL;
+}
+
+static void steps(shell_scene *s, double time_s)
+{
+    for (double t = 0; t < time_s - 1e-9; t += 1.0 / 60)
+        if (pal_world_step(s->world, 1.0 / 60)) CHECK_FAIL("a step failed");
+}
+
+/* in place of all loads from before */
+static void load_all(shell_scene *s, const double at[3], double radius, const double force_N[3])
+{
+    for (int k = 0; s->body->external_force && k < s->body->n_active; k++)
+        pal_world_load(s->world, 0, pal_body_point(s->body, k), none);
+    shell_scene_press(s, at, radius, force_N);
+}
+
+/* presses both poles of the sphere together, so that it stays where it is */
+static void pinch(shell_scene *s, double force_N)
+{
+    load_all(s, pole, 0.03, (double[3]){0, 0, -force_N});
+    shell_scene_press(s, south, 0.03, (double[3]){0, 0, force_N});
+}
+
+/* farthest place at rest, from `at`, of a node that is not of level 0 */
+static double farthest_new(const shell_scene *s, const double at[3])
+{
+    double most = 0;
+    for (int k = 0; k < s->body->n_active; k++) {
+        int i = pal_body_point(s->body, k);
+        if (i >= s->body->adaptive->levels.n_vertex[0]) most = fmax(most, pal_dist3(s->body->x_rest + 3 * i, at));
+    }
+    return most;
+}
+
+/* ---- where ---- */
+
+static void refines_where_pressed_and_only_there(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0.02, 0, 0);
+    REQUIRE(shell_scene_start(&s));
+    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    for (int i = 0; i < 60; i++) {
+        load_all(&s, pole, 0.03, (double[3]){0, 0, -0.3});
+        steps(&s, 1.0 / 60);
+    }
+    CHECK_INT(adaptive->finest, 2);
+    CHECK(s.body->n_active > 114 && s.body->n_active < 250);
+    /* a face reaches 2 cm beyond the pressed nodes, its like and coarser neighbours as far again */
+    CHECK_LE(farthest_new(&s, pole), 0.08);
+    /* all faces around pressed nodes are of the finest level */
+    for (int k = 0; k < adaptive->n_leaf; k++) {
+        const int32_t *c = adaptive->levels.face + 3 * adaptive->leaf[k];
+        bool pressed = false;
+        for (int j = 0; j < 3; j++) pressed |= pal_dist3(s.body->x_rest + 3 * c[j], pole) < 0.03;
+        if (pressed) CHECK_INT(adaptive->levels.face_level[adaptive->leaf[k]], 2);
+    }
+    shell_scene_close(&s);
+}
+
+static void thresholds_of_0_switch_criteria_off(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0, 0, 0);
+    REQUIRE(shell_scene_start(&s));
+    load_all(&s, pole, 0.03, (double[3]){0, 0, -1});
+    steps(&s, 0.5);
+    CHECK(shell_scene_rms(&s) > 1e-3);
+    CHECK_INT(report_of(&s)->n_switch, 0);
+    CHECK_INT(s.body->n_active, 114);
+    shell_scene_close(&s);
+}
+
+static void never_has_more_than_most_node(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    pal_entry_put_number(thresholds(&s, 0.001, 0, 0), "most_node", 150, NULL);
+    REQUIRE(shell_scene_start(&s));
+    int most = 0;
+    for (int i = 0; i < 60; i++) {
+        load_all(&s, pole, 0.08, (double[3]){0, 0, -1});
+        steps(&s, 1.0 / 60);
+        if (s.body->n_active > most) most = s.body->n_active;
+    }
+    CHECK(most > 140 && most <= 150);
+    shell_scene_close(&s);
+}
+
+/* ---- speed and curvature ---- */
+
+/* velocities V + Omega x x at every active node */
+static void set_motion(shell_scene *s, const double V[3], const double Omega[3])
+{
+    for (int k = 0; k < s->body->n_active; k++) {
+        int i = pal_body_point(s->body, k);
+        double *v = s->body->v + 3 * i;
+        pal_cross3(v, Omega, s->body->x + 3 * i);
+        pal_add3(v, v, V);
+    }
+}
+
+static void a_wave_refines_by_speed_alone(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0, 0.05, 0);
+    REQUIRE(shell_scene_start(&s));
+    int top = shell_scene_nearest(&s, pole);
+    pal_set3(s.body->v + 3 * top, 0, 0, -1);
+    steps(&s, 1.0 / 60);
+    CHECK(report_of(&s)->n_split >= 6);
+    CHECK_LE(farthest_new(&s, pole), 0.11);
+    shell_scene_close(&s);
+}
+
+static void rigid_motion_refines_nothing(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, -1, 0.02, 1);
+    REQUIRE(shell_scene_start(&s));
+    /* speeds far above the threshold; slow enough to turn that the surface hardly widens */
+    set_motion(&s, (double[3]){1, -2, 0.5}, (double[3]){0.6, 0.5, -0.7});
+    steps(&s, 0.5);
+    CHECK_INT(report_of(&s)->n_switch, 0);
+    CHECK_LE(0.5, pal_dist3(s.body->x, s.body->x_rest));
+    shell_scene_close(&s);
+}
+
+static void take_sheet(shell_scene *s)
+{
+    pal_surface surface;
+    pal_diagnostic diag;
+    if (pal_sheet_make(13, 13, 0.24, 0.24, &surface, &diag)) abort();
+    shell_scene_take(s, &surface);
+    shell_scene_number(s, "levels", 2);
+    shell_scene_number(s, "k_shape_N_m", 0);
+}
+
+/* rolls the middle of the sheet, |x| < half, up to a cylinder of that curvature; the wings go on straight */
+static void roll(shell_scene *s, double curvature, double half)
+{
+    for (int i = 0; i < s->body->n_node; i++) {
+        double *x = s->body->x + 3 * i;
+        const double *r = s->body->x_rest + 3 * i;
+        double arc = fmax(-half, fmin(half, r[0])), turn = curvature * arc, over = r[0] - arc;
+        x[0] = sin(turn) / curvature + over * cos(turn);
+        x[1] = r[1];
+        x[2] = (1 - cos(turn)) / curvature + over * sin(turn);
+    }
+}
+
+static void a_bent_sheet_refines_by_curvature_alone(void)
+{
+    shell_scene s;
+    take_sheet(&s);
+    thresholds(&s, 0, 0, 2);
+    REQUIRE(shell_scene_start(&s));
+    /* mean over the directions of springs, 0, 45 and 90 degrees to the roll: half of its curvature */
+    roll(&s, 8, 0.05);
+    pal_world_invalidate_limits(s.world, 0);
+    steps(&s, 1e-4);
+    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    CHECK(adaptive->n_leaf_of[1] > 0 && adaptive->n_leaf_of[0] > 0);
+    for (int f = 0; f < adaptive->levels.first_face[1]; f++) {
+        const int32_t *c = adaptive->levels.face + 3 * f;
+        double x = 0;
+        for (int j = 0; j < 3; j++) x = fmax(x, fabs(s.body->x_rest[3 * c[j]]));
+        if (x < 0.045) CHECK_INT(adaptive->face_state[f], PAL_FACE_SPLIT);
+        if (x > 0.105) CHECK_INT(adaptive->face_state[f], PAL_FACE_LEAF);
+    }
+    shell_scene_close(&s);
+    /* the same less sharply, and straight but turned about */
+    take_sheet(&s);
+    thresholds(&s, 0, 0, 2);
+    REQUIRE(shell_scene_start(&s));
+    roll(&s, 3, 0.05);
+    pal_world_invalidate_limits(s.world, 0);
+    steps(&s, 1e-4);
+    CHECK_INT(report_of(&s)->n_switch, 0);
+    shell_scene_close(&s);
+}
+
+static void curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_changes_it(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    REQUIRE(shell_scene_start(&s));
+    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    int n = s.body->n_node;
+    pal_arena *arena = pal_arena_create(1 << 20, true);
+    double *out = malloc((size_t)n * sizeof *out), *x = malloc(3 * (size_t)n * sizeof *x);
+    pal_refine_measure measure;
+    REQUIRE(!pal_refine_measure_make(&measure, adaptive, arena));
+    for (int f = 0; f < 100; f += 7) pal_adaptive_split((pal_adaptive_surface *)(void *)adaptive, s.body, f, 0);
+    pal_adaptive_update((pal_adaptive_surface *)(void *)adaptive, s.body);
+    pal_refine_curvature(&measure, adaptive, s.body->x_rest, out);
+    double quat[4] = {0.5, -0.5, 0.1, 0.7}, worst = 0;
+    for (int i = 0; i < 114; i++) CHECK_NEAR(out[i], -1 / radius_m, 0.25 / radius_m);
+    for (int i = 0; i < n; i++) {
+        pal_quat_rotate(x + 3 * i, quat, s.body->x_rest + 3 * i);
+        pal_add3(x + 3 * i, x + 3 * i, (double[3]){3, -4, 5});
+    }
+    pal_refine_curvature(&measure, adaptive, x, measure.rest_curvature);
+    for (int k = 0; k < adaptive->n_node; k++)
+        worst = fmax(worst, fabs(measure.rest_curvature[adaptive->node[k]] - out[adaptive->node[k]]));
+    CHECK_LE(worst, 1e-9 / radius_m);
+    /* lengths twice as long, curvatures half as large */
+    for (int i = 0; i < 3 * n; i++) x[i] = 2 * s.body->x_rest[i];
+    pal_refine_curvature(&measure, adaptive, x, measure.rest_curvature);
+    for (int k = 0; k < adaptive->n_node; k++)
+        CHECK_NEAR(measure.rest_curvature[adaptive->node[k]], out[adaptive->node[k]] / 2, 1e-12 / radius_m);
+    free(out), free(x), pal_arena_destroy(arena);
+    shell_scene_close(&s);
+
+    take_sheet(&s);
+    REQUIRE(shell_scene_start(&s));
+    arena = pal_arena_create(1 << 20, true);
+    REQUIRE(!pal_refine_measure_make(&measure, s.body->adaptive, arena));
+    roll(&s, 2, 1);
+    pal_refine_curvature(&measure, s.body->adaptive, s.body->x, measure.rest_curvature);
+    for (int i = 0; i < 169; i++)
+        if (!pal_levels_on_boundary(&s.body->adaptive->levels, i)) CHECK_NEAR(measure.rest_curvature[i], 1.0, 0.002);
+    pal_arena_destroy(arena);
+    shell_scene_close(&s);
+}
+
+/* ---- when ---- */
+
+static uint64_t press_and_release(shell_scene *s, double *most)
+{
+    uint64_t hash = 0;
+    for (int i = 0; i < 300; i++) {
+        pinch(s, i < 60 ? 0.1 : 0);
+        steps(s, 1.0 / 60);
+        hash = 31 * hash + pal_world_hash(s->world);
+        *most = fmax(*most, s->body->n_active);
+    }
+    return hash;
+}
+
+static void goes_back_to_the_coarse_mesh_and_repeats_bit_by_bit(void)
+{
+    uint64_t hash[2] = {0};
+    for (int run = 0; run < 2; run++) {
+        shell_scene s;
+        double most = 0;
+        take_sphere(&s);
+        REQUIRE(shell_scene_start(&s));
+        double mass = s.body->mass_kg[0];
+        hash[run] = press_and_release(&s, &most);
+        CHECK(most > 150);
+        CHECK_INT(s.body->n_active, 114);
+        CHECK_INT(s.body->adaptive->n_spring, 336);
+        CHECK(s.body->mass_kg[0] == mass);
+        CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->length_scale_m);
+        if (run == 0) { /* the same world again */
+            pal_world_reset(s.world);
+            most = 0;
+            CHECK(press_and_release(&s, &most) == hash[0]);
+        }
+        shell_scene_close(&s);
+    }
+    CHECK(hash[0] == hash[1]);
+}
+
+static void reset_goes_back_to_the_start_level(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    shell_scene_number(&s, "start_level", 1);
+    REQUIRE(shell_scene_start(&s));
+    uint64_t start = pal_world_hash(s.world);
+    CHECK_INT(s.body->n_active, 450);
+    load_all(&s, pole, 0.03, (double[3]){0, 0, -0.3});
+    steps(&s, 1);
+    CHECK(s.body->n_active != 450 && s.body->adaptive->finest == 2);
+    pal_world_reset(s.world);
+    CHECK_INT(s.body->n_active, 450);
+    CHECK_INT(report_of(&s)->n_switch, 0);
+    CHECK(pal_world_hash(s.world) == start);
+    shell_scene_close(&s);
+}
+
+/* most switches of one face within a second, the force on the pole being force(step) times the threshold there */
+static int most_switches(double (*force)(int), int n_step, bool spread)
+{
+    enum { WINDOW = 60 };
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0.05, 0, 0);
+    if (!shell_scene_start(&s)) return 1000;
+    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    int n = adaptive->levels.first_face[3], most = 0, top = shell_scene_nearest(&s, pole);
+    uint8_t *was = malloc((size_t)n), (*switched)[WINDOW] = calloc((size_t)n, WINDOW);
+    memcpy(was, adaptive->face_state, (size_t)n);
+    for (int i = 0; i < n_step; i++) {
+        double f[3] = {0, 0, -0.05 * force(i)};
+        if (!spread) pal_scale3(f, s.body->mass_kg[top] / adaptive->level_mass_kg[0], f);
+        if (spread)
+            load_all(&s, pole, 0.03, f);
+        else
+            pal_world_load(s.world, 0, top, f);
+        steps(&s, 1.0 / 60);
+        for (int k = 0; k < n; k++) {
+            /* a face that is absent comes and goes with its parent */
+            bool now = (adaptive->face_state[k] == PAL_FACE_SPLIT) != (was[k] == PAL_FACE_SPLIT);
+            switched[k][i % WINDOW] = now;
+            was[k] = adaptive->face_state[k];
+            int sum = 0;
+            for (int w = 0; now && w < WINDOW; w++) sum += switched[k][w];
+            if (sum > most) most = sum;
+        }
+    }
+    free(was), free(switched);
+    shell_scene_close(&s);
+    return most;
+}
+
+static double at_threshold(int i)
+{
+    (void)i;
+    return 1;
+}
+static double around_threshold(int i)
+{
+    return i & 1 ? 1.01 : 0.99;
+}
+static double around_both(int i)
+{
+    return i & 1 ? 1.01 : 0.49;
+}
+static double on_and_off(int i)
+{
+    return i / 13 & 1 ? 4 : 0;
+}
+static double sweeps(int i)
+{
+    return 30 * (1 + sin(0.02 * i * i));
+}
+
+static void never_flickers(void)
+{
+    const char *const what = "most switches of a face in a second";
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(at_threshold, 120, false), 1, "");
+    CHECK_INT(most_switches(around_threshold, 120, false), 1);
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(around_both, 120, false), 5, "");
+    int worst = most_switches(on_and_off, 240, false);
+    CHECK(worst >= 4 && worst <= 5);
+    HARD_CASE("threshold", "adaptive_springs", what, worst, 5, "");
+    HARD_CASE("threshold", "adaptive_springs", what, most_switches(sweeps, 240, true), 5, "");
+}
+
+static void a_node_that_bears_a_lasting_load_is_not_taken_away(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 1, 0, 0);
+    shell_scene_number(&s, "start_level", 1);
+    REQUIRE(shell_scene_start(&s));
+    pal_world_load(s.world, 0, 200, (double[3]){0, 0, 1e-3});
+    steps(&s, 1);
+    CHECK(pal_adaptive_has(s.body->adaptive, 200));
+    CHECK(s.body->n_active > 114 && s.body->n_active < 140);
+    pal_world_load(s.world, 0, 200, none);
+    steps(&s, 0.5);
+    CHECK_INT(s.body->n_active, 114);
+    shell_scene_close(&s);
+}
+
+static void thresholds_follow_a_live_edit_of_the_material(void)
+{
+    for (int stiff = 0; stiff < 2; stiff++) {
+        shell_scene s;
+        take_sphere(&s);
+        pal_config_entry *item = shell_scene_effect(&s, "refine");
+        pal_entry_put_number(item, "speed_m_s", 0, NULL);
+        pal_entry_put_number(item, "curvature_1_m", 0, NULL);
+        REQUIRE(shell_scene_start(&s));
+        const pal_adaptive_surface *adaptive = s.body->adaptive;
+        double h = 0, k = 0.5 * sqrt(3) * 5000 * 0.003;
+        for (int e = 0; e < adaptive->levels.first_edge[1]; e++)
+            h += pal_dist3(s.body->x_rest + 3 * adaptive->levels.edge[e].vertex[0],
+                           s.body->x_rest + 3 * adaptive->levels.edge[e].vertex[1]) /
+                 adaptive->levels.first_edge[1];
+        pal_material to = s.scene->body[0].material;
+        to.young_Pa *= stiff ? 1.02 : 0.98;
+        REQUIRE(!pal_world_material(s.world, 0, &to, &s.diag));
+        int top = shell_scene_nearest(&s, pole);
+        pal_world_load(s.world, 0, top, (double[3]){0, 0, -0.005 * k * h});
+        steps(&s, 0.1);
+        CHECK_INT(report_of(&s)->n_switch > 0, !stiff);
+        shell_scene_close(&s);
+    }
+}
+
+static void a_frozen_body_keeps_its_levels(void)
+{
+    shell_scene s;
+    take_sphere(&s);
+    REQUIRE(shell_scene_start(&s));
+    load_all(&s, pole, 0.03, (double[3]){0, 0, -0.3});
+    s.body->frozen = true;
+    for (int i = 0; i < 20; i++) (void)pal_world_step(s.world, 1.0 / 60);
+    CHECK_INT(s.body->n_active, 114);
+    shell_scene_close(&s);
+}
+
+/* pinched as it rests and as it flies: the same levels and the same shape, whatever motion adds to the energy */
+static void what_flies_is_refined_as_what_rests(void)
+{
+    enum { STEPS = 75 };
+    shell_scene s[2];
+    double worst = 0;
+    int unlike = 0, most = 0;
+    for (int run = 0; run < 2; run++) {
+        take_sphere(&s[run]);
+        REQUIRE(shell_scene_start(&s[run]));
+        if (run) set_motion(&s[run], (double[3]){1, 0, 0}, none);
+    }
+    for (int i = 0; i < STEPS; i++) {
+        for (int run = 0; run < 2; run++) {
+            pinch(&s[run], i < 45 ? 0.1 : 0);
+            steps(&s[run], 1.0 / 60);
+        }
+        const pal_body *a = s[0].body, *b = s[1].body;
+        unlike += a->n_active != b->n_active;
+        most = a->n_active > most ? a->n_active : most;
+        for (int k = 0; k < a->n_active && !unlike; k++) {
+            int n = pal_body_point(a, k);
+            double back[3] = {b->x[3 * n] - (i + 1) / 60.0, b->x[3 * n + 1], b->x[3 * n + 2]};
+            worst = fmax(worst, pal_dist3(a->x + 3 * n, back));
+        }
+    }
+    CHECK_INT(unlike, 0);
+    CHECK(most > 200);
+    CHECK_LE(worst, 1e-4 * radius_m);
+    for (int run = 0; run < 2; run++) shell_scene_close(&s[run]);
+}
+
+/* ---- what a switch keeps ---- */
+
+typedef struct worst {
+    uint64_t n;
+    double raw, after, mass, momentum, turn, kinetic_raw, elastic_raw;
+} worst;
+
+static void watch(const shell_scene *s, uint64_t *seen, worst *w)
+{
+    const pal_refine_history *r = report_of(s);
+    if (r->n_switch == *seen) return;
+    *seen = r->n_switch;
+    const pal_refine_balance *b = &r->before, *raw = &r->raw, *a = &r->after;
+    double total = pal_refine_balance_total_J(b), unit = sqrt(2 * b->mass_kg * fmax(b->kinetic_J, 1e-12 * total));
+    w->n++;
+    w->raw = fmax(w->raw, fabs(pal_refine_balance_total_J(raw) / total - 1));
+    w->after = fmax(w->after, fabs(pal_refine_balance_total_J(a) / total - 1));
+    w->kinetic_raw = fmax(w->kinetic_raw, fabs(raw->kinetic_J - b->kinetic_J) / total);
+    w->elastic_raw = fmax(w->elastic_raw, fabs(raw->spring_J + raw->shape_J - b->spring_J - b->shape_J) / total);
+    w->mass = fmax(w->mass, fabs(a->mass_kg / b->mass_kg - 1));
+    w->turn = fmax(w->turn, pal_dist3(a->turn_kg_m2_s, b->turn_kg_m2_s) / (unit * s->body->length_scale_m));
+    w->momentum = fmax(w->momentum, pal_dist3(a->momentum_kg_m_s, b->momentum_kg_m_s) / unit);
+    if (getenv("REFINE_VERBOSE"))
+        printf("  %6.3f s  n %d  E %.3g = K %.3g S %.3g A %.3g  raw K %+.4f S %+.4f A %+.4f  after %+.5f  ramps %.4f "
+               "%.4f\n",
+               r->time_s, s->body->n_active, total, b->kinetic_J, b->spring_J, b->shape_J,
+               (raw->kinetic_J - b->kinetic_J) / total, (raw->spring_J - b->spring_J) / total,
+               (raw->shape_J - b->shape_J) / total, pal_refine_balance_total_J(a) / total - 1,
+               s->body->adaptive->spring_ramp, s->body->adaptive->shape_ramp);
+}
+
+static worst watch_press(bool stomach, double force_N)
+{
+    shell_scene s;
+    worst w = {0};
+    uint64_t seen = 0;
+    if (stomach)
+        take_stomach(&s);
+    else
+        take_sphere(&s);
+    if (!shell_scene_start(&s)) return (worst){.after = NAN};
+    for (int i = 0; i < 240; i++) {
+        double force = i < 120 ? force_N : 0;
+        if (stomach)
+            load_all(&s, side, 0.03, (double[3]){0, 0, -force});
+        else
+            pinch(&s, force);
+        steps(&s, 1.0 / 60);
+        watch(&s, &seen, &w);
+    }
+    CHECK_INT(s.body->n_active, s.body->adaptive->levels.n_vertex[0]);
+    printf("  %s, %g N: %d switches; worst jump of energy %.2g as it comes (motion %.2g, springs and anchors %.2g), "
+           "%.2g as kept; mass %.1g, momentum %.1g, angular %.1g\n",
+           stomach ? "stomach" : "sphere", force_N, (int)w.n, w.raw, w.kinetic_raw, w.elastic_raw, w.after, w.mass,
+           w.momentum, w.turn);
+    shell_scene_close(&s);
+    return w;
+}
+
+/* a blow on one node runs over a sphere that turns and flies */
+static void a_switch_under_a_wave_keeps_them_too(void)
+{
+    shell_scene s;
+    worst w = {0};
+    uint64_t seen = 0;
+    take_sphere(&s);
+    REQUIRE(shell_scene_start(&s));
+    set_motion(&s, (double[3]){0.3, 0, -0.2}, (double[3]){1, -2, 1});
+    pal_set3(s.body->v + 3 * shell_scene_nearest(&s, pole), 0, 0, -2);
+    double P[2][3];
+    pal_body_momentum(s.body, P[0]);
+    for (int i = 0; i < 60; i++) {
+        steps(&s, 1.0 / 60);
+        watch(&s, &seen, &w);
+    }
+    pal_body_momentum(s.body, P[1]);
+    printf(
+        "  wave: %d switches; worst jump of energy %.2g as it comes (motion %.2g, springs and anchors %.2g), %.2g as "
+        "kept; momentum %.1g, angular %.1g\n",
+        (int)w.n, w.raw, w.kinetic_raw, w.elastic_raw, w.after, w.momentum, w.turn);
+    CHECK(w.n >= 4);
+    CHECK_LE(w.after, 0.01);
+    CHECK_LE(w.mass, 1e-12);
+    CHECK_LE(w.momentum, 1e-10);
+    CHECK_LE(w.turn, 1e-10);
+    CHECK_LE(pal_dist3(P[0], P[1]), 1e-10 * pal_norm3(P[0]));
+    shell_scene_close(&s);
+}
+
+static void a_switch_keeps_energy_mass_and_momentum(void)
+{
+    for (int run = 0; run < 4; run++) {
+        bool stomach = run & 1;
+        worst w = watch_press(stomach, run & 2 ? 0.3 : 0.05);
+        CHECK(w.n >= 4);
+        /* without what the row does about it the test would show nothing */
+        CHECK(w.raw > 0.05);
+        HARD_CASE("threshold", "adaptive_springs", "energy jumps at a switch by", 100 * w.after, 1, "%");
+        HARD_CASE("threshold", "adaptive_springs", "mass off by", w.mass, 1e-12, "");
+        CHECK_LE(w.momentum, 1e-10);
+        if (!stomach) CHECK_LE(w.turn, 1e-10);
+    }
+}
+
+static void bad_numbers_are_refused_in_a_sentence(void)
+{
+    static const struct {
+        const char *key;
+        double number;
+        const char *sentence;
+    } bad[] = {{"force_N", NAN, "effects[0].force_N: nan is outside [0, 1e+12]"},
+               {"speed_m_s", -1, "effects[0].speed_m_s: -1 is outside [0, 1e+12]"},
+               {"curvature_1_m", NAN, "effects[0].curvature_1_m: nan is outside [0, 1e+12]"},
+               {"dwell_s", -0.1, "effects[0].dwell_s: -0.1 is outside [0, 1e+06]"},
+               {"every_s", INFINITY, "effects[0].every_s: inf is outside [0, 1e+06]"},
+               {"ramp_s", NAN, "effects[0].ramp_s: nan is outside [0, 1e+06]"},
+               {"most_node", 1.5, "effects[0].most_node: 1.5 is not a whole number"},
+               {"force", 1, "effects[0] (refine): unknown key \"force\""}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        shell_scene s;
+        take_sphere(&s);
+        pal_entry_put_number(shell_scene_effect(&s, "refine"), bad[i].key, bad[i].number, NULL);
+        CHECK(pal_world_create(s.scene, &s.diag, &s.world) == PAL_ERR_REFUSED);
+        CHECK_TEXT(s.diag.text, bad[i].sentence);
+        s.world = NULL;
+        shell_scene_close(&s);
+    }
+}
+
+int main(void)
+{
+    RUN(curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_changes_it);
+    RUN(refines_where_pressed_and_only_there);
+    RUN(thresholds_of_0_switch_criteria_off);
+    RUN(never_has_more_than_most_node);
+    RUN(a_wave_refines_by_speed_alone);
+    RUN(rigid_motion_refines_nothing);
+    RUN(a_bent_sheet_refines_by_curvature_alone);
+    RUN(goes_back_to_the_coarse_mesh_and_repeats_bit_by_bit);
+    RUN(reset_goes_back_to_the_start_level);
+    RUN(never_flickers);
+    RUN(a_node_that_bears_a_lasting_load_is_not_taken_away);
+    RUN(thresholds_follow_a_live_edit_of_the_material);
+    RUN(a_frozen_body_keeps_its_levels);
+    RUN(what_flies_is_refined_as_what_rests);
+    RUN(a_switch_keeps_energy_mass_and_momentum);
+    RUN(a_switch_under_a_wave_keeps_them_too);
+    RUN(bad_numbers_are_refused_in_a_sentence);
+    return check_report();
+}
