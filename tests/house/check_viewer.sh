@@ -28,7 +28,7 @@ format | reformat)
     # shellcheck disable=SC2046
     exec "$packages/node_modules/.bin/prettier" --log-level warn --config clients/viewer/package.json $mode \
         $(find clients/viewer tests -name node_modules -prune -o \( -name '*.js' -o -name '*.mjs' \) -print | sort) \
-        clients/viewer/index.html clients/viewer/style.css clients/viewer/package.json clients/viewer/jsconfig.json
+        clients/viewer/index.html clients/viewer/*.css clients/viewer/package.json clients/viewer/jsconfig.json
     ;;
 test) cd "$tree/clients/viewer" && exec node --test test/*.test.js ;;
 *)

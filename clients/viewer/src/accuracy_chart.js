@@ -1,6 +1,6 @@
 // Draws the plot of error against cost as SVG: axes, the study's points and its Pareto front, the running configuration.
 import { layOutPlot } from "./accuracy_plot.js";
-import { milliseconds, millimetres } from "./accuracy_text.js";
+import { milliseconds, millimetres, plainLabel } from "./accuracy_text.js";
 
 const BOX = { left: 40, right: 302, top: 20, bottom: 172 };
 const SVG = "http://www.w3.org/2000/svg";
@@ -63,7 +63,7 @@ function drawPoints(plot, { requested }) {
         out.push(shape("polyline", { points, class: "front" }));
     }
     for (const { x, y, point, colour } of plot.marks) {
-        const text = `${point.label}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`;
+        const text = `${plainLabel(point.label)}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`;
         const style = point.front ? { r: 4, class: "point on-front" } : { r: 2.8, class: "point" };
         out.push(shape("circle", { cx: x, cy: y, fill: colour, ...style }, text));
     }
@@ -72,7 +72,7 @@ function drawPoints(plot, { requested }) {
             shape("circle", { cx: plot.x(requested.ms), cy: plot.y(requested.error_m), r: 8, class: "requested" }),
         );
     for (const { x, y, of } of plot.neighbours) {
-        const text = `${of.label}, predicted: ${milliseconds(of.ms)}, ${millimetres(of.error_m)}`;
+        const text = `${plainLabel(of.label)}, predicted: ${milliseconds(of.ms)}, ${millimetres(of.error_m)}`;
         out.push(shape("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5 -5z`, class: "neighbour" }, text));
     }
     return out;

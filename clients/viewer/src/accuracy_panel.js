@@ -3,7 +3,15 @@
 // configuration is pending at a time.
 import { drawChart } from "./accuracy_chart.js";
 import { frontOf, neighbourArgs, positionOn } from "./accuracy_plot.js";
-import { errorText, milliseconds, millimetres, neighbourText, partsOf, switchText } from "./accuracy_text.js";
+import {
+    errorText,
+    milliseconds,
+    millimetres,
+    neighbourText,
+    partsOf,
+    plainLabel,
+    switchText,
+} from "./accuracy_text.js";
 import { htmlById, inputById, makeOption, selectById } from "./dom.js";
 
 /**
@@ -100,6 +108,7 @@ export class AccuracyPanel {
         this.front = frontOf(this.points);
         this.slider.max = String(Math.max(0, this.front.length - 1));
         this.at("front").hidden = this.front.length < 2;
+        if (this.points.length === 0) this.report("No accuracy study exists for this scene.");
         this.show();
     }
 
@@ -139,7 +148,7 @@ export class AccuracyPanel {
     submit(command, label) {
         if (this.pending) return;
         this.pending = { command, since: Date.now() };
-        this.report(`Preparing ${label} …`);
+        this.report(`Preparing ${plainLabel(label)} …`);
         this.send(command);
         this.show();
     }
@@ -160,9 +169,9 @@ export class AccuracyPanel {
         if (!this.opened) return;
         const plot = this.drawPlot();
         this.at("methods").replaceChildren(
-            ...plot.methods.map(({ name, colour }) => this.legendItem(colour, name.replaceAll("_", " "))),
+            ...plot.methods.map(({ name, colour }) => this.legendItem(colour, plainLabel(name))),
         );
-        this.at("configuration").textContent = this.estimate?.setting ?? "";
+        this.at("configuration").textContent = plainLabel(this.estimate?.setting ?? "");
         this.showError(this.estimate);
         this.showSlider();
         this.showNeighbours(this.estimate);
@@ -195,6 +204,7 @@ export class AccuracyPanel {
         this.at("note").textContent = text.note;
         this.at("parts").replaceChildren(...parts.map((p) => this.legendItem(p.colour, p.title, millimetres(p.value))));
         const segments = parts.filter((part) => part.share > SHARE_MIN);
+        this.at("bar").hidden = segments.length === 0;
         this.at("bar").replaceChildren(
             ...segments.map(({ colour, share }) => {
                 const segment = this.page.createElement("i");
@@ -213,7 +223,7 @@ export class AccuracyPanel {
         this.slider.disabled = this.pending !== null;
         const point = this.front[Number(this.slider.value)];
         const text = point
-            ? `${point.label.replaceAll("_", " ")}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`
+            ? `${plainLabel(point.label)}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`
             : "";
         this.at("choice").textContent = text;
         if (point) this.slider.setAttribute("aria-valuetext", text);
@@ -239,7 +249,7 @@ export class AccuracyPanel {
         const title = Object.assign(this.page.createElement("b"), { textContent: near.knob });
         const text = Object.assign(this.page.createElement("span"), { textContent: neighbourText(estimate, near) });
         button.append(title, text);
-        button.title = `${near.label}, predicted: ${milliseconds(near.ms)}, ${millimetres(near.error_m)}`;
+        button.title = `${plainLabel(near.label)}, predicted: ${milliseconds(near.ms)}, ${millimetres(near.error_m)}`;
         button.disabled = this.pending !== null || !command;
         if (command) button.onclick = () => this.submit(command, near.label);
         return button;

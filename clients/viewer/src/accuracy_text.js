@@ -42,6 +42,9 @@ export function millimetres(m) {
     return m !== 0 && m < RESOLUTION_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`;
 }
 
+/** a label of the server without underscores @param {string} label */
+export const plainLabel = (label) => label.replaceAll("_", " ");
+
 /** @param {number | undefined} ms */
 export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)} ms`);
 
@@ -91,7 +94,7 @@ export function neighbourText(now, to) {
     const cost = positive(now.ms) && positive(to.ms) ? to.ms - now.ms : null;
     const difference = cost === null ? "" : `${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
     const costText = cost === null ? "" : Math.abs(cost) < SAME_MS ? ": same cost" : `: ${difference}`;
-    if (!known(now.error_m) || !known(to.error_m)) return to.label + costText;
+    if (!known(now.error_m) || !known(to.error_m)) return plainLabel(to.label) + costText;
     const ratio = Math.max(RESOLUTION_M, to.error_m) / Math.max(RESOLUTION_M, now.error_m);
     return gainText(ratio) + costText;
 }

@@ -104,10 +104,14 @@ export class Stage {
         this.home();
     }
 
+    /** distance of the initial view, which a narrow page increases */
+    homeDistance() {
+        const narrow = Math.max(0.5, Math.min(1, this.camera.aspect));
+        return ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / narrow;
+    }
+
     home() {
-        const narrow = Math.min(1, this.camera.aspect);
-        this.distance =
-            ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(0.5, narrow);
+        this.distance = this.homeDistance();
         this.azimuth = -0.6;
         this.elevation = 0.42;
         this.dirty = true;
@@ -122,7 +126,9 @@ export class Stage {
             height = this.canvas.clientHeight || 1;
         this.renderer.setPixelRatio(this.pixelRatio());
         this.renderer.setSize(width, height, false);
+        const before = this.homeDistance();
         this.camera.aspect = width / height;
+        this.distance *= this.homeDistance() / before;
         this.updateProjection();
     }
 
