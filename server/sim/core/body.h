@@ -10,6 +10,7 @@
 #include "server/sim/core/dofs.h"
 #include "server/sim/core/safeguards.h"
 #include "server/sim/core/simd_blocks.h"
+#include "server/sim/core/tuning.h"
 
 /* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
  * Published by an implicit solver that holds a static factor; rows stay apart, the body carries the door. */
@@ -145,7 +146,8 @@ static inline int pal_body_nodes(const pal_body *body)
 /* load_cap_N of a body of this material: by what its edges are, where their constants are given */
 static inline double pal_body_load_cap_N(const pal_body *body, double young_Pa)
 {
-    return 10 * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m * body->edge_m;
+    return PAL_LOAD_CAP_FACTOR * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m *
+           body->edge_m;
 }
 /* most of a lasting load that a node bears (less of it beyond 2 S from its rest place, world_load.c): load_cap_N, and
  * of that the part that the node is of the corner of a full voxel, or of a solid's mean cell, as a sliver is as much

@@ -108,7 +108,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
     tool_grasp *grasp = self;
     (void)body, (void)diag;
     grasp->young_Pa = mat->young_Pa;
-    grasp->poisson = fmin(mat->poisson, 0.4999);
+    grasp->poisson = fmin(mat->poisson, PAL_POISSON_CLAMP);
     return PAL_ERR_OK;
 }
 

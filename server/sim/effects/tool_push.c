@@ -81,7 +81,7 @@ typedef struct tool_push {
 static void take_material(tool_push *push, const pal_material *material)
 {
     push->young_Pa = material->young_Pa;
-    push->poisson = fmin(material->poisson, 0.4999);
+    push->poisson = fmin(material->poisson, PAL_POISSON_CLAMP);
     push->damping_1_s = material->damping_1_s;
     push->density_kg_m3 = material->density_kg_m3;
 }
