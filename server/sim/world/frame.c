@@ -1,16 +1,15 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/world/frame.h"
 
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 
 #include <stdlib.h>
 
 /* room for the triangles of a part that adapts; no table taken yet */
-static bool make_slots(pal_frame_part *part, const pal_adaptive_surface *adaptive)
+static bool make_slots(pal_frame_part *part, const pal_dofs *dofs)
 {
-    const pal_levels *levels = &adaptive->levels;
-    part->n_slot = adaptive->n_slot;
+    const pal_levels *levels = dofs->levels;
+    part->n_slot = dofs->n_slot;
     part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
     part->slot_log = UINT64_MAX;
     part->n_finest = levels->n_vertex[levels->n_level - 1];
@@ -37,7 +36,7 @@ pal_frame *pal_frame_create(const pal_world *world)
         part->n_vertex = shown.n_vertex;
         part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
         const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
-        bool made = part->position_m && (!shown.is_adaptive || make_slots(part, body->adaptive)) &&
+        bool made = part->position_m && (!shown.is_adaptive || make_slots(part, &body->dofs)) &&
                     (!body->interpolation || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);
