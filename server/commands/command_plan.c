@@ -231,8 +231,8 @@ int command_plan(int argc, char **argv)
                                   .about = "Shows the rows that a scene calls for, in the order of a step, with their "
                                            "memory and their measured cost here.\nSCENE is a scene.json, its folder, "
                                            "control cells (.palcells), or any surface or scan.\n",
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
