@@ -567,7 +567,7 @@ static void reset(void *self, const pal_body *body)
 }
 
 /* clocks, patience and factors of the same surface in another world; of another number of levels they begin anew */
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;
     const refine *was = before;
@@ -594,5 +594,5 @@ const pal_effect pal_effect_refine = {.name = "refine",
                                       .run = run,
                                       .material = material,
                                       .reset = reset,
-                                      .hand = hand,
+                                      .transfer = transfer,
                                       .settled_s = settled_s};

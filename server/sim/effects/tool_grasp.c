@@ -363,7 +363,7 @@ static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_bo
     g->reach_m = b->reach_m;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     tool_grasp *grasp = self;
     const tool_grasp *old = before;
@@ -684,7 +684,7 @@ const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
                                           .run = run,
                                           .material = material,
                                           .reset = reset,
-                                          .hand = hand,
+                                          .transfer = transfer,
                                           .destroy = destroy,
                                           .reach_m = how_far_m,
                                           .tangent = &tangent};

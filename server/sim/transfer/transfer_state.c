@@ -447,15 +447,15 @@ static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
     for (int i = 0; i < next->plan.n_row; i++) {
         const pal_component *row = &next->plan.row[i];
         int b = next->plan.component_body[i];
-        const pal_component *from = row->effect->hand ? find_row(before, b, row->effect) : NULL;
+        const pal_component *from = row->effect->transfer ? find_row(before, b, row->effect) : NULL;
         bool known = b == t->body ? t->back.n_row > 0 : next->plan.body[b].n_node == before->plan.body[b].n_node;
         if (from && known)
-            row->effect->hand(row->self, &next->plan.body[b], from->self,
-                              &(pal_component_transfer){.from = &before->plan.body[b],
-                                                        .place = b == t->body ? pal_transfer_force_map(t) : NULL,
-                                                        .rest_m = next->part[b].rest_m,
-                                                        .same_shown = pal_transfer_same_shown(next, before, b),
-                                                        .left_N = b == t->body ? t->pull : NULL});
+            row->effect->transfer(row->self, &next->plan.body[b], from->self,
+                                  &(pal_component_transfer){.from = &before->plan.body[b],
+                                                            .place = b == t->body ? pal_transfer_force_map(t) : NULL,
+                                                            .rest_m = next->part[b].rest_m,
+                                                            .same_shown = pal_transfer_same_shown(next, before, b),
+                                                            .left_N = b == t->body ? t->pull : NULL});
     }
 }
 

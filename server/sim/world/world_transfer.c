@@ -62,8 +62,8 @@ static void follow_shell(pal_world *w, int b, const pal_world *before)
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
         const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
         const pal_component *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
-        if (row->effect == was->effect && row->effect->hand)
-            row->effect->hand(row->self, to, was->self, &(pal_component_transfer){.from = from});
+        if (row->effect == was->effect && row->effect->transfer)
+            row->effect->transfer(row->self, to, was->self, &(pal_component_transfer){.from = from});
     }
 }
 
