@@ -48,7 +48,7 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
         t->node_order = body->node_order;
         PAL_TRY(pal_simd_blocks_make(t->node_order, t->corner, n_tet, 4, build->arena, &t->simd_blocks));
         t->place = t->simd_blocks.place;
-        t->n_block = t->simd_blocks.n_strip + t->simd_blocks.n_unsupported;
+        t->n_block = t->simd_blocks.n_strip + t->simd_blocks.n_loose;
     } else {
         t->place = PAL_NEW(build->arena, int32_t, n_tet);
         if (!t->place) return PAL_ERR_MEMORY;

@@ -108,7 +108,7 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *row, pal_node_order *node
             pal_add8(fz + base[c], f[c - 1][2]);
         }
     }
-    for (int b = 0; b < row->simd_blocks.n_unsupported; b++) {
+    for (int b = 0; b < row->simd_blocks.n_loose; b++) {
         const int32_t *node = row->simd_blocks.node + n_corner * PAL_LANES * b;
         double at[PAL_CORNERS][3][PAL_LANES];
         pal_loose_load(node_order, node, n_corner, at);
@@ -130,7 +130,7 @@ PAL_INLINE void pal_spring_bound(const pal_spring_set *row, pal_node_order *node
     const double *p[PAL_CORNERS][3];
     pal_v8 b8[PAL_CORNERS];
     pal_node_order_load(node_order, at);
-    for (int b = 0; b < n_strip + row->simd_blocks.n_unsupported; b++) {
+    for (int b = 0; b < n_strip + row->simd_blocks.n_loose; b++) {
         bool loose = b >= n_strip;
         const int32_t *base = row->simd_blocks.base + n_corner * b;
         const int32_t *node = row->simd_blocks.node + n_corner * PAL_LANES * (b - n_strip);

@@ -8,7 +8,7 @@ void pal_spring_volume_range(const pal_spring_set *row, pal_node_order *node_ord
     pal_v8 least = one, most = one;
     const double *p[PAL_CORNERS][3];
     pal_node_order_load(node_order, d);
-    for (int b = 0; b < n_strip + row->simd_blocks.n_unsupported; b++) {
+    for (int b = 0; b < n_strip + row->simd_blocks.n_loose; b++) {
         double x[PAL_CORNERS][3][PAL_LANES];
         const bool loose = b >= n_strip;
         if (loose) pal_loose_load(node_order, row->simd_blocks.node + 4 * PAL_LANES * (b - n_strip), 4, x);
