@@ -77,12 +77,13 @@ typedef struct pal_tangent {
      * solver takes the polar part of the sum; with weights by volume, a preconditioner turned by the rotations of soft
      * material would stretch stiff material next to it. NULL: no rotations */
     void (*rotate)(void *self, const pal_body *body, double *turn);
-    /* CONTACT, after a solve that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
-     * prescribed nodes too). Brings the forces on the tools to those at the end of the sub-step; a solver with several
-     * stages asks after each, the last answer holds. True: contact pulled where it can only push, or exceeded a cap, so
-     * that its loads and stiffness have changed: the stage is to be solved again from where it began. The solver limits
-     * the rounds and takes the last answer */
-    bool (*settle)(void *self, pal_step *step, const double *moved);
+    /* CONTACT, after a stage that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
+     * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
+     * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so
+     * that its loads in body->load and its stiffness have changed: the sub-step is to be solved again from where it
+     * began. A component asks for that a bounded number of times, seldom more than three, and a solver always complies,
+     * so that no sub-step ends on loads that it was not solved with */
+    bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
 } pal_tangent;
 
 /* progress of a solver, for status, studies and panel */

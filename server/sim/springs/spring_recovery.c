@@ -1,4 +1,4 @@
-/* Patches of springs that are turned over. */
+/* Regions of inverted springs. */
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/clock.h"
@@ -8,24 +8,23 @@
 
 #include <math.h>
 
-/* volume over that at rest: from where on a tetrahedron is turned over or blown up, and until when it stays in a region
- */
+/* volume over volume at rest: thresholds for entering a region and for leaving it */
 static const double least_in = 0.01, least_out = 0.2, most_in = 30, most_out = 20;
-/* of s, so that a region never is too soft to move */
+/* smallest s: a region never becomes too soft to move */
 static const double least_scale = 0.02;
-/* kinetic energy of a region that stands still, of what all of them store */
+/* kinetic energy of a region at rest, as a part of what all regions store */
 static const double still_share = 1e-3;
-/* of the sum of constants: springs that store more would fly apart when they take over */
+/* largest energy of springs that return, as a part of the sum of their constants: with more they would fly apart */
 static const double calm_share = 0.02;
-/* of the time that edges give to an explicit step */
+/* tau, as a part of the time that edges permit an explicit step */
 static const double damp_share = 0.25;
-/* of what is stored, that letting go a body that stands still may add */
+/* energy that the return of a body at rest may add, as a part of what is stored */
 static const double little_share = 2e-3;
-/* a region that stands still is let go after, one that does not come loose grows every; of what is short of that by
- * rounding */
+/* time at rest after which a region is released; period of growth of one that does not recover; tolerance for rounding
+ * of both */
 static const double loose_after_s = 2, grow_every_s = 0.5, nearly = 1 - 1e-9;
 
-/* a body's sets of springs; NULL: it has no such set */
+/* a body's sets of springs by kind; NULL: none */
 typedef struct sets {
     pal_spring_set *of[3];
 } sets;
@@ -76,7 +75,7 @@ static const int32_t *corners(const pal_spring_set *set, int i)
     return set->item + (size_t)set->n_corner * (size_t)i;
 }
 
-/* the region of a spring, -1: none; its nodes that are in one are in the same, as edges join them */
+/* the region of a spring, -1: none; edges join its nodes, so at most one region has any of them */
 static int region_of(const pal_spring_recovery *t, const pal_spring_set *set, int i)
 {
     const int32_t *node = corners(set, i);
@@ -94,7 +93,7 @@ static void edge_vectors(const int32_t *node, const pal_body *body, double x[3],
     pal_sub3(y, body->x_rest + b, body->x_rest + a);
 }
 
-/* relative velocity of the ends, less what the spin gives */
+/* relative velocity of the ends without the spin */
 static void edge_rate(const pal_spring_region *region, const int32_t *node, const pal_body *body, const double x[3],
                       double out[3])
 {
@@ -110,7 +109,7 @@ static double edge_N_m(const pal_spring_set *set, int i)
     return set->spring.k_J * set->all[lane] * set->w[lane] * set->w[lane];
 }
 
-/* rotations of those regions that have their own */
+/* best-fit rotations of the regions that have one of their own */
 static void find_turns(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
 {
     for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
@@ -126,7 +125,7 @@ static void find_turns(pal_spring_recovery *t, const pal_spring_set *set, const 
         if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
 }
 
-/* w = A^-1 sum k x x v, A = sum k (x.x I - x x'); about an axis along which all lies there is nothing to find */
+/* w = A^-1 sum k x x v, A = sum k (x.x I - x x'); about an axis on which all nodes lie, w is zero */
 static void find_spins(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
 {
     for (int p = 0; p < t->n_region; p++) {
@@ -156,7 +155,7 @@ static void find_spins(pal_spring_recovery *t, const pal_spring_set *set, const 
     }
 }
 
-/* energy of an edge without s; f: s times its force is added */
+/* energy of an edge without s; f += s times its force */
 static double edge_energy(const pal_spring_recovery *t, const pal_spring_set *set, int i, const pal_body *body,
                           double *f)
 {
@@ -196,7 +195,7 @@ double pal_spring_recovery_energy(pal_spring_recovery *t, const pal_spring_set *
     return sum;
 }
 
-/* ---- looking ---- */
+/* ---- detection ---- */
 
 static double volume_ratio(const pal_spring_set *set, int i, const double *d)
 {
@@ -221,7 +220,7 @@ static bool loaded(const pal_body *body, int node)
     return load[0] != 0 || load[1] != 0 || load[2] != 0;
 }
 
-/* energies of the regions and of their springs as such, what is turned over and what is pressed */
+/* energies of the regions and of their springs; which are inverted and which are loaded */
 static void weigh(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
@@ -271,7 +270,7 @@ static double springs(const sets *r, const pal_body *body)
     return sum;
 }
 
-/* which regions become springs again; true: some do */
+/* chooses the regions that become springs again; true: any */
 static bool let_go(pal_spring_recovery *t, double spare_J, double little_J, double still_J, double passed_s)
 {
     bool any = false;
@@ -293,7 +292,7 @@ static bool let_go(pal_spring_recovery *t, double spare_J, double little_J, doub
 
 enum { NOT = -1, NEW = -2 };
 
-/* roots of all nodes that are in regions, as edges join them: the least node of each */
+/* connected components by edges of the nodes in regions; the root is the smallest node */
 static void join(pal_spring_recovery *t, const pal_spring_set *edges)
 {
     pal_union_find_init(t->root, t->n_node);
@@ -303,8 +302,8 @@ static void join(pal_spring_recovery *t, const pal_spring_set *edges)
     }
 }
 
-/* nothing new while anything presses or pulls the body: regions are softer than springs, so that a load would draw them
- * out, and a tool that turns tetrahedra over goes on to feel springs. True: what is new stays in */
+/* no new region while a load acts: regions are softer than springs, so that a load would draw them out, and a tool that
+ * inverts tetrahedra must feel springs. True: new nodes stay in */
 static bool leave_pressed(pal_spring_recovery *t, const pal_body *body)
 {
     bool pressed = false;
@@ -314,7 +313,7 @@ static bool leave_pressed(pal_spring_recovery *t, const pal_body *body)
     return !pressed;
 }
 
-/* nodes of what is turned over join, and those beside regions that do not come loose; true: some do */
+/* nodes of inverted tetrahedra enter, and those beside regions that do not recover; true: any */
 static bool take_in(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
@@ -345,8 +344,7 @@ static bool take_in(pal_spring_recovery *t, const sets *r, const pal_body *body)
     return any && leave_pressed(t, body);
 }
 
-/* regions anew of all nodes that are in one, connected by edges. What has changed elsewhere sets back neither the
- * times nor s of those that stay as they are */
+/* numbers the connected regions. A region that has not changed keeps its clocks and s */
 static void number(pal_spring_recovery *t, const pal_spring_set *edges)
 {
     pal_spring_region old[PAL_SPRING_REGIONS_MAX];
@@ -379,7 +377,7 @@ static void number(pal_spring_recovery *t, const pal_spring_set *edges)
     }
 }
 
-/* the time that edges alone give to an explicit step: the least sqrt(m / K) of free nodes, K their set sums */
+/* the time that edges alone give to an explicit step: the least sqrt(m / K) of free nodes, K their row sums */
 static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
     double least = INFINITY, *sum = t->room;
@@ -391,7 +389,7 @@ static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, c
     return isfinite(least) ? sqrt(least) : 0;
 }
 
-/* springs at the nodes of regions off, all others on */
+/* switches the springs at nodes of regions off, all others on */
 static void switch_sets(const pal_spring_recovery *t, sets *r)
 {
     for (int kind = 0; kind < 3; kind++) {
@@ -407,7 +405,7 @@ static void switch_sets(const pal_spring_recovery *t, sets *r)
     }
 }
 
-/* G held or not, and s of regions that are others than before such that there is no more energy than before_J */
+/* chooses G of each region, and s of changed ones such that there is no more energy than before_J */
 static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, double before_J)
 {
     double fixed[9];
@@ -432,7 +430,7 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
     }
 }
 
-/* supports may turn or be taken off, and constants may be others than when regions began */
+/* supports may have moved or gone, and constants may have changed since regions began */
 static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
     double fixed[9];
@@ -447,7 +445,7 @@ static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const p
     t->damp_s = damp_share * edge_time_s(t, edges, body);
 }
 
-/* what is in regions has changed; before_J: of the springs and the regions that were */
+/* the regions have changed; before_J: energy of springs and regions before */
 static void change(pal_spring_recovery *t, sets *r, const pal_body *body, double before_J)
 {
     number(t, r->of[PAL_SPRING_DISTANCE]);
@@ -455,7 +453,7 @@ static void change(pal_spring_recovery *t, sets *r, const pal_body *body, double
     if (t->n_region > 0) begin(t, r, body, before_J);
 }
 
-/* what solvers are told; stale: sets were, too */
+/* the answer of `recover` */
 static unsigned seen(const pal_spring_recovery *t, bool changed)
 {
     return (t->n_region > 0 ? PAL_INVERTED : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
@@ -470,7 +468,7 @@ unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
     const bool stale = t->stale;
     if (stale) switch_sets(t, &r);
     t->stale = false;
-    /* asked for the limit at rest, and of a state that is no number, it says nothing */
+    /* at rest, and for a state that is not finite, nothing is examined */
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return seen(t, stale);
     double ratio[2] = {1, 1};
     if (t->n_region == 0) pal_spring_volume_range(r.of[PAL_SPRING_VOLUME], body->node_order, body->d, ratio);

@@ -121,7 +121,7 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
     return least[0];
 }
 
-/* bound [n_node] += the set sums at positions x [n_node][3] */
+/* bound [n_node] += the row sums at positions x [n_node][3] */
 PAL_INLINE void pal_spring_bound(const pal_spring_set *set, pal_node_order *node_order, const double *at,
                                  pal_bound_kernel kernel, int n_corner, double k, bool bend, double *bound)
 {
