@@ -1,4 +1,4 @@
-/* Folded bodies made straight: see elastic_tet.h. */
+/* Folded bodies made single_rotation: see elastic_tet.h. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/elements/elastic_tet_block.h"
@@ -45,14 +45,14 @@ void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d)
         for (int k = 0; k < 9; k++) f[k] += a[k / 3] * b[k % 3];
     }
     pal_polar_rotation(f, q, MOST_TURNS);
-    for (int e = 0; e < t->wish.n_tet; e++)
+    for (int e = 0; e < t->options.n_tet; e++)
         for (int i = 0; i < 4; i++) pal_lane_set(t->turn, 4, t->place[e], i, q[i]);
 }
 
 double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f)
 {
     double sum = 0, torque[3] = {0};
-    for (int e = 0; e < t->wish.n_tet; e++)
+    for (int e = 0; e < t->options.n_tet; e++)
         if (pal_lane_get(t->volume_m3, 1, t->place[e], 0) > 0) sum += pal_tet_add_element(t, e, d, f, torque);
     /* what nothing holds does not turn itself */
     if (f && !has_frame(t)) pal_tet_balance_torque(t, d, torque, f);
@@ -63,7 +63,7 @@ static bool has_moved(const pal_elastic_tets *t, const pal_body *body)
 {
     double most = still_S * body->length_scale_m;
     for (int i = 0; i < t->n_node; i++)
-        if (pal_dist3(t->seen + 3 * i, body->d + 3 * i) > most) return true;
+        if (pal_dist3(t->x_before + 3 * i, body->d + 3 * i) > most) return true;
     return false;
 }
 
@@ -80,12 +80,12 @@ bool pal_elastic_tets_check_rest(pal_elastic_tets *t, const pal_body *body, bool
     t->n_whole = has_inversion ? 0 : t->n_whole + 1;
     if (t->n_whole >= PEACE) t->n_single_rotation = t->n_whole = 0;
     if (!has_inversion || t->n_single_rotation >= TIMES) return false;
-    if (t->straight || t->n_look++ % LOOKS != 0) return false;
-    bool stuck = t->n_look > 1 && !has_moved(t, body) && !is_pressed(body);
-    memcpy(t->seen, body->d, 3 * sizeof(double) * (size_t)t->n_node);
+    if (t->single_rotation || t->n_still++ % LOOKS != 0) return false;
+    bool stuck = t->n_still > 1 && !has_moved(t, body) && !is_pressed(body);
+    memcpy(t->x_before, body->d, 3 * sizeof(double) * (size_t)t->n_node);
     if (!stuck) return false;
     double before = pal_elastic_tets_energy(t, body->d, NULL);
-    t->straight = true, t->soft = 1;
+    t->single_rotation = true, t->soft = 1;
     t->n_single_rotation++;
     pal_tet_fit_single_rotation(t, body->d);
     double after = pal_tet_single_rotation_force(t, body->d, NULL);

@@ -95,7 +95,7 @@ typedef struct pal_cells_elastic {
     const pal_subdivision_solid *solid;
     pal_cell_operator op;
     uint64_t sampled;     /* of the solid, what the constants were made for */
-    pal_force_cache kept; /* made by the row, of PAL_CELL_POLAR under an implicit solver */
+    pal_force_cache force_cache; /* made by the row, of PAL_CELL_POLAR under an implicit solver */
     pal_cell_recovery recovery;
     pal_cell_volume volume;
     pal_cell_line line;

@@ -129,8 +129,8 @@ static void a_calm_step_saves_one_pass(void)
         CHECK(!pal_world_step(b.world, b.scene->step_s) && !pal_world_step(plain.world, b.scene->step_s));
         for (int c = 0; c < 3 * b.body->n_dof; c++) most = fmax(most, fabs(b.body->x[c] - plain.body->x[c]));
     }
-    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->kept.n_add, STEPS, most);
-    CHECK(with->kept.n_add == STEPS && without->kept.n_add == 0);
+    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->force_cache.n_add, STEPS, most);
+    CHECK(with->force_cache.n_add == STEPS && without->force_cache.n_add == 0);
     CHECK(b.body->safeguards.n_search == 0 && most < 1e-9);
     beam_free(&b);
     beam_free(&plain);
