@@ -108,7 +108,7 @@ static double swell_of(const pal_subdivision_solid *solid, pal_cell_kind kind, i
         double J[9], cofactor[9], mu, lambda;
         const double det = pal_subdivision_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
         pal_cofactor3(J, cofactor);
-        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], 0.4999), &mu, &lambda);
+        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], PAL_POISSON_CLAMP), &mu, &lambda);
         const double kappa_J = (lambda - pal_cell_own_lambda(mu, lambda)) * s->volume_m3[first + p];
         all += kappa_J;
         /* J^-T = cofactor / det */
