@@ -1,5 +1,5 @@
 /* Where the nodes of one body lie in the elements of another (transfer.h). */
-#include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
 #include "server/mesh/volume/locate.h"
@@ -7,6 +7,7 @@
 #include "server/sim/core/effect_list.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/transfer/transfer_core.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -4,6 +4,7 @@
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/subdivision_body.h"
 #include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>

@@ -2,6 +2,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>

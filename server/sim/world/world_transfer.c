@@ -2,6 +2,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/springs/spring_recovery.h"
 #include "server/sim/surface/adaptive_transfer.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>
