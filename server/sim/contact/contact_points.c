@@ -1,5 +1,5 @@
 /* Contact points of the shown surface: collection, evaluation, and forces back to the nodes. */
-#include "server/sim/contact/contact_samples.h"
+#include "server/sim/contact/contact_points.h"
 
 #include "server/base/vec3.h"
 

@@ -3,7 +3,7 @@
  * A body that adapts (sim/adaptive_surface.h) draws other triangles from time to time, and only its active vertices are
  * points then. Its fixed samples, fans and areas are made again when body->revision has changed, at the cost of what is
  * drawn now. */
-#include "server/sim/contact/contact_samples.h"
+#include "server/sim/contact/contact_points.h"
 
 #include "server/base/vec3.h"
 

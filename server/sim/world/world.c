@@ -1,5 +1,5 @@
 /* The world: steps a plan. Reading order: pal_world_step at the end. */
-#include "server/sim/world/world_core.h"
+#include "server/sim/world/world.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -7,6 +7,7 @@
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/subdivision_body.h"
 #include "server/sim/world/field_components.h"
+#include "server/sim/world/world_core.h"
 
 #include <stdio.h>
 #include <stdlib.h>
