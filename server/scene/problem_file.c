@@ -3,6 +3,7 @@
 #include "server/scene/problem_file.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 

@@ -6,7 +6,7 @@
 #include "server/scene/region_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/scan/label_volume.h"
 
 #include <math.h>

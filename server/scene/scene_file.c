@@ -2,6 +2,7 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
