@@ -252,7 +252,7 @@ pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "gravity_m_s2: %g is outside [-1e4, 1e4]",
                                   scene->gravity_m_s2);
     if (scene->max_substep < 1 || scene->max_substep > 1000000)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "most_substep: %d is outside [1, 1000000]",
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "max_substep: %d is outside [1, 1000000]",
                                   scene->max_substep);
     if (scene->n_body < 1 || scene->n_body > PAL_BODY_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);

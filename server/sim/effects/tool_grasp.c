@@ -158,7 +158,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "reach_m", 0, 10, &grasp->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (build->body->n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grab needs a body that shows something",
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body that shows something",
                                   item->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->body->implicit) {
