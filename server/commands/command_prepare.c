@@ -531,7 +531,7 @@ int command_prepare(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .most_operand = 1};
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);

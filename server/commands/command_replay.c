@@ -34,8 +34,8 @@ int command_replay(int argc, char **argv)
                                   .about = "Runs an input log (palpate serve --record LOG) again and compares the hash "
                                            "of the world now and then.\nSCENE is the scene that was served.\n"
                                            "Exit code 1 when a hash differs.\n",
-                                  .least_operand = 2,
-                                  .most_operand = 2};
+                                  .min_operand = 2,
+                                  .max_operand = 2};
     pal_flag_common common;
     const char *word[2];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
@@ -45,12 +45,12 @@ int command_replay(int argc, char **argv)
     pal_replay_report report;
     double start = pal_clock_s();
     pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &diag);
-    pal_studied studied = {0};
+    pal_studied_scene studied = {0};
     pal_report_progress("replay", 0, &common);
-    if (!err) err = pal_studied_open(word[1], &loaded->scene, &studied, &diag);
+    if (!err) err = pal_studied_scene_open(word[1], &loaded->scene, &studied, &diag);
     if (!err) err = pal_replay_run(word[0], studied.scene, &report, &diag);
     pal_report_progress(NULL, 0, &common);
-    pal_studied_close(&studied);
+    pal_studied_scene_close(&studied);
     pal_scene_free(loaded);
     if (err) return pal_report_refusal(&common, err, &diag);
     bool equal = report.n_hash == report.n_hash_equal;

@@ -111,7 +111,7 @@ void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const 
 
 void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
         c->members_due = true;
@@ -310,10 +310,10 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
             pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
         return;
     }
-    while (i < hub->most_clients && hub->client[i].peer) i++;
-    if (i == hub->most_clients) {
+    while (i < hub->max_clients && hub->client[i].peer) i++;
+    if (i == hub->max_clients) {
         hub->count.n_refused_join++;
-        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->most_clients);
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->max_clients);
         return;
     }
     pal_client *c = &hub->client[i];
@@ -344,7 +344,7 @@ static void client_closed(void *user, pal_peer *peer)
 
 static void offer_cycle(pal_hub *hub, pal_hub_room *room)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
         pal_member_entry *m = pal_members_find(&room->members, c->id);
@@ -405,7 +405,7 @@ static void hub_tick(void *user)
         pal_hub_tell_estimates(&hub->room[r]);
         pal_hub_count_unwatched(&hub->room[r]);
     }
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->peer->drop_code) continue;
         if (!c->id) {
@@ -435,9 +435,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
     hub->site = options->site;
     hub->session = session;
     hub->error_m = options->error_m;
-    hub->most_clients = options->most_clients > 0 ? options->most_clients : 200;
+    hub->max_clients = options->max_clients > 0 ? options->max_clients : 200;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
-    hub->client = calloc((size_t)hub->most_clients, sizeof *hub->client);
+    hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
     if (!hub->room || !hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
@@ -449,9 +449,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         room->reference_m = NAN;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
-        if (options->setting && options->n_setting[i] > 0) {
+        if (options->setting && options->n_configuration[i] > 0) {
             room->setting = options->setting[i];
-            room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
+            room->n_configuration = options->n_configuration[i], room->setting_body = options->setting_body[i];
             if (options->reference_m) room->reference_m = options->reference_m[i];
         }
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
@@ -492,7 +492,7 @@ void pal_hub_events(pal_hub *hub, pal_peer_events *out)
 void pal_hub_goodbye(pal_hub *hub)
 {
     hub->leaving = true;
-    for (int i = 0; i < hub->most_clients; i++)
+    for (int i = 0; i < hub->max_clients; i++)
         if (hub->client[i].peer) pal_hub_drop(hub, &hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
 }
 

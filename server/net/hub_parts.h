@@ -65,8 +65,8 @@ typedef struct pal_hub_room {
     bool told_estimate[PAL_BODY_MAX]; /* the session knows that some do */
     double step_s;                    /* of the scene as it was opened: what all prices are for */
     const pal_measured_configuration
-        *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
-    int n_setting, setting_body;
+        *setting; /* what a study found, for body setting_body [n_configuration]; NULL: no study */
+    int n_configuration, setting_body;
     double reference_m; /* the study's reference's own error; NaN: not known */
     bool told_far;      /* that an estimate is beyond what the scene asks for */
     int tier_users[PAL_STREAM_TIER];
@@ -88,10 +88,10 @@ struct pal_hub {
     pal_hub_works *works;  /* NULL until somebody sculpts or switches */
     double error_m;
     pal_site *site;
-    int n_room, most_clients, n_client;
+    int n_room, max_clients, n_client;
     bool leaving;
     pal_hub_room *room;   /* [n_room] */
-    pal_client *client;   /* [most_clients] */
+    pal_client *client;   /* [max_clients] */
     pal_control *control; /* scratch: it is large */
     char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
     pal_hub_count count;

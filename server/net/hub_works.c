@@ -51,7 +51,7 @@ bool pal_hub_works_may(pal_hub *hub, pal_client *c, const char *verb, const char
 
 pal_client *pal_hub_asker(pal_hub *hub, const pal_hub_waiting *w)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (c->peer && c->room == w->room && c->id == w->member && !c->peer->drop_code) return c;
     }
@@ -148,7 +148,7 @@ static bool take_over(pal_hub *hub, pal_hub_works *s, pal_work *work)
 
 static void tell_topology(pal_hub *hub, pal_hub_room *room)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
         memset(hub->control, 0, sizeof *hub->control);

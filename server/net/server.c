@@ -100,15 +100,16 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
 {
     char url[160];
     pal_hub_options hub = {.error_m = options->error_m,
-                           .most_clients = options->most_clients > 0 ? options->most_clients : 200};
+                           .max_clients = options->max_clients > 0 ? options->max_clients : 200};
     pal_peer_events events;
     PAL_TRY(make_url(options, url, sizeof url, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
     hub.site = s->site;
-    hub.setting = options->setting, hub.n_setting = options->n_setting, hub.setting_body = options->setting_body;
+    hub.setting = options->setting, hub.n_configuration = options->n_configuration,
+    hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     /* besides the clients: page loads, and what lws needs itself */
-    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, diag, &s->loop));
+    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
     return s->road->open(s->loop, url, &events, diag, &s->transport);

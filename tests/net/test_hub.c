@@ -17,14 +17,14 @@ static pal_transport *road;
 static uint64_t now_ns, apart_ns; /* time, and what a turn adds to it */
 static bool running;
 
-static void begin(bool paused, int most_clients)
+static void begin(bool paused, int max_clients)
 {
     pal_session *list[1];
     pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
     pal_session_options options = {
         .lease_s = 60, .start_paused = paused, .unpaced = !paused, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem", .most_clients = most_clients};
+    pal_server_options net = {.road = "mem", .max_clients = max_clients};
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     list[0] = session;
     if (pal_server_open(&net, list, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
@@ -557,8 +557,8 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     UNTIL(bob.n_field > 0, &ada, &bob);
     mem_text(&ada, "{\"type\":\"view\",\"part\":0,\"field\":\"none\"}");
     for (int i = 0; i < 20; i++) turn(&ada, &bob);
-    int ended = ada.n_field, goes_on = bob.n_field;
-    UNTIL(bob.n_field > goes_on + 3, &ada, &bob);
+    int ended = ada.n_field, may_continue = bob.n_field;
+    UNTIL(bob.n_field > may_continue + 3, &ada, &bob);
     CHECK_INT(ada.n_field, ended);
     mem_end(&bob); /* it goes without a word */
     UNTIL(ada.last[PAL_CONTROL_STATUS].status.n_row == n_row, &ada, NULL);
