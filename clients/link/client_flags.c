@@ -84,7 +84,7 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
     return -1;
 }
 
-bool pal_client_triple(const char *text, double out[3])
+bool pal_client_parse_vector(const char *text, double out[3])
 {
     for (int i = 0; i < 3; i++) {
         char *end;

@@ -42,5 +42,5 @@ void pal_server_close(pal_server *server); /* [load] */
 /* road "mem" only: the transport for pal_mem_connect, and one turn of the loop at a time of the caller's choosing
  * (instead of pal_server_run). This thread is [net]. */
 struct pal_transport *pal_server_transport(pal_server *server);
-void pal_server_turn(pal_server *server, uint64_t now_ns);
+void pal_server_advance(pal_server *server, uint64_t now_ns);
 #endif

@@ -125,11 +125,11 @@ refuse 1 "another body" study "$beam" --quick --out o
 head -c 1000 whole.json >o/study.json
 refuse 1 "again starts over" study "$beam" --quick --out o
 sed 's/"complete":.*/"complete": 3,/' whole.json >o/study.json
-refuse 1 "whole: is not true or false" study "$beam" --quick --out o
+refuse 1 "complete: is not true or false" study "$beam" --quick --out o
 cp whole.json o/study.json
 
 # ---- picking ----
-most=$(number most_m o/study.json)
+most=$(number max_m o/study.json)
 loose=$(awk "BEGIN { printf \"%.6gmm\", 1000 * $most }")
 begin "the cheapest within an error is written as a scene that plan takes"
 run study "$beam" --quick --out o --within "$loose" -o near --json

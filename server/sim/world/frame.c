@@ -37,7 +37,7 @@ pal_frame *pal_frame_create(const pal_world *world)
         part->n_vertex = shown.n_vertex;
         part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
         const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
-        bool made = part->position_m && (!shown.adapts || make_slots(part, body->adaptive)) &&
+        bool made = part->position_m && (!shown.is_adaptive || make_slots(part, body->adaptive)) &&
                     (!body->interpolation || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);

@@ -103,8 +103,8 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
 {
     double limit = find_rest_limit(w);
     int n = count_substeps(w, w->step_s, limit);
-    bool adapts = false;
-    for (int b = 0; b < w->plan.n_body; b++) adapts |= refines(w, b);
+    bool is_adaptive = false;
+    for (int b = 0; b < w->plan.n_body; b++) is_adaptive |= refines(w, b);
     if (!(limit > 0) || n > w->max_substep) {
         char who[120];
         pal_world_describe_limit(w, who, sizeof who);
@@ -112,8 +112,8 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
             diag, PAL_ERR_BUDGET,
             "a step of %g s needs %.0f sub-steps of %.3g s%s%s, most_substep allows %d: take a softer or "
             "denser material, larger elements%s or a shorter step",
-            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "", who, w->max_substep,
-            adapts ? ", fewer levels" : "");
+            w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "", who, w->max_substep,
+            is_adaptive ? ", fewer levels" : "");
     }
     w->rest_limit_s = limit;
     return PAL_ERR_OK;

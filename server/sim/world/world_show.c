@@ -44,7 +44,7 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->frozen = body->frozen;
     memcpy(to->reason, body->reason, sizeof to->reason);
     to->safeguards = body->safeguards;
-    to->n_rescue = pal_safeguards_sum(&body->safeguards);
+    to->n_safeguard = pal_safeguards_sum(&body->safeguards);
     to->rescue_ns = body->safeguards.ns;
     to->asleep = body->asleep;
     bool same = to->n_output == body->n_output; /* these are the positions that it has */
@@ -212,7 +212,7 @@ void pal_world_shown(const pal_world *world, int index, pal_shown *out)
                        .revision = body->revision};
     if (!body->adaptive || p->n_vertex == 0) return;
     const pal_levels *levels = &body->adaptive->levels;
-    out->adapts = true;
+    out->is_adaptive = true;
     out->n_coarse = levels->n_vertex[0];
     out->parent = p->parent;
     out->n_coarse_tri = levels->first_face[1];

@@ -215,7 +215,7 @@ static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
     REQUIRE(each && some);
     pal_shown shown;
     pal_world_shown(s.world, 0, &shown);
-    CHECK(shown.adapts);
+    CHECK(shown.is_adaptive);
     CHECK_INT(shown.n_tri, adaptive->n_slot);
     CHECK_INT(each->part[0].n_slot, adaptive->n_slot);
     CHECK_INT(shown.n_vertex, s.body->n_node);
