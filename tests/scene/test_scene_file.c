@@ -164,7 +164,7 @@ static void every_bad_body_has_its_sentence(void)
          "bodies[0].effects[0].k: is not a list of numbers"},
         {"{\"bodies\": [{\"effects\": [{\"name\": \"a\", \"k\": [1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1]}]}]}",
          "bodies[0].effects[0].k: more than 16 numbers"},
-        {"{\"bodies\": [{\"supports\": [{}]}]}", "bodies[0].supports[0]: needs either lowest or box"},
+        {"{\"bodies\": [{\"supports\": [{}]}]}", "bodies[0].supports[0]: needs either lowest, box or boundary"},
         {"{\"bodies\": [{\"supports\": [{\"lowest\": 2}]}]}", "bodies[0].supports[0].lowest: 2 is outside 0 .. 1"},
         {"{\"bodies\": [{\"supports\": [{\"box\": {\"low_m\": [0,0,0]}}]}]}",
          "bodies[0].supports[0].box: needs low_m and high_m"},

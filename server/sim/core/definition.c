@@ -127,9 +127,10 @@ static pal_err check_support(const pal_body_def *body, int index, pal_diagnostic
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: both lowest and rim", body->name,
                                   index);
     if (s->rim && strcmp(body->model.name, "adaptive_springs") != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].rim: only goes with model \"adaptive_springs\", not \"%s\"",
-                                  body->name, index, body->model.name);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "body \"%s\" supports[%d].boundary: only goes with model \"adaptive_springs\", not \"%s\"", body->name,
+            index, body->model.name);
     if (s->lowest && !(s->fraction >= 0 && s->fraction <= 1))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]",
                                   body->name, index, s->fraction);

@@ -658,8 +658,8 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
         again |= settle_tool(g, &tools->tool[t], step->body, moved);
         if (!last || step->sub != step->n_sub - 1) continue;
         /* a grip that was handed over leads as the one before from its second step on */
-        const bool goes_on = grasp->grasp_transfer && grasp->grasp_transfer[t].left_s > 0;
-        int n_find = g->firm->found ? 0 : goes_on && g->firm->n_give < 3 ? 3 : 1;
+        const bool may_continue = grasp->grasp_transfer && grasp->grasp_transfer[t].left_s > 0;
+        int n_find = g->firm->found ? 0 : may_continue && g->firm->n_give < 3 ? 3 : 1;
         g->firm->found = true;
         for (int k = 0; k < n_find; k++) find_give(g, &tools->tool[t], step);
         publish(grasp, g, &tools->tool[t], true);

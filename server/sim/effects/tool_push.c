@@ -209,7 +209,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
-static void seat(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
+static void workspace(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
 {
     double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
@@ -245,13 +245,13 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     if (!h->active) {
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
-        seat(push, h, body, last, tool->radius_m);
+        workspace(push, h, body, last, tool->radius_m);
         h->ease = 1;
         /* it has neither touched nor slipped before */
         h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->time_behind_s > push->slip_s) {
-        seat(push, h, body, next, tool->radius_m);
+        workspace(push, h, body, next, tool->radius_m);
         pal_tool_contact_end_blend(h);
         h->ease = 0, body->safeguards.n_tool_reset++;
     }

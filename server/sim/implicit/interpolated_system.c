@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* moves times nodes */
-static const double most_work = 2e7;
+static const double max_work = 2e7;
 
 /* ---- pattern ---- */
 
@@ -194,7 +194,7 @@ static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, boo
 static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_diagnostic *diag)
 {
     double moves = 3.0 * n_group * (damped ? 2 : 1);
-    if (moves * body->n_node <= most_work) return PAL_ERR_OK;
+    if (moves * body->n_node <= max_work) return PAL_ERR_OK;
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
         "body \"%s\": an implicit solver finds the matrix of its %d control points by %.0f or more "

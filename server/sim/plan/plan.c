@@ -15,12 +15,12 @@ static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
     if (!body->active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].rim: the model has no surface of its own", body->name,
+                                  "body \"%s\" supports[%d].boundary: the model has no surface of its own", body->name,
                                   index);
     const pal_levels *levels = body->dofs.levels;
     if (levels->closed)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the surface has no open edge",
-                                  body->name, index);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "body \"%s\" supports[%d].boundary: the surface has no open edge", body->name, index);
     for (int i = 0; i < body->n_dof; i++)
         if (pal_levels_on_boundary(levels, i)) body->fixed[i] = 1;
     return PAL_ERR_OK;
