@@ -22,7 +22,7 @@ const shown = (page) => page.evaluate(() => {
 const plan = (page) => page.evaluate(() => ({
   on: [...document.querySelectorAll("#rows tr:not(.off)")].map((r) => r.textContent), off: [...document.querySelectorAll("#rows tr.off")].map((r) => r.textContent),
   switches: document.querySelectorAll("#rows input").length, why: document.querySelector("#rows tr")?.title ?? "", rows: window.palpate.state.rows,
-  row_ms: window.palpate.state.status?.row_ms.length ?? 0, unwatched: document.querySelector("#unwatched").textContent, off_wire: window.palpate.state.status?.off ?? [],
+  row_ms: window.palpate.state.status?.component_ms.length ?? 0, unwatched: document.querySelector("#unwatched").textContent, off_wire: window.palpate.state.status?.disabled ?? [],
 }));
 /** moves the slider to a place and lets it go, as a hand does; what the panel shows at that moment: a switch may take 40 ms */
 const slide = (page, place) => page.evaluate((value) => {
@@ -150,14 +150,14 @@ try {
   // the knobs: every kind of button is pressed once, and goes where it says
   const pressed = new Set();
   for (let press = 0; press < 3; press++) {
-    const left = (s) => s.estimate?.neighbours?.find((n) => !pressed.has(n.knob));
+    const left = (s) => s.estimate?.neighbours?.find((n) => !pressed.has(n.parameter));
     const before = await until(() => shown(ada), (s) => left(s) && !s.busy, 40000), near = left(before);
     if (!near) break;
-    pressed.add(near.knob);
-    const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.knob }).first(), title = await button.getAttribute("title");
+    pressed.add(near.parameter);
+    const button = ada.locator("#cost-knob-list button:enabled", { hasText: near.parameter }).first(), title = await button.getAttribute("title");
     await button.click();
     const after = await until(() => shown(ada), (s) => !s.busy && s.epoch > before.epoch && s.drawn && title.startsWith(`${s.setting},`));
-    check(`the button of the knob ${near.knob} goes to its neighbour`, after.setting !== before.setting && title.startsWith(`${after.setting},`), `${before.setting} -> ${after.setting}; ${title}`);
+    check(`the button of the knob ${near.parameter} goes to its neighbour`, after.setting !== before.setting && title.startsWith(`${after.setting},`), `${before.setting} -> ${after.setting}; ${title}`);
     check("it says what jumped, and against which bound", /^Switched: energy [+−][\d.]+ %, moves .* of .* allowed, .* a frame, made in/.test(after.said), after.said);
   }
   check("there were knobs to press", pressed.size >= 2, [...pressed].join());
@@ -183,7 +183,7 @@ try {
   const name = rows.rows.includes("viscous") ? "viscous" : rows.rows[0];
   await flip(ada, name);
   const off = await until(() => plan(ada), (p) => p.off.length === 1 && p.row_ms === rows.on.length - 1);
-  check(`${name} off: it is gone from the plan, with its cost`, off.row_ms === rows.on.length - 1 && off.off_wire[0]?.row === name && !off.rows.includes(name), off.off.join());
+  check(`${name} off: it is gone from the plan, with its cost`, off.row_ms === rows.on.length - 1 && off.off_wire[0]?.component === name && !off.rows.includes(name), off.off.join());
   const seenOff = await until(() => plan(ben), (p) => p.off.length === 1);
   check("who looks on sees that it is off", seenOff.off.length === 1, seenOff.off.join());
   await ada.screenshot({ path: join(pictures, "accuracy_row_off.png") });

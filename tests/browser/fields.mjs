@@ -7,7 +7,7 @@ import { check, finish, launch, open, organPixel, palpate, pictures, prepare, sc
 const figures = (page) => page.evaluate(() => {
   const { state } = window.palpate, body = [...state.bodies.values()][0];
   return {
-    field: state.field, range: state.range, values: body?.values ?? null, mix: body?.uniforms.mix.value, rows: state.rows, wanted: state.status?.rows ?? [],
+    field: state.field, range: state.range, values: body?.values ?? null, mix: body?.uniforms.mix.value, rows: state.rows, wanted: state.status?.components ?? [],
     low: document.querySelector("#legend-low").textContent, high: document.querySelector("#legend-high").textContent,
     unit: document.querySelector("#legend-unit").textContent, legend: !document.querySelector("#legend").hidden,
     options: [...document.querySelector("#field").options].map((o) => o.value), note: document.querySelector("#field-note").textContent,
