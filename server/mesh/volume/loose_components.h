@@ -15,27 +15,27 @@
  * A component that is to move freely beside a held one is a body of its own. The rule is applied where scenes are made
  * ready; a world simulates every component of the mesh it is given. Pieces of an adaptive surface have anchors, which
  * leave them no rigid motion: they all stay. Thread: [load]. */
-#ifndef PAL_MESH_VOLUME_LOOSE_PARTS_H
-#define PAL_MESH_VOLUME_LOOSE_PARTS_H
+#ifndef PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
+#define PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
 #include "server/mesh/cells/cells.h"
 #include "server/mesh/volume/prepared.h"
 
 /* what was found and dropped */
-typedef struct pal_loose_parts {
-    int n_component, n_dropped;         /* components before, and of them dropped     */
-    double volume_m3;                   /* of all components                          */
-    double dropped_m3, most_dropped_m3; /* of those dropped, and of the largest of them */
-    bool largest_only;                  /* dropped because only the largest was wanted */
-} pal_loose_parts;
+typedef struct pal_loose_components {
+    int n_component, n_dropped;        /* components before, and of them dropped     */
+    double volume_m3;                  /* of all components                          */
+    double dropped_m3, max_dropped_m3; /* of those dropped, and of the largest of them */
+    bool largest_only;                 /* dropped because only the largest was wanted */
+} pal_loose_components;
 
 /* Drops components of a mesh of tetrahedra with its hexahedra; the skin is bound anew, the surface stays. held
  * [n_node]: not 0 where a node is held. name stands in the sentence. REFUSED, with the number of components at fault
  * and volume, share and place of the largest of them, or MEMORY, and then the mesh is as it was */
-pal_err pal_loose_parts_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
-                             pal_loose_parts *out, pal_diagnostic *diag);
+pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
+                                  pal_loose_components *out, pal_diagnostic *diag);
 /* the same with control cells; held [n_vertex] */
 pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_cells *cells,
-                             pal_loose_parts *out, pal_diagnostic *diag);
+                             pal_loose_components *out, pal_diagnostic *diag);
 /* "body "x": 2 of 3 components dropped, ..." or an empty text when none is */
-void pal_loose_parts_tell(const pal_loose_parts *parts, const char *name, pal_diagnostic *out);
+void pal_loose_components_describe(const pal_loose_components *parts, const char *name, pal_diagnostic *out);
 #endif

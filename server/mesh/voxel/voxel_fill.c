@@ -5,8 +5,8 @@
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
+#include "server/mesh/voxel/voxel_classify.h"
 #include "server/mesh/voxel/voxel_fraction.h"
-#include "server/mesh/voxel/voxel_scanline.h"
 
 #include <math.h>
 #include <stdlib.h>

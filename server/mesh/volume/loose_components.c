@@ -1,5 +1,5 @@
 /* Components that nothing holds: what stays is decided alike for tetrahedra and control cells. */
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
@@ -19,7 +19,7 @@ typedef struct component {
 
 /* ---- what stays ---- */
 
-static pal_err refuse(const char *name, const component *part, const pal_loose_parts *all, int n_bad, int bad,
+static pal_err refuse(const char *name, const component *part, const pal_loose_components *all, int n_bad, int bad,
                       pal_diagnostic *diag)
 {
     const component *p = &part[bad];
@@ -33,12 +33,12 @@ static pal_err refuse(const char *name, const component *part, const pal_loose_p
         middle[0], middle[1], middle[2]);
 }
 
-static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_parts *out,
+static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_components *out,
                       pal_diagnostic *diag)
 {
     int best = 0, bad = -1, n_bad = 0;
     bool any_held = false;
-    *out = (pal_loose_parts){.n_component = n, .largest_only = largest_only};
+    *out = (pal_loose_components){.n_component = n, .largest_only = largest_only};
     for (int k = 0; k < n; k++) {
         out->volume_m3 += part[k].volume_m3;
         any_held |= part[k].fixed;
@@ -54,12 +54,12 @@ static pal_err choose(const char *name, bool largest_only, component *part, int 
         if (part[k].keep) continue;
         out->n_dropped++;
         out->dropped_m3 += part[k].volume_m3;
-        out->most_dropped_m3 = fmax(out->most_dropped_m3, part[k].volume_m3);
+        out->max_dropped_m3 = fmax(out->max_dropped_m3, part[k].volume_m3);
     }
     return bad < 0 ? PAL_ERR_OK : refuse(name, part, out, n_bad, bad, diag);
 }
 
-void pal_loose_parts_tell(const pal_loose_parts *parts, const char *name, pal_diagnostic *out)
+void pal_loose_components_describe(const pal_loose_components *parts, const char *name, pal_diagnostic *out)
 {
     out->text[0] = 0;
     if (parts->n_dropped == 0) return;
@@ -149,12 +149,12 @@ static pal_err keep_mesh(pal_prepared *mesh, const int32_t *label, const compone
     return PAL_ERR_OK;
 }
 
-pal_err pal_loose_parts_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
-                             pal_loose_parts *out, pal_diagnostic *diag)
+pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
+                                  pal_loose_components *out, pal_diagnostic *diag)
 {
     const pal_tets *tets = &mesh->tets;
     int n = 0;
-    *out = (pal_loose_parts){0};
+    *out = (pal_loose_components){0};
     if (tets->n_tet == 0) return PAL_ERR_OK;
     int32_t *label = malloc((size_t)tets->n_tet * sizeof *label);
     pal_err err = label ? pal_tets_components(tets, label, &n) : PAL_ERR_MEMORY;
@@ -206,13 +206,13 @@ static pal_err keep_cells(pal_cells *cells, const int32_t *label, const componen
 }
 
 pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_cells *cells,
-                             pal_loose_parts *out, pal_diagnostic *diag)
+                             pal_loose_components *out, pal_diagnostic *diag)
 {
     int32_t *label = malloc((size_t)cells->n_cell * sizeof *label);
     int n = label ? label_cells(cells, label) : 0;
     component *part = label ? calloc((size_t)n, sizeof *part) : NULL;
     pal_err err = part ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    *out = (pal_loose_parts){0};
+    *out = (pal_loose_components){0};
     for (int32_t c = 0; part && c < cells->n_cell; c++) {
         component *to = &part[label[c]];
         double volume = pal_cells_cell_volume(cells, NULL, c), middle[3];

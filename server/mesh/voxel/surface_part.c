@@ -3,7 +3,7 @@
  * One hash table over edges joins triangles into parts (any shared edge) and into patches that must face alike (edges
  * of exactly two triangles, union-find with a parity bit). A part that is a closed chain as it stands keeps its
  * orientation; others take the patches'. */
-#include "server/mesh/voxel/surface_parts.h"
+#include "server/mesh/voxel/surface_part.h"
 
 #include "server/base/vec3.h"
 

@@ -1,7 +1,7 @@
 /* Private to the voxel files: the edge-connected parts of a surface in grid units, whether each is closed, which way
  * each faces, and which of them bound a cavity. Thread: [load]. */
-#ifndef PAL_MESH_VOXEL_SURFACE_PARTS_H
-#define PAL_MESH_VOXEL_SURFACE_PARTS_H
+#ifndef PAL_MESH_VOXEL_SURFACE_PART_H
+#define PAL_MESH_VOXEL_SURFACE_PART_H
 #include "server/mesh/voxel/voxel_scanline.h"
 
 typedef enum pal_part_kind {
