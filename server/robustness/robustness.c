@@ -578,7 +578,7 @@ static void look_at_rows(pal_trial *trial)
             if (info.body == pal_world_body(trial->world, b)->name) trial->body = b, first = false;
         trial->touches = true;
     }
-    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->adaptive != NULL;
+    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->active != NULL;
 }
 
 static pal_err open_rig(pal_trial *trial, const pal_scene *scene)
