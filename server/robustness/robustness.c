@@ -148,7 +148,7 @@ static int common_points(const pal_body *body)
 static bool is_free(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) return false;
+        if (body->support[i]) return false;
     return true;
 }
 
@@ -305,7 +305,7 @@ int pal_trial_far_node(const pal_trial *trial, int b)
     double from[3] = {0, 0, 0}, most = -1;
     int n = 0, far = pal_body_point(body, 0);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
+        if (body->support[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
     for (int k = 0; k < pal_body_nodes(body) && n == 0; k++)
         pal_axpy3(from, 1.0 / pal_body_nodes(body), body->node_rest + 3 * (size_t)pal_body_point(body, k));
     if (n > 0) pal_scale3(from, 1.0 / n, from);

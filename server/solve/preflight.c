@@ -105,8 +105,8 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        out->n_fixed += body->fixed[i] != 0;
-        if (!body->fixed[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+        out->n_fixed += body->support[i] != 0;
+        if (!body->support[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
@@ -121,7 +121,7 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
         if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (body->fixed[i] || !(bound[i] > most * body->mass_kg[i])) continue;
+        if (body->support[i] || !(bound[i] > most * body->mass_kg[i])) continue;
         most = bound[i] / body->mass_kg[i];
         out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
         pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
@@ -160,7 +160,7 @@ static void apply(void *user, const double *v, double *out)
     force_at(p, v, -way, p->low);
     force_at(p, v, way, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
-        bool moves = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3];
+        bool moves = body->mass_kg[i / 3] > 0 && !body->support[i / 3];
         out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
     }
 }
@@ -175,7 +175,7 @@ static bool over_mass(void *user, const double *b, double *out)
 {
     const pal_body *body = ((const probe *)user)->body;
     for (int i = 0; i < 3 * body->n_dof; i++)
-        out[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
+        out[i] = body->mass_kg[i / 3] > 0 && !body->support[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
     return true;
 }
 
@@ -201,7 +201,7 @@ static double fast(probe *p, double *room)
     uint64_t seed = 7;
     for (int i = 0; i < n; i++) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
-        l.z[i] = body->fixed[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
+        l.z[i] = body->support[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
     }
     (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
     free(basis);
@@ -226,7 +226,7 @@ static double slow(probe *p, double *room)
         double uf = 0, uu = 0;
         for (size_t i = 0; i < n; i++) {
             u[i] = 0;
-            b[i] = cg.r[i] = i % 3 == axis && !body->fixed[i / 3] ? body->mass_kg[i / 3] : 0;
+            b[i] = cg.r[i] = i % 3 == axis && !body->support[i / 3] ? body->mass_kg[i / 3] : 0;
         }
         (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
         /* u'Ku = u'(b - r) */

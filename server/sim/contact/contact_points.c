@@ -502,7 +502,7 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *touch, const pal_bo
         to_nodes(touch, body);
         for (int i = 0; i < touch->n_node; i++) {
             int node = touch->node[i];
-            pal_scale3(touch->force + 3 * (size_t)node, body->fixed[node] ? 0 : 1 / body->mass_kg[node],
+            pal_scale3(touch->force + 3 * (size_t)node, body->support[node] ? 0 : 1 / body->mass_kg[node],
                        touch->force + 3 * (size_t)node);
         }
         for (int i = 0; i < touch->n_slot && body->skin; i++) {

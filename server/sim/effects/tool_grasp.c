@@ -340,7 +340,7 @@ static void leave(const grip *g, const grip *b, const double force_N[3], const p
     const pal_interpolation *place = by->place;
     if (!by->left_N || !place || !pal_finite3(force_N)) return;
     for (int i = 0; i < b->n_node; i++) {
-        if (!by->from->interpolation && by->from->fixed[b->node[i]]) continue;
+        if (!by->from->interpolation && by->from->support[b->node[i]]) continue;
         for (int32_t k = place->start[b->node[i]]; k < place->start[b->node[i] + 1]; k++)
             pal_axpy3(by->left_N + 3 * (size_t)place->point[k], b->weight[i] * place->weight[k], force_N);
     }
@@ -363,7 +363,7 @@ static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_bo
     g->reach_m = b->reach_m;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     tool_grasp *grasp = self;
     const tool_grasp *old = before;
@@ -434,7 +434,7 @@ static void find_limits(const tool_grasp *grasp, grip *g, const pal_body *body, 
     double least = INFINITY;
     if (body->interpolation) least = patch_mass(grasp, g, body);
     for (int i = 0; i < g->n_node && !body->interpolation; i++)
-        if (!body->fixed[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
+        if (!body->support[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
     g->k_max_N_m = ALPHA * least / (dt_s * dt_s);
     g->c_most_Ns_m = BETA * least / dt_s;
 }
@@ -684,7 +684,7 @@ const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
                                           .run = run,
                                           .material = material,
                                           .reset = reset,
-                                          .hand = hand,
+                                          .transfer = transfer,
                                           .destroy = destroy,
                                           .reach_m = how_far_m,
                                           .tangent = &tangent};

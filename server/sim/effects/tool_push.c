@@ -653,7 +653,7 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
     return again;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its touch gathers forces, which is work room */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
@@ -685,7 +685,7 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
-                                         .hand = hand,
+                                         .transfer = transfer,
                                          .destroy = destroy,
                                          .wanted = wanted,
                                          .reach_m = how_far_m,

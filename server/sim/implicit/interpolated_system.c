@@ -133,7 +133,7 @@ static int choose_groups(const pal_body *body, const near_list *near, int32_t *g
     for (int i = 0; i < body->n_dof; i++) group[i] = -1;
     for (int i = 0; i <= body->n_dof; i++) mark[i] = -1;
     for (int32_t j = 0; j < body->n_dof; j++) {
-        if (body->fixed[j]) continue;
+        if (body->support[j]) continue;
         for (int32_t a = near->start[j]; a < near->start[j + 1]; a++) {
             int32_t i = near->point[a];
             for (int32_t b = near->start[i]; b < near->start[i + 1]; b++)

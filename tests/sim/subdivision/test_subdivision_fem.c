@@ -163,8 +163,8 @@ static void supports_hold_control_points(void)
     clay_block(&c, 3, 0.1);
     REQUIRE(clay_plan(&c));
     for (int i = 0; i < c.body->n_dof; i++) {
-        n_fixed += c.body->fixed[i];
-        CHECK_INT(c.body->fixed[i], c.body->x_rest[3 * i + 2] < -0.049);
+        n_fixed += c.body->support[i];
+        CHECK_INT(c.body->support[i], c.body->x_rest[3 * i + 2] < -0.049);
     }
     CHECK_INT(n_fixed, 16);
     clay_close(&c);
@@ -173,7 +173,7 @@ static void supports_hold_control_points(void)
     c.def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, -0.04, 1}};
     REQUIRE(clay_plan(&c));
     n_fixed = 0;
-    for (int i = 0; i < c.body->n_dof; i++) n_fixed += c.body->fixed[i];
+    for (int i = 0; i < c.body->n_dof; i++) n_fixed += c.body->support[i];
     CHECK_INT(n_fixed, 4);
     clay_close(&c);
 }
