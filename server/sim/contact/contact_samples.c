@@ -3,7 +3,6 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/contact/tuning.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -52,7 +51,7 @@ static int64_t count_samples(const pal_body *body, double spacing_m)
 {
     const pal_surface *surface = body->surface;
     int64_t n = 0;
-    const pal_levels *levels = body->adaptive ? &body->adaptive->levels : NULL;
+    const pal_levels *levels = body->dofs.levels;
     for (int32_t f = 0; levels && f < levels->first_face[1]; f++) n += most_of_family(levels, spacing_m, f);
     if (levels) return n;
     for (int t = 0; t < surface->n_tri; t++) {
@@ -91,16 +90,16 @@ static int sample(int32_t *corner_out, float *share_out, const int32_t *corner, 
 static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pal_contact_samples *t)
 {
     size_t n_vertex = (size_t)body->n_shown, room = (size_t)n_sample + PASSING_MAX;
-    size_t n_tri = (size_t)(body->adaptive ? body->adaptive->n_slot : body->surface->n_tri);
+    size_t n_tri = (size_t)(body->active ? body->dofs.n_slot : body->surface->n_tri);
     t->corner = PAL_NEW(arena, int32_t, 3 * room);
     t->share = PAL_NEW(arena, float, 3 * room);
     t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
     t->fan_start = PAL_NEW(arena, int32_t, n_vertex + 2);
-    t->fan_end = body->adaptive ? PAL_NEW(arena, int32_t, n_vertex) : t->fan_start + 1;
-    if (body->adaptive) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
+    t->fan_end = body->active ? PAL_NEW(arena, int32_t, n_vertex) : t->fan_start + 1;
+    if (body->active) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
     t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
     t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
-    bool all = t->corner && t->share && t->area_m2 && t->fan_start && t->fan_end && (t->run || !body->adaptive) &&
+    bool all = t->corner && t->share && t->area_m2 && t->fan_start && t->fan_end && (t->run || !body->active) &&
                t->fan && t->tri_mark;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -170,7 +169,7 @@ pal_err pal_contact_samples_make(const pal_body *body, double spacing_m, int max
     t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
     t.max_point = t.n_fixed + PASSING_MAX;
     PAL_TRY(allocate(body, arena, (int)n_sample, &t));
-    if (body->adaptive) {
+    if (body->active) {
         make_active(body, &t);
     } else {
         make_fans(surface, &t);
@@ -182,7 +181,7 @@ pal_err pal_contact_samples_make(const pal_body *body, double spacing_m, int max
 
 bool pal_contact_samples_update_topology(pal_contact_samples *t, const pal_body *body)
 {
-    if (!body->adaptive || t->revision == body->revision) return false;
+    if (!body->active || t->revision == body->revision) return false;
     make_active(body, t);
     return true;
 }
