@@ -123,15 +123,17 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
                                const double *weight, int n, double k_N_m, pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch);
-    double *sum = PAL_NEW(scratch, double, body->n_node), mean[3], give = 0;
+    double *sum = PAL_NEW(scratch, double, body->n_node), inward[3], mean[3], give = 0;
     int32_t slot[PAL_CONTACT_POINT_SLOTS];
     double share[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3];
     for (int i = 0; i < n && sum; i++) {
         int m = pal_contact_points_slots(points, body, point[i], slot, share, arm);
         for (int k = 0; k < m; k++) sum[pal_contact_points_slot_node(body, slot[k])] += weight[i] * share[k];
     }
-    if (sum && k_N_m > 0 && solve_mean(body, NULL, sum, body->n_node, group->normal, mean, scratch))
-        give = 1 / k_N_m + pal_dot3(mean, group->normal);
+    /* as contact presses: the solver starts from the answer to a load that is alike */
+    pal_scale3(inward, -1, group->normal);
+    if (sum && k_N_m > 0 && solve_mean(body, NULL, sum, body->n_node, inward, mean, scratch))
+        give = 1 / k_N_m + pal_dot3(mean, inward);
     pal_arena_rewind(scratch, used);
     keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
 }
