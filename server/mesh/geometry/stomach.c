@@ -178,7 +178,7 @@ static void flip_edge(hollow *body, int32_t a, int32_t b)
     int32_t left = body->owner[(size_t)a * n + (size_t)b], right = body->owner[(size_t)b * n + (size_t)a];
     int32_t *tl = s->tri + 3 * left, *tr = s->tri + 3 * right, c = third(tl, a, b), d = third(tr, a, b);
     const double *x = s->x;
-    if (body->support[a] && body->support[b]) return;
+    if (body->fixed[a] && body->fixed[b]) return;
     if (body->valence[a] < 5 || body->valence[b] < 5 || body->valence[c] > 6 || body->valence[d] > 6) return;
     if (body->owner[(size_t)c * n + (size_t)d] >= 0 || body->owner[(size_t)d * n + (size_t)c] >= 0) return;
     if (cotangent(x + 3 * c, x + 3 * a, x + 3 * b) + cotangent(x + 3 * d, x + 3 * a, x + 3 * b) > -1e-3) return;
@@ -220,7 +220,7 @@ static void smooth_tangentially(hollow *body, double share)
         for (int k = 0; k < 3; k++) body->move[4 * c[k] + 3] += area;
     }
     for (int v = 0; v < s->n_vertex; v++) {
-        if (body->support[v]) continue;
+        if (body->fixed[v]) continue;
         double *x = s->x + 3 * v, *to = body->move + 4 * v, g[3];
         pal_scale3(to, 1 / to[3], to);
         pal_sub3(to, to, x);
@@ -298,7 +298,7 @@ static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int 
     }
     for (int step = 0; !err && step < WIDENINGS; step++)
         for (int32_t v = 0; v < s.n_vertex; v++)
-            if (!body.support[v]) widen(&body, v, reach / (2 + step));
+            if (!body.fixed[v]) widen(&body, v, reach / (2 + step));
     free(body.owner);
     free(body.move);
     if (err)
