@@ -1,7 +1,7 @@
 // Commands of sculpting from the settings of the panel and the clicked points; the plane of a cut; answers in words. Pure.
 
 /**
- * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharp: number, sharpWhat: number,
+ * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharpness: number, entity: number,
  *            pressure_Pa: number, lift_m: number, stiffness_N_m: number, middle: number[]}} Settings
  * @typedef {{verb: string, args: Record<string, number>}} Command
  * @typedef {{low: number[], high: number[]}} Box
@@ -67,7 +67,7 @@ export function commandOf(tool, settings, points) {
     const args = { x_m, y_m, z_m };
     if (TOOLS[tool].points === 2) [args.x2_m, args.y2_m, args.z2_m] = points[1];
     if (tool === "extrude") Object.assign(args, { distance_m: settings.distance_m, scale: settings.scale });
-    if (tool === "sharpen") Object.assign(args, { sharp: settings.sharp, what: settings.sharpWhat });
+    if (tool === "sharpen") Object.assign(args, { sharpness: settings.sharpness, entity: settings.entity });
     if (tool === "paint") {
         const { young_factor, density_factor } = PAINTS[settings.paint];
         Object.assign(args, { radius_m: settings.radius_m, young_factor, density_factor });
@@ -118,5 +118,5 @@ export function answerText({ verb, text, args = {} }) {
         return `${pressureText(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
     if (args.cells === undefined) return text;
     const title = TOOLS[verb]?.title ?? verb[0].toUpperCase() + verb.slice(1);
-    return `${title}: ${args.cells} cells${args.made_ms === undefined ? "" : `, ${Math.round(args.made_ms)} ms`}`;
+    return `${title}: ${args.cells} cells${args.prepare_ms === undefined ? "" : `, ${Math.round(args.prepare_ms)} ms`}`;
 }

@@ -3,7 +3,7 @@ import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
 
 const RATIO_MIN = 0.4; // drawn pixels per page pixel, where drawing is slow
-const HOME_SHARE = 0.94; // of the picture's height: initial size of the scene's diagonal
+const HOME_SHARE = 0.88; // of the picture's height: initial size of the scene's diagonal
 const ZOOM_MIN = 0.45; // beside panels
 const POLL_MS = 2; // between checks whether a picture is finished
 

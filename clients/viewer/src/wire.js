@@ -1,10 +1,10 @@
-// The binary messages of palpate.v1 except FRAME's body: protocol/README.md, mirrored by protocol/wire.c. Pure: bytes in,
+// The binary messages of palpate.v2 except FRAME's body: protocol/README.md, mirrored by protocol/wire.c. Pure: bytes in,
 // plain objects out; anything that is not exactly one known message throws WireError.
 
-export const PROTOCOL = "palpate.v1";
-export const VERSION = 1;
+export const PROTOCOL = "palpate.v2";
+export const VERSION = 2;
 export const MAGIC = 0x314c4150;
-export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, PATCH: 5, POSE: 16, ACK: 17 });
+export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, TOPOLOGY_DELTA: 5, POSE: 16, ACK: 17 });
 export const POSE_FLAG = Object.freeze({
     CONTACT: 1,
     CLUTCHED: 2,

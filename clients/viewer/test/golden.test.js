@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
 import { decodeField, readFieldHead } from "../src/field_decoder.js";
 import { FrameDecoder, readFrameHead } from "../src/frame_decoder.js";
-import { applyPatch } from "../src/patch_decoder.js";
+import { applyTopologyDelta } from "../src/topology_delta.js";
 import {
     KIND,
     POSE_FLAG,
@@ -38,7 +38,7 @@ test("writes the golden pose and ack byte for byte", () => {
     assert.deepEqual(writeAck(expected.ack), load("ack.bin"));
     assert.deepEqual(readHead(load("pose.bin")), { kind: KIND.POSE, flags: 0, index: 3 });
     assert.equal(POSE_FLAG.CONTACT | POSE_FLAG.POSE_ONLY | POSE_FLAG.AWAY, expected.pose.flags);
-    assert.equal(PROTOCOL, "palpate.v1");
+    assert.equal(PROTOCOL, "palpate.v2");
 });
 
 test("reads the golden tools", () => {
@@ -89,12 +89,12 @@ test("refuses fields of bad kinds, ranges, counts and blocks", () => {
     assert.throws(() => decodeField(changed(40, 255), level), WireError);
 });
 
-test("reads the golden patch into the golden asset's table", () => {
+test("applies the golden topology delta to the table of the golden asset", () => {
     const { triangles, rest } = decodeAsset(load("asset.bin")),
-        wanted = expected.patch,
+        wanted = expected.topology_delta,
         before = triangles.slice();
-    const head = applyPatch(load("patch.bin"), triangles, rest.length / 3);
-    same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "patch");
+    const head = applyTopologyDelta(load("topology_delta.bin"), triangles, rest.length / 3);
+    same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "topology_delta");
     assert.deepEqual([...triangles], wanted.triangles);
     wanted.places.forEach((/** @type {number} */ place, /** @type {number} */ i) =>
         before.set(wanted.corners.slice(3 * i, 3 * i + 3), 3 * place),
@@ -144,7 +144,7 @@ test("refuses every message cut anywhere, and with a byte too many", () => {
         ["haptic.bin", readHaptic],
         ["asset.bin", decodeAsset],
         ["field.bin", (bytes) => decodeField(bytes, new Uint8Array(expected.field.n))],
-        ["patch.bin", (bytes) => applyPatch(bytes, asset.triangles.slice(), asset.rest.length / 3)],
+        ["topology_delta.bin", (bytes) => applyTopologyDelta(bytes, asset.triangles.slice(), asset.rest.length / 3)],
         ["frame_bend.bin", (bytes) => decoder.decode(bytes, positions)],
         ["frame_affine.bin", (bytes) => decoder.decode(bytes, positions)],
     ];

@@ -94,10 +94,12 @@ async function joined() {
 test("joins with the protocol's name, asks for any tool and for patches", () => {
     const s = stand();
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    assert.equal(s.sockets[0].protocol, "palpate.v1");
+    assert.equal(s.sockets[0].protocol, "palpate.v2");
     assert.equal(s.sockets[0].sent.length, 0);
     s.sockets[0].accept();
-    assert.deepEqual(s.sockets[0].texts(), [{ type: "join", name: "Ada", role: "trainee", tool: -1, patches: true }]);
+    assert.deepEqual(s.sockets[0].texts(), [
+        { type: "join", name: "Ada", role: "trainee", tool: -1, topology_deltas: true },
+    ]);
 });
 
 test("keeps the newest frame until its asset has come, then shows it", async () => {

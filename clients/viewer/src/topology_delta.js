@@ -1,33 +1,33 @@
-// PATCH messages (protocol/README.md, "PATCH"; protocol/patch_codec.c): changed places of the table of triangles of a part
-// that adapts, and what a table shows: its triangles without the empty places 0 0 0, and the vertices in them. Pure.
+// TOPOLOGY_DELTA messages (protocol/README.md, "TOPOLOGY_DELTA"; protocol/topology_delta_codec.c): changed slots of the
+// triangle table of an adaptive part; the visible triangles of a table, without empty slots 0 0 0, and their vertices. Pure.
 import { planes, unfold } from "./asset.js";
 import { lz4Decode } from "./lz4.js";
 import { KIND, PART_MAX, readHead, WireError } from "./wire.js";
 
 const HEAD_BYTES = 32,
-    PLACE_BYTES = 16,
-    PLACE_MAX = 2 ** 22;
+    SLOT_BYTES = 16,
+    SLOT_MAX = 2 ** 22;
 
 /** @param {boolean} good @param {string} code @param {string} text */
 function need(good, code, text) {
-    if (!good) throw new WireError(code, `patch: ${text}`);
+    if (!good) throw new WireError(code, `topology delta: ${text}`);
 }
 
 /**
- * @typedef {{part: number, epoch: number, n: number, revision: number, nRaw: number}} PatchHead n: changed places;
- *   revision: of the table that comes of it
+ * @typedef {{part: number, epoch: number, n: number, revision: number, nRaw: number}} TopologyDeltaHead n: changed slots;
+ *   revision: of the resulting table
  * @typedef {{triangles: Uint32Array, visible: Uint32Array | null}} Shown visible: the vertices in the triangles,
  *   ascending; null: every vertex
  */
 
 /**
- * Head of a PATCH message, lengths checked.
+ * Head of a TOPOLOGY_DELTA message, lengths checked.
  * @param {Uint8Array} bytes
- * @returns {PatchHead}
+ * @returns {TopologyDeltaHead}
  */
-export function readPatchHead(bytes) {
+export function readTopologyDeltaHead(bytes) {
     const { kind, flags, index } = readHead(bytes);
-    need(kind === KIND.PATCH, "KIND", `message kind ${kind}`);
+    need(kind === KIND.TOPOLOGY_DELTA, "KIND", `message kind ${kind}`);
     need(flags === 0, "FLAGS", `flags ${flags}`);
     need(bytes.length >= HEAD_BYTES, "SHORT", "no room for its head");
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
@@ -40,42 +40,41 @@ export function readPatchHead(bytes) {
     need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "block cut short");
     need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the block");
     need(index < PART_MAX && high < 1 << 21, "RANGE", "part or revision");
-    need(n > 0 && n <= PLACE_MAX && nRaw === PLACE_BYTES * n, "COUNT", `${n} places in ${nRaw} bytes`);
+    need(n > 0 && n <= SLOT_MAX && nRaw === SLOT_BYTES * n, "COUNT", `${n} slots in ${nRaw} bytes`);
     need(Math.floor(nRaw / 255) <= nLz4, "COUNT", "states more than its bytes can hold");
     return { part: index, epoch, n, revision: high * 4294967296 + low, nRaw };
 }
 
 /**
- * Decodes one PATCH message into the table; a refused one leaves it as it was.
- * @param {Uint8Array} bytes @param {Uint32Array} table [t][3] @param {number} nVertex that corners may name
- * @returns {PatchHead}
+ * Applies one TOPOLOGY_DELTA message to the table; a refused one changes nothing.
+ * @param {Uint8Array} bytes @param {Uint32Array} table [t][3] @param {number} nVertex number of vertices
+ * @returns {TopologyDeltaHead}
  */
-export function applyPatch(bytes, table, nVertex) {
-    const head = readPatchHead(bytes),
+export function applyTopologyDelta(bytes, table, nVertex) {
+    const head = readTopologyDeltaHead(bytes),
         { n, nRaw } = head,
         t = table.length / 3;
-    need(n <= t, "COUNT", `${n} places, the table has ${t}`);
+    need(n <= t, "COUNT", `${n} slots, the table has ${t}`);
     const raw = new Uint8Array(nRaw);
     lz4Decode(bytes.subarray(HEAD_BYTES), raw, 0, nRaw);
 
-    const place = planes(raw, 0, n),
+    const slot = planes(raw, 0, n),
         corner = planes(raw, 4 * n, 3 * n);
     for (let i = 0; i < n; i++) {
-        const before = i ? place[i - 1] : 0;
-        place[i] = before + unfold(place[i]);
-        if (place[i] >= t || (i && place[i] <= before))
-            need(false, "RANGE", `place ${place[i]} after ${before} of ${t}`);
+        const before = i ? slot[i - 1] : 0;
+        slot[i] = before + unfold(slot[i]);
+        if (slot[i] >= t || (i && slot[i] <= before)) need(false, "RANGE", `slot ${slot[i]} after ${before} of ${t}`);
     }
     for (let e = 0; e < 3 * n; e++) {
         corner[e] = unfold(corner[e]) + (e < 3 ? 0 : corner[e - 3]);
         if (corner[e] >= nVertex) need(false, "RANGE", `corner ${corner[e]} of ${nVertex} vertices`);
     }
-    for (let i = 0; i < n; i++) table.set(corner.subarray(3 * i, 3 * i + 3), 3 * place[i]);
+    for (let i = 0; i < n; i++) table.set(corner.subarray(3 * i, 3 * i + 3), 3 * slot[i]);
     return head;
 }
 
 /**
- * What a table shows.
+ * Visible triangles and vertices of a table.
  * @param {Uint32Array} table [t][3] @param {number} nVertex
  * @returns {Shown}
  */
