@@ -24,9 +24,9 @@ import {
 /** contents of the accuracy panel */
 const shown = (page) =>
     page.evaluate(() => {
-        const { accuracy, state } = window.palpate,
-            body = [...state.bodies.values()][0],
-            at = (id) => document.querySelector("#accuracy-" + id);
+        const { accuracy, state } = window.palpate;
+        const body = [...state.bodies.values()][0];
+        const at = (id) => document.querySelector("#accuracy-" + id);
         return {
             visible: !at("panel").hidden,
             points: accuracy.points.length,
@@ -74,8 +74,8 @@ const slide = (page, position) =>
 /** fields that a page offers and shows; every notice since the first call */
 const colours = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            notice = document.querySelector("#notice");
+        const { state } = window.palpate;
+        const notice = document.querySelector("#notice");
         if (!window.notices) {
             window.notices = [];
             new MutationObserver(() => window.notices.push(notice.textContent)).observe(notice, {
@@ -106,13 +106,13 @@ const choose = async (page, name) => {
 /** horizontal extent of the organ, of the hint and of the space between the panels, pixels */
 const extents = (page) =>
     page.evaluate(() => {
-        const { stage, state } = window.palpate,
-            { rest } = [...state.bodies.values()][0],
-            xs = [];
+        const { stage, state } = window.palpate;
+        const { rest } = [...state.bodies.values()][0];
+        const xs = [];
         for (let i = 0; i < rest.length; i += 3)
             xs.push(stage.project(stage.target.clone().set(rest[i], rest[i + 1], rest[i + 2])).x);
-        const box = (id) => document.querySelector(id).getBoundingClientRect(),
-            hint = box("#hint");
+        const box = (id) => document.querySelector(id).getBoundingClientRect();
+        const hint = box("#hint");
         return {
             organ: [Math.min(...xs), Math.max(...xs)],
             hint: [hint.left, hint.right],
@@ -127,8 +127,8 @@ async function pressRow(browser, file) {
     const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
     page.on("pageerror", (e) => consoleErrors.push(`study.html: ${e.message}`));
     await page.goto(pathToFileURL(file).href);
-    const buttons = page.locator("tbody button"),
-        rows = await buttons.count();
+    const buttons = page.locator("tbody button");
+    const rows = await buttons.count();
     const row = await buttons.nth(rows - 1).textContent();
     await buttons.nth(rows - 1).click();
     const copied = await until(
@@ -147,16 +147,16 @@ async function pressRow(browser, file) {
             copied === `copied: ${pasted}`,
         pasted,
     );
-    const args = [...pasted.matchAll(/'([^']*)'|(\S+)/g)].map((m) => m[1] ?? m[2]),
-        folder = join(scratch, "picked");
+    const args = [...pasted.matchAll(/'([^']*)'|(\S+)/g)].map((m) => m[1] ?? m[2]);
+    const folder = join(scratch, "picked");
     execFileSync(palpate, [...args.slice(1, -1), folder, "--quiet"], { stdio: ["ignore", "ignore", "inherit"] });
     check("the command writes the scene", existsSync(join(folder, "scene.json")), folder);
     await page.close();
 }
 
 await run(async () => {
-    const folder = join(scratch, "organ"),
-        scene = join(folder, "scene.json");
+    const folder = join(scratch, "organ");
+    const scene = join(folder, "scene.json");
     execFileSync(palpate, [
         "prepare",
         "--procedural",
@@ -280,8 +280,8 @@ await run(async () => {
             seen.configuration,
         );
         check("simulated time never goes back", after.tick >= before.tick, `${before.tick} to ${after.tick}`);
-        const springs = /springs/.test(after.configuration),
-            gone = springs !== (own === "stiffness");
+        const springs = /springs/.test(after.configuration);
+        const gone = springs !== (own === "stiffness");
         const offer = await until(
             () => colours(ada),
             (c) => c.options.includes("stiffness") === springs && c.options.includes("von_mises") === !springs,
@@ -330,15 +330,15 @@ await run(async () => {
     for (let press = 0; press < 3; press++) {
         const left = (s) => s.estimate?.neighbours?.find((n) => !pressed.has(n.parameter));
         const before = await until(
-                () => shown(ada),
-                (s) => left(s) && !s.busy,
-                40000,
-            ),
-            near = left(before);
+            () => shown(ada),
+            (s) => left(s) && !s.busy,
+            40000,
+        );
+        const near = left(before);
         if (!near) break;
         pressed.add(near.parameter);
-        const button = ada.locator("#accuracy-neighbour-list button:enabled", { hasText: near.parameter }).first(),
-            title = await button.getAttribute("title");
+        const button = ada.locator("#accuracy-neighbour-list button:enabled", { hasText: near.parameter }).first();
+        const title = await button.getAttribute("title");
         await button.click();
         const after = await until(
             () => shown(ada),

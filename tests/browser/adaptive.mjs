@@ -21,17 +21,17 @@ import {
 /** what a page shows: counts of the panel, triangles and their vertices, open edges, shortest and longest edge */
 const shown = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            body = [...state.bodies.values()][0];
-        const x = body.position.array,
-            index = body.geometry.index.array.subarray(0, body.nCorner),
-            open = new Set();
-        let min = Infinity,
-            max = 0;
+        const { state } = window.palpate;
+        const body = [...state.bodies.values()][0];
+        const x = body.position.array;
+        const index = body.geometry.index.array.subarray(0, body.nCorner);
+        const open = new Set();
+        let min = Infinity;
+        let max = 0;
         for (let e = 0; e < index.length; e++) {
-            const a = index[e],
-                b = index[e % 3 === 2 ? e - 2 : e + 1],
-                back = `${b} ${a}`;
+            const a = index[e];
+            const b = index[e % 3 === 2 ? e - 2 : e + 1];
+            const back = `${b} ${a}`;
             if (!open.delete(back)) open.add(`${a} ${b}`);
             const length = Math.hypot(x[3 * a] - x[3 * b], x[3 * a + 1] - x[3 * b + 1], x[3 * a + 2] - x[3 * b + 2]);
             min = Math.min(min, length);
@@ -62,15 +62,15 @@ const agrees = (s) => s.of && s.text === countsOf(s) && s.vertices === s.of.node
 /** a pixel near the middle where the organ faces the camera, with the organ all around it and no panel in front */
 const middlePixel = (page) =>
     page.evaluate(() => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
         const seen = (x, y) => (document.elementFromPoint(x, y)?.id === "view" ? input.pick(stage.ray(x, y)) : null);
         for (let r = 0; r < 0.4; r += 0.03)
             for (let a = 0; a < 6.28; a += 0.5) {
-                const x = w * (0.5 + r * Math.cos(a)),
-                    y = h * (0.5 + r * Math.sin(a)),
-                    hit = seen(x, y);
+                const x = w * (0.5 + r * Math.cos(a));
+                const y = h * (0.5 + r * Math.sin(a));
+                const hit = seen(x, y);
                 if (
                     hit &&
                     hit.normal.dot(stage.ray(x, y).direction) < -0.8 &&
@@ -163,8 +163,8 @@ await run(async () => {
     check("and not the initial ones", both[1].triangles > rest.triangles);
     // picking uses the refined triangles
     const hit = await ada.evaluate(({ x, y }) => {
-        const { input, stage, state } = window.palpate,
-            found = input.pick(stage.ray(x, y));
+        const { input, stage, state } = window.palpate;
+        const found = input.pick(stage.ray(x, y));
         return found
             ? Math.hypot(...found.point.toArray().map((v, i) => v - state.tools[state.ownTool].position[i]))
             : null;

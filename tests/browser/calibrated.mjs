@@ -18,8 +18,8 @@ import {
     until,
 } from "./common.mjs";
 
-const problem = join(dirname(fileURLToPath(import.meta.url)), "../../deploy/problems/gear.json"),
-    scene = join(scratch, "gear.json");
+const problem = join(dirname(fileURLToPath(import.meta.url)), "../../deploy/problems/gear.json");
+const scene = join(scratch, "gear.json");
 await run(async () => {
     const result = JSON.parse(
         execFileSync(palpate, ["calibrate", problem, "--case", "twist", "--resolution", "12", "-o", scene, "--json"], {
@@ -35,9 +35,9 @@ await run(async () => {
     const browser = await launch();
     const page = await open(browser, `http://127.0.0.1:${server.info.port}/`, "Ada", { width: 900, height: 600 });
     const shown = await page.evaluate(() => {
-        const text = document.querySelector("#accuracy"),
-            title = document.querySelector("#title").getBoundingClientRect(),
-            box = text.getBoundingClientRect();
+        const text = document.querySelector("#accuracy");
+        const title = document.querySelector("#title").getBoundingClientRect();
+        const box = text.getBoundingClientRect();
         return { text: text.textContent, seen: !text.hidden && box.height > 0, gap: box.top - title.bottom };
     });
     const figure = Number(/^([\d.]+) %/.exec(shown.text)?.[1]);
@@ -51,8 +51,8 @@ await run(async () => {
         Math.abs(figure - result.error_percent) <= 0.06 * result.error_percent,
         `${figure} %`,
     );
-    const rest = await displacement(page),
-        pixel = await until(() => organPixel(page));
+    const rest = await displacement(page);
+    const pixel = await until(() => organPixel(page));
     check("the body is at rest", rest < 1e-4, `${1000 * rest} mm`);
     await page.mouse.move(pixel.x, pixel.y);
     await page.mouse.down();

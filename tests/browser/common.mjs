@@ -13,8 +13,8 @@ export const scratch = mkdtempSync(join(tmpdir(), "palpate-browser-"));
 const { chromium } = createRequire(join(build, "viewer_packages", "package.json"))("playwright-core");
 mkdirSync(pictures, { recursive: true });
 
-let passed = 0,
-    failed = 0;
+let passed = 0;
+let failed = 0;
 export function check(what, good, figure = "") {
     console.log(`${good ? "ok  " : "FAIL"} ${what} ${figure}`);
     if (good) passed++;
@@ -26,8 +26,8 @@ export function checkConsoles(errors = consoleErrors) {
     check("the consoles of the pages have no errors", errors.length === 0, errors.slice(0, 3).join(" | "));
 }
 
-const browsers = [],
-    children = [];
+const browsers = [];
+const children = [];
 /** ends this child process with the test */
 export function endWithTest(child) {
     children.push(child);
@@ -48,13 +48,13 @@ export async function run(test) {
     process.exit(failed ? 1 : 0);
 }
 
-const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz",
-    LIVER = "data/images/liver.inr.gz";
+const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz";
+const LIVER = "data/images/liver.inr.gz";
 
 /** scene of the liver of the CT, else of the procedural organ; coarse, so that it is fast beside two software renderers */
 export function prepare() {
-    const folder = join(scratch, "organ"),
-        size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
+    const folder = join(scratch, "organ");
+    const size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
     if (existsSync(SCAN)) {
         execFileSync("tar", ["-xzf", SCAN, "-C", scratch, LIVER]);
         execFileSync(palpate, [
@@ -134,13 +134,13 @@ export const displacement = (page) =>
 /** a pixel on the organ near the middle of the picture */
 export const organPixel = (page) =>
     page.evaluate(() => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
         for (let r = 0; r < 0.4; r += 0.04)
             for (let a = 0; a < 6.28; a += 0.5) {
-                const x = w * (0.5 + r * Math.cos(a)),
-                    y = h * (0.5 + r * Math.sin(a));
+                const x = w * (0.5 + r * Math.cos(a));
+                const y = h * (0.5 + r * Math.sin(a));
                 if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
             }
         return null;

@@ -19,8 +19,8 @@ import {
 
 const figures = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            body = [...state.bodies.values()][0];
+        const { state } = window.palpate;
+        const body = [...state.bodies.values()][0];
         return {
             field: state.field,
             range: state.range,

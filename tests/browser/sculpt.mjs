@@ -20,8 +20,8 @@ import {
 /** what a page shows */
 const shown = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            body = [...state.bodies.values()][0];
+        const { state } = window.palpate;
+        const body = [...state.bodies.values()][0];
         return {
             vertices: body.rest.length / 3,
             triangles: body.nCorner / 3,
@@ -58,11 +58,11 @@ const summary = (s) => `${s.vertices} vertices, ${s.triangles} triangles, epoch 
 /** a pixel of the organ whose normal is closest to an axis, 2: +z */
 const facePixel = (page, axis) =>
     page.evaluate((k) => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
-        let best = null,
-            max = 0.9;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
+        let best = null;
+        let max = 0.9;
         for (let x = 0.05 * w; x < w; x += w / 40)
             for (let y = 0.05 * h; y < h; y += h / 30) {
                 if (document.elementFromPoint(x, y)?.id !== "view") continue;
@@ -123,11 +123,11 @@ await run(async () => {
     // counts pictures without a body while the topology changes
     await ada.evaluate(() => {
         window.blank = 0;
-        const { state } = window.palpate,
-            look = () => {
-                if (![...state.bodies.values()].some((b) => b.mesh.visible && b.mesh.parent)) window.blank++;
-                requestAnimationFrame(look);
-            };
+        const { state } = window.palpate;
+        const look = () => {
+            if (![...state.bodies.values()].some((b) => b.mesh.visible && b.mesh.parent)) window.blank++;
+            requestAnimationFrame(look);
+        };
         look();
     });
     const top = await until(() => facePixel(ada, 2));

@@ -83,8 +83,8 @@ await run(async () => {
     };
     // Two renderers share the cores: the first presses may precede the first contact model, and a late servo loop switches
     // its forces off, as it must. Therefore up to four tries with growing time.
-    let tries = 1,
-        last = await press(3000);
+    let tries = 1;
+    let last = await press(3000);
     for (; last.rendered.force_max_N <= 0.05 && tries < 4; tries++) {
         console.log(
             `     ${last.rendered.force_max_N} N of ${last.rendered.models} models, forces ${last.rendered.forces}: next try`,
@@ -111,8 +111,8 @@ await run(async () => {
     );
     logger.kill("SIGINT");
     await logger.ended;
-    const log = readFileSync(record).toString("latin1"),
-        name = server.info.sessions?.[0]?.name ?? "";
+    const log = readFileSync(record).toString("latin1");
+    const name = server.info.sessions?.[0]?.name ?? "";
     for (const channel of ["BODY/0", "STATUS"])
         check(
             `the log contains ${channel}`,

@@ -23,14 +23,14 @@ export function logRange(values, span = 10) {
     const good = values.filter(positive);
     if (good.length === 0) return { low: 1, high: span };
     const step = (/** @type {number} */ v, /** @type {boolean} */ up) => {
-        const ten = 10 ** Math.floor(Math.log10(v) + 1e-9),
-            all = [1, 2, 5, 10].map((s) => s * ten);
+        const ten = 10 ** Math.floor(Math.log10(v) + 1e-9);
+        const all = [1, 2, 5, 10].map((s) => s * ten);
         return up
             ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten)
             : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
     };
-    let low = step(Math.min(...good) / 1.15, false),
-        high = step(Math.max(...good) * 1.15, true);
+    let low = step(Math.min(...good) / 1.15, false);
+    let high = step(Math.max(...good) * 1.15, true);
     while (high / low < span * (1 - 1e-9)) {
         high = step(high * 1.01, true);
         if (high / low < span * (1 - 1e-9)) low = step(low / 1.01, false);
@@ -89,8 +89,8 @@ export function positionOn(front, estimate) {
  * @param {StudyPoint[]} points @param {Estimate | null} estimate @param {{left: number, right: number, top: number, bottom: number}} box
  */
 export function layOutPlot(points, estimate, box) {
-    const good = points.filter((p) => positive(p.cost_ms) && positive(p.error_m)),
-        near = estimate?.neighbours ?? [];
+    const good = points.filter((p) => positive(p.cost_ms) && positive(p.error_m));
+    const near = estimate?.neighbours ?? [];
     const both = (/** @type {{cost_ms?: number, error_m?: number} | null} */ p) =>
         p !== null && positive(p.cost_ms) && positive(p.error_m);
     const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];

@@ -9,8 +9,8 @@ import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_d
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
 export const REPEAT_MS = 50; // period of repeated poses of a resting tool: the server releases a silent one
-const RETRY_MS = 500, // pause before the first reconnection, doubled with each failure
-    RETRY_MAX_MS = 5000;
+const RETRY_MS = 500; // pause before the first reconnection, doubled with each failure
+const RETRY_MAX_MS = 5000;
 const PAGE_SILENCE_MS = 3000; // a page that has been silent for longer no longer holds its tool
 const PING_MS = 1000;
 const FIGURES_MS = 500;
@@ -33,7 +33,7 @@ const FINAL = new Map([
  * @typedef {import("./control_table.js").ClientMessage} ClientMessage
  * @typedef {import("./topology_delta.js").Shown} Shown
  * @typedef {"connecting" | "live" | "lost" | "refused"} ConnectionState
- * @typedef {{tool: number, position: number[] | null, grab: boolean, away: boolean}} ToolPose position m; away: the
+ * @typedef {{tool: number, position: number[] | null, grasp: boolean, away: boolean}} ToolPose position m; away: the
  *   tool is lifted out of the scene
  * @typedef {{positions: Float32Array<ArrayBuffer>, normals: Float32Array<ArrayBuffer>}} FrameArrays [n][3] each
  * @typedef {{latency_ms: number, rtt_ms: number, decode_ms: number, bytes_s: number}} LinkFigures
@@ -201,7 +201,7 @@ export class Link {
         const now = this.env.now();
         if (!this.lastPose || now - this.poseSentAt < 0.8 * REPEAT_MS) return;
         if (now - this.poseFromPageAt < PAGE_SILENCE_MS) this.sendPose(this.lastPose);
-        else this.pose({ ...this.lastPose, position: null, grab: false, away: true });
+        else this.pose({ ...this.lastPose, position: null, grasp: false, away: true });
     }
 
     /** @param {ToolPose} pose */
@@ -216,7 +216,7 @@ export class Link {
                 flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
                 stampUs: Math.round(this.env.now() * 1000),
                 position: this.lastPosition,
-                buttons: pose.grab ? 1 : 0,
+                buttons: pose.grasp ? 1 : 0,
             }),
         );
     }
@@ -267,8 +267,8 @@ export class Link {
             if (generation !== this.generation || this.requested.get(index) !== info.epoch) return;
             // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
             this.tries = 0;
-            const n = asset.rest.length / 3,
-                shown = shownOf(asset.triangles, n);
+            const n = asset.rest.length / 3;
+            const shown = shownOf(asset.triangles, n);
             this.parts.set(index, {
                 decoder: new FrameDecoder(asset),
                 table: asset.triangles,
@@ -288,8 +288,8 @@ export class Link {
 
     /** messages that arrived before the asset @param {number} index of the part */
     decodeEarly(index) {
-        const frame = this.earlyFrames.get(index),
-            deltas = this.earlyDeltas.get(index) ?? [];
+        const frame = this.earlyFrames.get(index);
+        const deltas = this.earlyDeltas.get(index) ?? [];
         this.earlyFrames.delete(index);
         this.earlyDeltas.delete(index);
         for (const delta of deltas) this.topologyDelta(index, delta);
@@ -301,15 +301,15 @@ export class Link {
 
     /** @param {number} index @param {Uint8Array} bytes */
     field(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readFieldHead(bytes);
+        const part = this.parts.get(index);
+        const { epoch } = readFieldHead(bytes);
         if (!part || epoch > part.epoch) {
             this.earlyFields.set(index, bytes.slice());
             return;
         }
         if (epoch < part.epoch) return;
-        const level = new Uint8Array(part.n),
-            head = decodeField(bytes, level);
+        const level = new Uint8Array(part.n);
+        const head = decodeField(bytes, level);
         this.env.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
             level.buffer,
         ]);
@@ -320,8 +320,8 @@ export class Link {
      * @param {number} index @param {Uint8Array} bytes
      */
     topologyDelta(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readTopologyDeltaHead(bytes);
+        const part = this.parts.get(index);
+        const { epoch } = readTopologyDeltaHead(bytes);
         if (!part || epoch > part.epoch) {
             const before = this.earlyDeltas.get(index) ?? [];
             this.earlyDeltas.set(index, [
@@ -339,8 +339,8 @@ export class Link {
 
     /** @param {number} index @param {Uint8Array} bytes */
     frame(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readFrameHead(bytes);
+        const part = this.parts.get(index);
+        const { epoch } = readFrameHead(bytes);
         if (!part || epoch > part.epoch) {
             this.earlyFrames.set(index, bytes.slice());
             return;
@@ -352,8 +352,8 @@ export class Link {
             normals: new Float32Array(3 * part.n),
         };
         part.decoder.decode(bytes, positions);
-        const ms = this.env.now() - begin,
-            shown = part.changed ? shownOf(part.table, part.n) : null;
+        const ms = this.env.now() - begin;
+        const shown = part.changed ? shownOf(part.table, part.n) : null;
         if (shown) part.shown = shown;
         part.changed = false;
         vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);

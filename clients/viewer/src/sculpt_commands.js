@@ -47,11 +47,11 @@ export const PAINTS = Object.freeze({
  */
 export function liftOf(a, b, middle, lift_m) {
     const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    const along = b.map((v, i) => v - a[i]),
-        out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
+    const along = b.map((v, i) => v - a[i]);
+    const out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
     const share = dot(along, along) > 0 ? dot(out, along) / dot(along, along) : 0;
-    const across = out.map((v, i) => v - share * along[i]),
-        length = Math.hypot(...across);
+    const across = out.map((v, i) => v - share * along[i]);
+    const length = Math.hypot(...across);
     return length > 1e-9 ? across.map((v) => (lift_m * v) / length) : [0, 0, lift_m];
 }
 
@@ -97,8 +97,8 @@ export function cutCommand(axis, share, box) {
 
 /** box around a box and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */
 export function boxAround(box, x) {
-    const low = [...box.low],
-        high = [...box.high];
+    const low = [...box.low];
+    const high = [...box.high];
     for (let i = 0; i < x.length; i++) {
         low[i % 3] = Math.min(low[i % 3], x[i]);
         high[i % 3] = Math.max(high[i % 3], x[i]);

@@ -2,16 +2,13 @@
 // triangle table of an adaptive part; the visible triangles of a table, without empty slots 0 0 0, and their vertices. Pure.
 import { planes, unfold } from "./asset.js";
 import { lz4Decode } from "./lz4.js";
-import { KIND, PART_MAX, readHead, WireError } from "./wire.js";
+import { checkOf, KIND, PART_MAX, readHead } from "./wire.js";
 
-const HEAD_BYTES = 32,
-    SLOT_BYTES = 16,
-    SLOT_MAX = 2 ** 22;
+const HEAD_BYTES = 32;
+const SLOT_BYTES = 16;
+const SLOT_MAX = 2 ** 22;
 
-/** @param {boolean} good @param {string} code @param {string} text */
-function need(good, code, text) {
-    if (!good) throw new WireError(code, `topology delta: ${text}`);
-}
+const need = checkOf("topology delta");
 
 /**
  * @typedef {{part: number, epoch: number, n: number, revision: number, nRaw: number}} TopologyDeltaHead n: changed slots;
@@ -31,12 +28,12 @@ export function readTopologyDeltaHead(bytes) {
     need(flags === 0, "FLAGS", `flags ${flags}`);
     need(bytes.length >= HEAD_BYTES, "SHORT", "no room for its head");
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-    const epoch = view.getUint32(8, true),
-        n = view.getUint32(12, true),
-        low = view.getUint32(16, true),
-        high = view.getUint32(20, true);
-    const nRaw = view.getUint32(24, true),
-        nLz4 = view.getUint32(28, true);
+    const epoch = view.getUint32(8, true);
+    const n = view.getUint32(12, true);
+    const low = view.getUint32(16, true);
+    const high = view.getUint32(20, true);
+    const nRaw = view.getUint32(24, true);
+    const nLz4 = view.getUint32(28, true);
     need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "block cut short");
     need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the block");
     need(index < PART_MAX && high < 1 << 21, "RANGE", "part or revision");
@@ -51,15 +48,15 @@ export function readTopologyDeltaHead(bytes) {
  * @returns {TopologyDeltaHead}
  */
 export function applyTopologyDelta(bytes, table, nVertex) {
-    const head = readTopologyDeltaHead(bytes),
-        { n, nRaw } = head,
-        t = table.length / 3;
+    const head = readTopologyDeltaHead(bytes);
+    const { n, nRaw } = head;
+    const t = table.length / 3;
     need(n <= t, "COUNT", `${n} slots, the table has ${t}`);
     const raw = new Uint8Array(nRaw);
     lz4Decode(bytes.subarray(HEAD_BYTES), raw, 0, nRaw);
 
-    const slot = planes(raw, 0, n),
-        corner = planes(raw, 4 * n, 3 * n);
+    const slot = planes(raw, 0, n);
+    const corner = planes(raw, 4 * n, 3 * n);
     for (let i = 0; i < n; i++) {
         const before = i ? slot[i - 1] : 0;
         slot[i] = before + unfold(slot[i]);
@@ -79,14 +76,14 @@ export function applyTopologyDelta(bytes, table, nVertex) {
  * @returns {Shown}
  */
 export function shownOf(table, nVertex) {
-    const seen = new Uint8Array(nVertex),
-        triangles = new Uint32Array(table.length);
-    let to = 0,
-        nSeen = 0;
+    const seen = new Uint8Array(nVertex);
+    const triangles = new Uint32Array(table.length);
+    let to = 0;
+    let nSeen = 0;
     for (let e = 0; e < table.length; e += 3) {
-        const a = table[e],
-            b = table[e + 1],
-            c = table[e + 2];
+        const a = table[e];
+        const b = table[e + 1];
+        const c = table[e + 2];
         if ((a | b | c) === 0) continue;
         triangles[to] = a;
         triangles[to + 1] = b;

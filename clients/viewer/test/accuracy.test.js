@@ -155,8 +155,8 @@ test("parts of the error are shares of their sum, unknown ones are left out", ()
 });
 
 test("a neighbour is described by its gain and cost", () => {
-    const now = estimate({}),
-        to = { parameter: "resolution", label: "24 voxels", size: 24 };
+    const now = estimate({});
+    const to = { parameter: "resolution", label: "24 voxels", size: 24 };
     assert.equal(neighbourText(now, { ...to, cost_ms: 8.5, error_m: 4.5e-4 }), "half the error: +4.1 ms");
     assert.equal(neighbourText(now, { ...to, cost_ms: 2, error_m: 1.8e-3 }), "twice the error: −2.4 ms");
     assert.equal(neighbourText(now, { ...to, cost_ms: 4.4, error_m: 6.3e-4 }), "30 % less error: same cost");

@@ -54,8 +54,8 @@ test("reads the golden tools", () => {
 test("reads the golden haptic model", () => same(readHaptic(load("haptic.bin")), expected.haptic));
 
 test("reads the golden field", () => {
-    const level = new Uint8Array(expected.field.n),
-        head = decodeField(load("field.bin"), level);
+    const level = new Uint8Array(expected.field.n);
+    const head = decodeField(load("field.bin"), level);
     same({ ...head, level }, expected.field, "field");
     assert.equal(head.name, "von_mises");
 });
@@ -90,9 +90,9 @@ test("refuses fields of bad kinds, ranges, counts and blocks", () => {
 });
 
 test("applies the golden topology delta to the table of the golden asset", () => {
-    const { triangles, rest } = decodeAsset(load("asset.bin")),
-        wanted = expected.topology_delta,
-        before = triangles.slice();
+    const { triangles, rest } = decodeAsset(load("asset.bin"));
+    const wanted = expected.topology_delta;
+    const before = triangles.slice();
     const head = applyTopologyDelta(load("topology_delta.bin"), triangles, rest.length / 3);
     same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "topology_delta");
     assert.deepEqual([...triangles], wanted.triangles);
@@ -103,8 +103,8 @@ test("applies the golden topology delta to the table of the golden asset", () =>
 });
 
 test("reads the golden asset, whose hash is its name", () => {
-    const bytes = load("asset.bin"),
-        asset = decodeAsset(bytes);
+    const bytes = load("asset.bin");
+    const asset = decodeAsset(bytes);
     same(
         asset,
         { ...expected.asset, levels: {}, hash: undefined, rest: Object.assign({}, expected.asset.rest) },
@@ -115,8 +115,8 @@ test("reads the golden asset, whose hash is its name", () => {
 });
 
 test("reads the golden frames to the same bits", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
     const positions = new Float32Array(asset.rest.length);
     for (const frame of expected.frames) {
         const head = decoder.decode(load(`frame_${frame.name}.bin`), positions);
@@ -125,9 +125,9 @@ test("reads the golden frames to the same bits", () => {
 });
 
 test("decodes frames in any order to the same positions", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        once = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const once = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     for (const frame of [...expected.frames].reverse()) {
         once.decode(load(`frame_${frame.name}.bin`), positions);
         same(positions, { ...frame.positions }, frame.name);
@@ -135,9 +135,9 @@ test("decodes frames in any order to the same positions", () => {
 });
 
 test("refuses every message cut anywhere, and with a byte too many", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     /** @type {[string, (bytes: Uint8Array) => any][]} */
     const readers = [
         ["tools.bin", readTools],
@@ -157,9 +157,9 @@ test("refuses every message cut anywhere, and with a byte too many", () => {
 });
 
 test("changed bytes give a refusal or a frame, never another error", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     for (const frame of expected.frames) {
         const bytes = load(`frame_${frame.name}.bin`);
         for (let at = 0; at < bytes.length; at++)

@@ -123,10 +123,10 @@ test("keeps the newest frame until its asset has come, then shows it", async () 
 });
 
 test("keeps the newest field until its asset has come, drops one of an older epoch", async () => {
-    const s = stand(),
-        field = load("field.bin"),
-        head = readFieldHead(field),
-        n = 301;
+    const s = stand();
+    const field = load("field.bin");
+    const head = readFieldHead(field);
+    const n = 301;
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
     s.sockets[0].accept();
     const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
@@ -153,17 +153,17 @@ test("acknowledges every cycle, frames decoded or not", async () => {
     const { s } = await joined();
     s.sockets[0].say(load("tools.bin"));
     s.sockets[0].say(load("tools.bin"));
-    const acks = s.sockets[0].binary(KIND.ACK),
-        cycle = readTools(load("tools.bin")).cycle;
+    const acks = s.sockets[0].binary(KIND.ACK);
+    const cycle = readTools(load("tools.bin")).cycle;
     assert.equal(acks.length, 2);
     assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
 });
 
-test("a pose carries tool, grab and clock, and lifting the tool keeps its last place", async () => {
+test("a pose carries tool, grasp and clock, and lifting the tool keeps its last place", async () => {
     const { s } = await joined();
     s.time = 1234.5;
-    s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grab: true, away: false });
-    s.link.pose({ tool: 2, position: null, grab: false, away: true });
+    s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grasp: true, away: false });
+    s.link.pose({ tool: 2, position: null, grasp: false, away: true });
     const [first, second] = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
     assert.equal(first.getUint16(6, true), 2);
     assert.equal(Number(first.getBigUint64(16, true)), 1234500);
@@ -176,7 +176,7 @@ test("a pose carries tool, grab and clock, and lifting the tool keeps its last p
 
 test("a resting tool is said again until the page has been silent for 3 s", async () => {
     const { s } = await joined();
-    s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
+    s.link.pose({ tool: 0, position: [0, 0, 1], grasp: true, away: false });
     for (let k = 0; k < 58; k++) {
         s.time += 50;
         s.link.repeatPose();
@@ -231,11 +231,11 @@ test("another topology: the old part goes on until the new asset is here, then f
     s.giveAsset(load("asset.bin").buffer);
     await turn();
     await turn();
-    const old = load("frame_bend.bin"),
-        fresh = load("frame_bend.bin"),
-        view = new DataView(fresh.buffer, fresh.byteOffset);
-    const epoch = view.getUint32(8, true) + 1,
-        frames = () => s.of("frame").filter((m) => m.part === part).length;
+    const old = load("frame_bend.bin");
+    const fresh = load("frame_bend.bin");
+    const view = new DataView(fresh.buffer, fresh.byteOffset);
+    const epoch = view.getUint32(8, true) + 1;
+    const frames = () => s.of("frame").filter((m) => m.part === part).length;
     view.setUint32(8, epoch, true);
     s.sockets[0].say({
         type: "topology",
@@ -263,8 +263,8 @@ test("another topology: the old part goes on until the new asset is here, then f
 
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
     const { s, part } = await joined();
-    const first = s.giveAsset,
-        epoch = s.link.requested.get(part);
+    const first = s.giveAsset;
+    const epoch = s.link.requested.get(part);
     s.sockets[0].say({
         type: "topology",
         parts: Array.from({ length: part + 1 }, () => partInfo({ epoch: epoch + 1, asset: "/asset/cd" })),
@@ -298,8 +298,8 @@ test("a message that cannot be read closes the connection, an old connection is 
 });
 
 test("normals of a tetrahedron point away from its middle", () => {
-    const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
-        n = new Float32Array(12);
+    const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const n = new Float32Array(12);
     vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
     for (let i = 0; i < 4; i++) {
         let outward = 0;

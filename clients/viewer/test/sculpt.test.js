@@ -129,8 +129,8 @@ const SURFACE = {
 };
 
 test("only vertices of triangles are written, surfaces one after the other", () => {
-    const one = joinSurfaces([SURFACE]),
-        two = joinSurfaces([SURFACE, SURFACE]);
+    const one = joinSurfaces([SURFACE]);
+    const two = joinSurfaces([SURFACE, SURFACE]);
     assert.equal(one.positions.length, 12);
     assert.ok(!one.positions.includes(9));
     assert.equal(two.positions.length, 24);
@@ -156,8 +156,8 @@ const volume = (triangles) =>
 
 test("OBJ, STL and PLY hold the same surface", () => {
     const tenth = { positions: SURFACE.positions.map((v) => Math.fround(v / 10)), triangles: SURFACE.triangles };
-    const lines = toObj([tenth]).split("\n"),
-        v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
+    const lines = toObj([tenth]).split("\n");
+    const v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
     const obj = lines
         .filter((l) => l.startsWith("f "))
         .map((l) =>
@@ -172,10 +172,10 @@ test("OBJ, STL and PLY hold the same surface", () => {
     const stlTriangles = [0, 1, 2, 3].map((k) =>
         [0, 1, 2].map((i) => [0, 1, 2].map((d) => stl.getFloat32(84 + 50 * k + 12 + 12 * i + 4 * d, true))),
     );
-    const ply = toPly([tenth]),
-        head = new TextDecoder().decode(ply),
-        begin = head.indexOf("end_header\n") + 11,
-        view = new DataView(ply);
+    const ply = toPly([tenth]);
+    const head = new TextDecoder().decode(ply);
+    const begin = head.indexOf("end_header\n") + 11;
+    const view = new DataView(ply);
     assert.match(head, /element vertex 4\n/);
     assert.match(head, /element face 4\n/);
     assert.equal(ply.byteLength, begin + 48 + 52);

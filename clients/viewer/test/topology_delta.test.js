@@ -32,8 +32,8 @@ function writeDelta({ part = 0, epoch, revision = 1, slots, corners }) {
         ...planes(slots.map((p, i) => fold((p - (i ? slots[i - 1] : 0)) | 0))),
         ...planes(corners.map((c, e) => fold((c - (e < 3 ? 0 : corners[e - 3])) | 0))),
     ]);
-    const bytes = new Uint8Array(32 + block.length),
-        view = new DataView(bytes.buffer);
+    const bytes = new Uint8Array(32 + block.length);
+    const view = new DataView(bytes.buffer);
     view.setUint32(0, MAGIC, true);
     view.setUint8(4, KIND.TOPOLOGY_DELTA);
     view.setUint16(6, part, true);
@@ -59,9 +59,9 @@ function random(seed) {
 }
 
 test("a delta changes the slots it names and no other", () => {
-    const x = table(),
-        head = applyTopologyDelta(good(), x, N),
-        wanted = table();
+    const x = table();
+    const head = applyTopologyDelta(good(), x, N);
+    const wanted = table();
     wanted.set([4, 5, 6], 0);
     wanted.set([0, 0, 0], 9);
     wanted.set([299, 0, 298], 117);
@@ -70,9 +70,9 @@ test("a delta changes the slots it names and no other", () => {
 });
 
 test("a thousand random deltas reproduce the table", () => {
-    const below = random(5),
-        mine = table(),
-        theirs = table();
+    const below = random(5);
+    const mine = table();
+    const theirs = table();
     for (let k = 0; k < 1000; k++) {
         const slots = [...new Set(Array.from({ length: 1 + below(12) }, () => below(40)))].sort((a, b) => a - b);
         const corners = slots.flatMap(() => (below(3) ? [below(N), below(N), below(N)] : [0, 0, 0]));
@@ -136,8 +136,8 @@ test("a damaged delta is refused without a change, or gives a table whose corner
     assert.throws(() => applyTopologyDelta(new Uint8Array([...bytes, 0]), table(), N), WireError);
     for (let at = 0; at < bytes.length; at++)
         for (let value = 0; value < 256; value++) {
-            const broken = bytes.slice(),
-                x = table();
+            const broken = bytes.slice();
+            const x = table();
             broken[at] = value;
             try {
                 applyTopologyDelta(broken, x, N);
@@ -150,9 +150,9 @@ test("a damaged delta is refused without a change, or gives a table whose corner
 });
 
 test("a message that states more than its bytes can hold takes no memory", () => {
-    const bytes = good(),
-        view = new DataView(bytes.buffer),
-        n = 2 ** 22;
+    const bytes = good();
+    const view = new DataView(bytes.buffer);
+    const n = 2 ** 22;
     view.setUint32(12, n, true);
     view.setUint32(24, 16 * n, true);
     assert.throws(() => readTopologyDeltaHead(bytes), { code: "COUNT" });
@@ -167,10 +167,10 @@ test("shows the triangles without empty slots, and the vertices in them", () => 
 });
 
 test("normals of visible vertices are those of the whole mesh, hidden ones are left alone", () => {
-    const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
-        triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
-    const all = new Float32Array(15),
-        some = new Float32Array(15).fill(7);
+    const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
+    const all = new Float32Array(15);
+    const some = new Float32Array(15).fill(7);
     vertexNormals(x, triangles, all);
     vertexNormals(x, triangles, some, new Uint32Array([0, 2, 3, 4]));
     assert.deepEqual([...some.subarray(3, 6)], [7, 7, 7]);
@@ -191,9 +191,9 @@ test("says what is active in a sentence, with the body's name only among several
 /** @param {string} name */
 const load = (name) => new Uint8Array(readFileSync(new URL(`../../../tests/data/golden/${name}`, import.meta.url)));
 const turn = () => new Promise((resolve) => setImmediate(resolve));
-const frame = load("frame_bend.bin"),
-    epoch = new DataView(frame.buffer).getUint32(8, true),
-    part = new DataView(frame.buffer).getUint16(6, true);
+const frame = load("frame_bend.bin");
+const epoch = new DataView(frame.buffer).getUint32(8, true);
+const part = new DataView(frame.buffer).getUint16(6, true);
 const asset = decodeAsset(load("asset.bin"));
 
 /** a connection that has heard hello and waits for the asset of the golden frames */
