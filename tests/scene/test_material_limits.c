@@ -4,7 +4,7 @@
 #include "server/scene/scene_file.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 static char folder[] = "/tmp/palpate_limits_XXXXXX";
 static pal_scene plain;
