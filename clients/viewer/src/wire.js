@@ -194,7 +194,7 @@ export function readTools(bytes) {
  *   kt: number, muS: number, muD: number, radius: number}} ContactPatch
  * @typedef {{tool: number, seq: number, flags: number, stampUs: number, echoStampUs: number, echoSeq: number,
  *   holdUs: number, frameUs: number, origin: number[], fRef: number[],
- *   grip: {x0: number[], f0: number[], k: number[], b: number} | null, patches: ContactPatch[]}} Haptic
+ *   grasp: {x0: number[], f0: number[], k: number[], b: number} | null, contactPatches: ContactPatch[]}} Haptic
  */
 
 /** @param {Reader} r @returns {ContactPatch} */
@@ -231,11 +231,11 @@ export function readHaptic(bytes) {
     exactly(bytes, 140 + 68 * nPatch);
     const origin = r.doubles(3);
     const fRef = r.floats(3);
-    const hasGrip = r.u32();
-    const grip = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
+    const hasGrasp = r.u32();
+    const grasp = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
     need(flags < 8, "FLAGS", `haptic flags ${flags}`);
-    need(tool < TOOL_MAX && hasGrip <= 1 && grip.b >= 0, "RANGE", "tool or grip");
-    const patches = Array.from({ length: nPatch }, () => readContactPatch(r));
+    need(tool < TOOL_MAX && hasGrasp <= 1 && grasp.b >= 0, "RANGE", "tool or grasp");
+    const contactPatches = Array.from({ length: nPatch }, () => readContactPatch(r));
     return {
         tool,
         seq,
@@ -247,8 +247,8 @@ export function readHaptic(bytes) {
         frameUs,
         origin,
         fRef,
-        grip: hasGrip ? grip : null,
-        patches,
+        grasp: hasGrasp ? grasp : null,
+        contactPatches,
     };
 }
 
@@ -274,7 +274,7 @@ function setU64(view, at, value) {
 /**
  * @typedef {{
  *   tool: number, seq: number, stampUs: number, position: number[], flags?: number, quaternion?: number[],
- *   velocity?: number[], omega?: number[], force?: number[], torque?: number[], grip?: number, buttons?: number,
+ *   velocity?: number[], omega?: number[], force?: number[], torque?: number[], gripper?: number, buttons?: number,
  *   modelSeq?: number, modelAgeUs?: number, modelStampUs?: number
  * }} Pose missing fields are 0, the quaternion is 1 0 0 0
  */
@@ -294,7 +294,7 @@ export function writePose(pose) {
     [pose.velocity, pose.omega, pose.force, pose.torque].forEach((vector, k) =>
         vector?.forEach((v, i) => view.setFloat32(80 + 12 * k + 4 * i, v, true)),
     );
-    view.setFloat32(128, pose.grip ?? 0, true);
+    view.setFloat32(128, pose.gripper ?? 0, true);
     view.setUint32(132, pose.buttons ?? 0, true);
     view.setUint32(136, pose.modelSeq ?? 0, true);
     view.setUint32(140, pose.modelAgeUs ?? 0, true);

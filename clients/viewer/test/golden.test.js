@@ -51,7 +51,10 @@ test("reads the golden tools", () => {
     );
 });
 
-test("reads the golden haptic model", () => same(readHaptic(load("haptic.bin")), expected.haptic));
+test("reads the golden haptic model", () => {
+    const { contact_patches: contactPatches, ...rest } = expected.haptic;
+    same(readHaptic(load("haptic.bin")), { ...rest, contactPatches });
+});
 
 test("reads the golden field", () => {
     const level = new Uint8Array(expected.field.n);

@@ -37,7 +37,7 @@ class FakeSocket {
         this.onopen?.();
     }
     /** @param {any} data */
-    say(data) {
+    receive(data) {
         this.onmessage?.({
             data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data),
         });
@@ -87,7 +87,7 @@ async function joined() {
     const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
     const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
     const parts = Array.from({ length: part + 1 }, () => partInfo({ epoch }));
-    s.sockets[0].say(hello({ parts }));
+    s.sockets[0].receive(hello({ parts }));
     return { s, part };
 }
 
@@ -105,8 +105,8 @@ test("joins with the protocol's name, asks for any tool and for patches", () => 
 test("keeps the newest frame until its asset has come, then shows it", async () => {
     const { s, part } = await joined();
     assert.equal(s.asked.at(-1), "http://host:1/asset/ab");
-    s.sockets[0].say(load("frame_spike.bin"));
-    s.sockets[0].say(load("frame_bend.bin"));
+    s.sockets[0].receive(load("frame_spike.bin"));
+    s.sockets[0].receive(load("frame_bend.bin"));
     assert.equal(s.of("frame").length, 0);
     s.giveAsset(load("asset.bin").buffer);
     await turn();
@@ -130,29 +130,29 @@ test("keeps the newest field until its asset has come, drops one of an older epo
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
     s.sockets[0].accept();
     const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
-    s.sockets[0].say(hello({ parts }));
-    s.sockets[0].say(field);
+    s.sockets[0].receive(hello({ parts }));
+    s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 0);
     // as if an asset of as many vertices had come
     s.link.parts.set(head.part, { epoch: head.epoch, n });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     const [shown] = s.of("field");
     assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
     assert.ok(shown.low < shown.high);
     s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 1);
     assert.equal(s.sockets[0].closed, 0);
     // of another number of vertices: the server's mistake
     s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     assert.equal(s.sockets[0].closed, 4900);
 });
 
 test("acknowledges every cycle, frames decoded or not", async () => {
     const { s } = await joined();
-    s.sockets[0].say(load("tools.bin"));
-    s.sockets[0].say(load("tools.bin"));
+    s.sockets[0].receive(load("tools.bin"));
+    s.sockets[0].receive(load("tools.bin"));
     const acks = s.sockets[0].binary(KIND.ACK);
     const cycle = readTools(load("tools.bin")).cycle;
     assert.equal(acks.length, 2);
@@ -214,7 +214,7 @@ test("a server whose asset cannot be read is asked again ever more slowly", asyn
     const pauses = [];
     for (let i = 0; i < 4; i++) {
         s.sockets[i].accept();
-        s.sockets[i].say(hello());
+        s.sockets[i].receive(hello());
         s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
         await turn();
         assert.equal(s.sockets[i].closed, 4900);
@@ -237,13 +237,13 @@ test("another topology: the old part goes on until the new asset is here, then f
     const epoch = view.getUint32(8, true) + 1;
     const frames = () => s.of("frame").filter((m) => m.part === part).length;
     view.setUint32(8, epoch, true);
-    s.sockets[0].say({
+    s.sockets[0].receive({
         type: "topology",
         parts: Array.from({ length: part + 1 }, () => partInfo({ epoch, asset: "/asset/cd" })),
     });
-    s.sockets[0].say(old); // was on its way
+    s.sockets[0].receive(old); // was on its way
     assert.equal(frames(), 1);
-    s.sockets[0].say(fresh);
+    s.sockets[0].receive(fresh);
     assert.equal(frames(), 1); // waits for its asset
     s.giveAsset(load("asset.bin").buffer);
     await turn();
@@ -256,7 +256,7 @@ test("another topology: the old part goes on until the new asset is here, then f
         [epoch - 1, epoch],
     );
     assert.equal(frames(), 2);
-    s.sockets[0].say(old);
+    s.sockets[0].receive(old);
     assert.equal(frames(), 2);
     assert.equal(s.sockets[0].closed, 0);
 });
@@ -265,7 +265,7 @@ test("an asset that arrives after a newer one was asked for is not shown", async
     const { s, part } = await joined();
     const first = s.giveAsset;
     const epoch = s.link.requested.get(part);
-    s.sockets[0].say({
+    s.sockets[0].receive({
         type: "topology",
         parts: Array.from({ length: part + 1 }, () => partInfo({ epoch: epoch + 1, asset: "/asset/cd" })),
     });
@@ -289,11 +289,11 @@ test("says why and stays away after a refusal", () => {
 
 test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
     const { s } = await joined();
-    s.sockets[0].say(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
+    s.sockets[0].receive(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
     assert.equal(s.sockets[0].closed, 4900);
     s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
     const n = s.posted.length;
-    s.sockets[0].say(hello());
+    s.sockets[0].receive(hello());
     assert.equal(s.posted.length, n);
 });
 

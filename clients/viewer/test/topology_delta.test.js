@@ -217,10 +217,10 @@ function stand() {
         later: () => {},
     });
     link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    const say = (/** @type {any} */ m) =>
+    const receive = (/** @type {any} */ m) =>
         socket.onmessage({ data: m instanceof Uint8Array ? m.slice().buffer : JSON.stringify(m) });
     const parts = (/** @type {number} */ e) => Array.from({ length: part + 1 }, () => partInfo({ epoch: e }));
-    say(hello({ parts: parts(epoch) }));
+    receive(hello({ parts: parts(epoch) }));
     const giveAsset = async () => {
         give(load("asset.bin").buffer);
         await turn();
@@ -228,7 +228,7 @@ function stand() {
     };
     return {
         socket,
-        say,
+        receive,
         parts,
         giveAsset,
         of: (/** @type {string} */ type) => posted.filter((m) => m.type === type && m.part === part),
@@ -243,52 +243,52 @@ function changed(changes) {
 }
 
 test("a delta is displayed with the next frame, once", async () => {
-    const { say, giveAsset, of } = stand();
+    const { receive, giveAsset, of } = stand();
     await giveAsset();
-    say(frame);
+    receive(frame);
     assert.equal(of("frame")[0].shown, null);
-    say(writeDelta({ part, epoch, slots: [0, 2], corners: [0, 0, 0, 3, 2, 1] }));
-    say(writeDelta({ part, epoch, slots: [2, 5], corners: [4, 2, 1, 0, 0, 0] }));
+    receive(writeDelta({ part, epoch, slots: [0, 2], corners: [0, 0, 0, 3, 2, 1] }));
+    receive(writeDelta({ part, epoch, slots: [2, 5], corners: [4, 2, 1, 0, 0, 0] }));
     assert.equal(of("frame").length, 1);
-    say(frame);
+    receive(frame);
     assert.deepEqual(of("frame")[1].shown, changed({ 0: [0, 0, 0], 2: [4, 2, 1], 5: [0, 0, 0] }));
-    say(frame);
+    receive(frame);
     assert.equal(of("frame")[2].shown, null);
 });
 
 test("deltas before the asset are applied in order, a frame before them is dropped", async () => {
-    const { say, giveAsset, of } = stand();
-    say(frame);
-    say(writeDelta({ part, epoch, slots: [0], corners: [3, 2, 1] }));
-    say(writeDelta({ part, epoch, slots: [0], corners: [4, 2, 1] }));
+    const { receive, giveAsset, of } = stand();
+    receive(frame);
+    receive(writeDelta({ part, epoch, slots: [0], corners: [3, 2, 1] }));
+    receive(writeDelta({ part, epoch, slots: [0], corners: [4, 2, 1] }));
     await giveAsset();
     assert.equal(of("part").length, 1);
     assert.equal(of("frame").length, 0);
-    say(frame);
+    receive(frame);
     assert.deepEqual(of("frame")[0].shown, changed({ 0: [4, 2, 1] }));
 });
 
 test("deltas of an older epoch are dropped, those of a newer one wait for its asset", async () => {
-    const { say, parts, giveAsset, of } = stand();
+    const { receive, parts, giveAsset, of } = stand();
     await giveAsset();
-    say(writeDelta({ part, epoch: epoch - 1, slots: [0], corners: [3, 2, 1] }));
-    say(frame);
+    receive(writeDelta({ part, epoch: epoch - 1, slots: [0], corners: [3, 2, 1] }));
+    receive(frame);
     assert.equal(of("frame")[0].shown, null);
-    say(writeDelta({ part, epoch: epoch + 1, slots: [0], corners: [3, 2, 1] }));
-    say({ type: "topology", parts: parts(epoch + 1) });
+    receive(writeDelta({ part, epoch: epoch + 1, slots: [0], corners: [3, 2, 1] }));
+    receive({ type: "topology", parts: parts(epoch + 1) });
     await giveAsset();
     assert.equal(of("part").length, 2);
     const next = frame.slice();
     new DataView(next.buffer).setUint32(8, epoch + 1, true);
-    say(next);
+    receive(next);
     assert.deepEqual(of("frame")[1].shown, changed({ 0: [3, 2, 1] }));
 });
 
 test("an unreadable delta closes the connection, also after waiting", async () => {
     for (const early of [false, true]) {
-        const { socket, say, giveAsset } = stand();
+        const { socket, receive, giveAsset } = stand();
         if (!early) await giveAsset();
-        say(writeDelta({ part, epoch, slots: [0], corners: [3, 2, asset.rest.length / 3] }));
+        receive(writeDelta({ part, epoch, slots: [0], corners: [3, 2, asset.rest.length / 3] }));
         if (early) await giveAsset();
         assert.equal(socket.closed, 4900);
     }
