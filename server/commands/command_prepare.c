@@ -326,7 +326,7 @@ static void print(const pal_loaded_scene *loaded, const plan_requests *wish, con
     else
         print_solid(mesh, r);
     if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
-    pal_loose_parts_tell(&loaded->loose[0], loaded->scene.body[0].name, &told);
+    pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &told);
     if (told.text[0]) printf("%s\n", told.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",

@@ -27,7 +27,7 @@ static void long_steps_stay_bounded(void)
             CHECK(run.finite);
             HARD_CASE("long_step", "fem", "x 10, x 100: energy over the first", run.most, 1.01, "");
             CHECK_LE(run.rise, 1e-6);
-            HARD_CASE("long_step", "fem", "at rest after steps", run.back_s / (times / 60.0), 10, "");
+            HARD_CASE("long_step", "fem", "at rest after steps", run.return_s / (times / 60.0), 10, "");
             CHECK_INT(hard_inverted(&b), 0);
             beam_free(&b);
         }

@@ -250,7 +250,7 @@ static void a_material_beyond_the_budget_is_refused_and_changes_nothing(void)
     double limit = pal_world_limit_s(b.world);
     hard.young_Pa = 1e12;
     CHECK_INT(pal_world_material(b.world, 0, &hard, &diag), PAL_ERR_BUDGET);
-    CHECK(strstr(diag.text, "most_substep allows 2000"));
+    CHECK(strstr(diag.text, "max_substep allows 2000"));
     CHECK_NEAR(pal_world_limit_s(b.world), limit, 0);
     hard.young_Pa = NAN;
     CHECK_INT(pal_world_material(b.world, 0, &hard, &diag), PAL_ERR_REFUSED);

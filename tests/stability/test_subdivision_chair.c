@@ -62,9 +62,10 @@ static void a_chair_comes_back_from_any_shape(void)
                 const double before = pal_world_energy_J(s.world);
                 solid_steps(&s, 10, solid_step_s, &run);
                 printf("  %s, %s: back after %.2f s, energy up to %.3f of %.3g J, %d looks found it turned over\n",
-                       solvers[k], chair_words[how], run.back_s, run.most, before, (int)s.body->safeguards.n_inversion);
+                       solvers[k], chair_words[how], run.return_s, run.most, before,
+                       (int)s.body->safeguards.n_inversion);
                 CHECK(run.finite && s.body->safeguards.n_inversion > 0 && s.body->safeguards.n_split >= 2);
-                HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.back_s, 10, "s");
+                HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.return_s, 10, "s");
                 HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over the insult's", run.most, 1.01, "");
             }
         solid_scene_close(&s);

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* moves times nodes */
-static const double most_work = 2e7;
+static const double max_work = 2e7;
 
 /* ---- pattern ---- */
 
@@ -194,7 +194,7 @@ static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, boo
 static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_diagnostic *diag)
 {
     double moves = 3.0 * n_group * (damped ? 2 : 1);
-    if (moves * body->n_node <= most_work) return PAL_ERR_OK;
+    if (moves * body->n_node <= max_work) return PAL_ERR_OK;
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
         "body \"%s\": an implicit solver finds the matrix of its %d control points by %.0f or more "
@@ -229,30 +229,6 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
 void pal_interpolated_system_invalidate(pal_interpolated_system *e)
 {
     e->next = 0;
-}
-
-/* one group along one axis; into `value` go the columns of its points, from the diagonal down */
-static void probe(pal_interpolated_system *e, const pal_system *system, int move, double *value)
-{
-    const int axis = move % 3, group = move / 3;
-    const int32_t *point = e->point + e->start[group], n = e->start[group + 1] - e->start[group];
-    memset(e->unit, 0, 3 * sizeof(double) * (size_t)e->rest.n);
-    memset(e->answer, 0, 3 * sizeof(double) * (size_t)e->rest.n);
-    for (int32_t i = 0; i < n; i++) e->unit[3 * point[i] + axis] = 1;
-    pal_system_multiply_stiffness(system, value != e->damping, value == e->damping, e->unit, e->answer);
-    for (int32_t i = 0; i < n; i++)
-        for (int32_t k = e->rest.start[point[i]]; k < e->rest.start[point[i] + 1]; k++)
-            for (int c = 0; c < 3; c++)
-                value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->answer[3 * e->rest.row[k] + c];
-}
-
-bool pal_interpolated_system_probe(pal_interpolated_system *e, const pal_system *system, int most)
-{
-    for (; most > 0 && e->next < e->n_move; most--, e->next++) {
-        bool second = e->next >= 3 * e->n_group;
-        probe(e, system, second ? e->next - 3 * e->n_group : e->next, second ? e->damping : e->rest.value);
-    }
-    return e->next == e->n_move;
 }
 
 void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to)

@@ -11,8 +11,6 @@
 #define PAL_SIM_IMPLICIT_INTERPOLATED_SYSTEM_H
 #include "server/sim/core/effect.h"
 
-struct pal_system;
-
 typedef struct pal_interpolated_system {
     double *p, *q;         /* a motion and its answer at nodes                       [n_node][3] */
     double *turn;          /* the rows' rotations at nodes                           [n_node][9] */
@@ -33,8 +31,6 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
                                      pal_diagnostic *diag, pal_interpolated_system **out);
 /* the numbers are out of date: rows have other material */
 void pal_interpolated_system_invalidate(pal_interpolated_system *e);
-/* at most `most` moves more; the rows are linearised at rest. True: all there. No heap */
-bool pal_interpolated_system_probe(pal_interpolated_system *e, const struct pal_system *system, int most);
 /* to += rows' sum of 9 numbers at nodes [n_node][9], pulled back to points [n_dof][9] */
 void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to);
 #endif

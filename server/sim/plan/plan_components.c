@@ -1,4 +1,5 @@
 /* The table of rows while a world runs: rows come and go between steps. */
+#include "server/sim/plan/plan.h"
 #include "server/sim/plan/plan_requests.h"
 
 #include <stdio.h>

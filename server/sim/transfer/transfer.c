@@ -1,11 +1,12 @@
 /* Where the nodes of one body lie in the elements of another (transfer.h). */
-#include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/volume/locate.h"
 #include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/transfer/transfer_core.h"
 
 #include <stdlib.h>
 #include <string.h>

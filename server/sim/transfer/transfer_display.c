@@ -1,7 +1,8 @@
 /* What of a carry is seen (transfer.h): how far points go, and a surface that does not jump. */
-#include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>

@@ -1,9 +1,10 @@
 /* The carry (transfer.h). Reading order: pal_transfer_apply at the end. */
-#include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/polar.h"
+#include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>

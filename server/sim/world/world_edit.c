@@ -3,6 +3,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/subdivision_body.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>

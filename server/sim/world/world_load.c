@@ -1,6 +1,7 @@
 /* Lasting loads on nodes, and how much of a load nodes bear. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>

@@ -1,7 +1,8 @@
 /* What a world shows of itself: frames, hash, rows, surfaces. */
-#include "server/sim/world/world_core.h"
+#include "server/sim/world/world.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/world/world_core.h"
 
 #include <stdio.h>
 #include <string.h>

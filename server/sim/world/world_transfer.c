@@ -1,6 +1,7 @@
 /* A world that goes on where another is (pal_world_transfer). */
 #include "server/base/vec3.h"
 #include "server/sim/springs/spring_recovery.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>

@@ -210,7 +210,7 @@ static void what_hangs_by_its_weight_is_left_to_its_springs(void)
     pal_world_destroy(world);
     REQUIRE(!pal_entry_put_bool(&scene->body[0].model, "recover", true, &diag));
     CHECK_INT(pal_world_create(scene, &diag, &world), PAL_ERR_REFUSED);
-    CHECK(strstr(diag.text, "untangle: goes with solver verlet or rk4 and without gravity only") != NULL);
+    CHECK(strstr(diag.text, "recover: goes with solver verlet or rk4 and without gravity only") != NULL);
     free(scene);
     box_free(&box);
 }
