@@ -137,7 +137,7 @@ bool pal_configuration_equal(const pal_configuration *a, const pal_configuration
            near(a->k_volume_J, b->k_volume_J);
 }
 
-/* ---- what goes together ---- */
+/* ---- models that fit ---- */
 
 pal_err pal_configuration_check_model(const pal_body_def *body, const char *model, pal_diagnostic *diag)
 {
@@ -323,7 +323,7 @@ static pal_err cells_surface(const pal_body_def *body, pal_surface *out, pal_dia
     pal_diagnostic reason = {{0}};
     int32_t *vertex = NULL, *face = NULL;
     pal_err err = pal_subdivision_make(body->cells, &options, &fine, &reason);
-    /* many cells: what is shown of them is fine enough */
+    /* many cells: their shown surface is fine enough */
     if (err == PAL_ERR_BUDGET) {
         options.n_level = 1;
         err = pal_subdivision_make(body->cells, &options, &fine, &reason);

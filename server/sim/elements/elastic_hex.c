@@ -3,11 +3,6 @@
 
 #include <math.h>
 
-/* least share of material of a border voxel, so that no node is left nearly without stiffness and mass */
-static const double least_share = 0.02;
-/* of the split: inverted voxels have no volume to keep, and five tetrahedra a voxel lock well below 0.5 */
-static const double max_poisson = 0.3;
-
 void pal_hex_material(pal_elastic_hexes *cubes, const pal_material *material)
 {
     for (int e = 0; e < cubes->n_hex; e++) {
@@ -64,7 +59,7 @@ static pal_err make_split(pal_elastic_hexes *cubes, pal_build *build, const char
     for (int t = 0; t < tets->n_tet; t++) cubes->split_fill[t] = (float)cubes->share[cubes->simd_blocks.place[t / 5]];
     const pal_elastic_tets_options options = {.law = PAL_LAW_COROTATIONAL,
                                               .recover = true,
-                                              .max_poisson = max_poisson,
+                                              .max_poisson = PAL_HEX_SPLIT_POISSON_MAX,
                                               .n_corner = 4,
                                               .n_tet = tets->n_tet,
                                               .tet = tets->tet,
@@ -122,7 +117,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
         int lane = out->simd_blocks.place[e];
         bool filled = !out->fill || !out->hexes->fill;
         out->hex[lane] = e;
-        out->share[lane] = filled ? 1 : fmax(least_share, fmin(1, (double)out->hexes->fill[e]));
+        out->share[lane] = filled ? 1 : fmax(PAL_HEX_SHARE_MIN, fmin(1, (double)out->hexes->fill[e]));
     }
     pal_hex_fill_reference(out);
     if (options->recover && options->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));
@@ -131,7 +126,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     return PAL_ERR_OK;
 }
 
-/* where each pair of corners stands in the pattern */
+/* index in the pattern of each pair of corners */
 static void find_entries(pal_elastic_hexes *cubes, const pal_block_matrix *to)
 {
     cubes->entry_of = to, cubes->entry_row = to->row;

@@ -50,7 +50,7 @@ typedef struct pal_elastic_hexes {
     pal_force_cache force_cache; /* implicit: of the cubes, not of the split */
 
     bool has_inversion;
-    int n_whole;          /* updates since the return to cubes, up to SOON                              */
+    int n_whole;          /* updates since the return to cubes, up to PAL_HEX_RETRY_UPDATES                           */
     double tried, needed; /* smallest corner at that return; the one required for the next              */
     uint64_t n_inversion,
         n_switch;            /* updates with inversion; changes between cubes, split, single rotation; since reset */

@@ -34,7 +34,7 @@ PAL_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
     pal_wide cxx = yy * zz - yz * yz, cyy = xx * zz - xz * xz, czz = xx * yy - xy * xy;
     pal_wide cxy = xz * yz - xy * zz, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
     pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz;
-    /* left out where the rotation is hardly known: collapsed and turned over cubes */
+    /* omitted where the rotation is nearly undefined: collapsed and inverted cubes */
     pal_wide_mask good = (det > 1e-3 * (t * t * t)) & (t > 0);
     pal_wide inverse = pal_wide_select(good, wide_of(1), wide_of(0)) / pal_wide_select(good, det, wide_of(1));
     pal_wide wx = inverse * (cxx * tx + cxy * ty + cxz * tz), wy = inverse * (cxy * tx + cyy * ty + cyz * tz);
@@ -69,7 +69,7 @@ PAL_INLINE double all_blocks(pal_elastic_hexes *cubes, pal_node_order *node_orde
                 for (int m = 1; m < 8; m++)
                     e += m == 1 << i ? (x[i][m] - 4 * cubes->edge_m) * u[i][m] : x[i][m] * u[i][m];
             }
-            /* what lanes without element read need not be finite */
+            /* lanes without an element may read numbers that are not finite */
             if (what & ENERGY) sum += pal_wide_select(stiff[0] < 0, e, wide_of(0));
             if (!(what & FORCE)) continue;
             if (turned) {

@@ -1,5 +1,5 @@
 /* What is shown of voxel hexahedra: von Mises stress, energy density, strain and distortion at the Gauss point nearest
- * to each corner, which stands for an eighth of the cube. And the stress there, for estimates. */
+ * to each corner, which represents an eighth of the cube; and the stress there, for error estimates. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape_functions.h"

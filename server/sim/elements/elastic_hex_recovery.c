@@ -1,23 +1,13 @@
 /* Which bodies of voxel hexahedra run on their five-tetrahedra split (elastic_hex.h, "Recovery"). */
 #include "server/sim/elements/elastic_hex_simd.h"
 
-/* corner determinants, h^3: a body below or above runs on its split. Above 30 the neo-Hookean energy, which grows with
- * the square, lets nothing else count, and nearly incompressible bodies take detours */
-static const double least_corner = 0.05, most_corner = 30;
-/* a body on its split returns to hexahedra between these */
-static const double least_whole = 0.3, most_needed = 0.9, most_whole = 20;
-/* inverted again within so many updates, one a Newton iteration: the return was in vain, and the next one needs corners
- * better by this */
-enum { SOON = 600 };
-static const double better = 0.05;
-
 void pal_hex_recovery_reset(pal_elastic_hexes *cubes)
 {
     cubes->has_inversion = false;
-    cubes->n_whole = SOON, cubes->needed = cubes->tried = least_whole;
+    cubes->n_whole = PAL_HEX_RETRY_UPDATES, cubes->needed = cubes->tried = PAL_HEX_LEAVE_LOW;
 }
 
-/* least and largest of the determinants of the three edges at each corner */
+/* smallest and largest determinant of the three edges at a corner */
 PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wide *high)
 {
     pal_wide x[8][3], least = wide_of(INFINITY), most = wide_of(-INFINITY);
@@ -38,7 +28,7 @@ PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wi
     *low = least, *high = most;
 }
 
-/* over all voxels, h^3 */
+/* the same over all voxels, h^3 */
 static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, double *low, double *high)
 {
     const double volume = cubes->edge_m * cubes->edge_m * cubes->edge_m;
@@ -73,15 +63,16 @@ bool pal_hex_recover(pal_elastic_hexes *cubes, const pal_body *body)
     corner_range(cubes, body, &low, &high);
     const bool before = cubes->has_inversion;
     if (before) {
-        cubes->has_inversion = low < cubes->needed || high > most_whole;
+        cubes->has_inversion = low < cubes->needed || high > PAL_HEX_LEAVE_HIGH;
         if (!cubes->has_inversion) cubes->n_whole = 0, cubes->tried = low;
     } else {
-        cubes->has_inversion = low < least_corner || high > most_corner;
-        if (cubes->n_whole < SOON) cubes->n_whole++;
+        cubes->has_inversion = low < PAL_HEX_INVERTED_LOW || high > PAL_HEX_INVERTED_HIGH;
+        if (cubes->n_whole < PAL_HEX_RETRY_UPDATES) cubes->n_whole++;
     }
     if (cubes->has_inversion && !before) {
-        cubes->needed =
-            cubes->n_whole < SOON ? fmin(fmax(cubes->needed, cubes->tried) + better, most_needed) : least_whole;
+        cubes->needed = cubes->n_whole < PAL_HEX_RETRY_UPDATES
+                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_HEX_RETRY_STEP, PAL_HEX_RETRY_MAX)
+                            : PAL_HEX_LEAVE_LOW;
         pal_elastic_tets_reset(cubes->split);
     }
     cubes->n_inversion += cubes->has_inversion;

@@ -49,7 +49,7 @@ PAL_INLINE pal_wide wide_inverse_root(pal_wide q)
     return r * (1.5 - half * r * r);
 }
 
-/* where 8 elements' corners stand: in a strip in the slots themselves, loose ones in copies */
+/* pointers to the corners of 8 elements: in a strip to the slots, in a loose block to copies */
 typedef struct hex_view {
     const double *x[8][3]; /* coordinates, 8 lanes each   */
     double *f[8][3];       /* to be added to, 8 lanes each */
@@ -78,7 +78,7 @@ PAL_INLINE void hex_open(const pal_elastic_hexes *cubes, const pal_node_order *n
             v->f[c][d] = v->to[c][d];
         }
 }
-/* brings what was added to copies into the slots */
+/* adds the copies of a loose block to the slots */
 PAL_INLINE void hex_close(const pal_elastic_hexes *cubes, pal_node_order *node_order, int block, const hex_view *v)
 {
     if (block < cubes->simd_blocks.n_strip) return;

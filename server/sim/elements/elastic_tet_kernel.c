@@ -79,8 +79,8 @@ PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_
 
 enum { FORCE = 1, ENERGY = 2 };
 
-/* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the rotation's own change adds to
- * the force when a turn w of R changes the energy by t.w */
+/* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the change of the rotation adds
+ * to the force when a turn w of R changes the energy by t.w */
 PAL_INLINE void turn_stress(const pal_wide r[9], const pal_wide m[9], const pal_wide t[3], const pal_wide inverse[9],
                             pal_wide s[9])
 {
@@ -327,8 +327,8 @@ double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, do
     return sum;
 }
 
-/* f -= forces without sum, a x r on the node at r from the mean, that have this torque: what the borrowed rotations
- * turn, the body as a whole turns back */
+/* f -= forces a x r at the nodes, r from the mean, which have this torque and no resultant: they balance averaged
+ * rotations */
 void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
 {
     double mean[3] = {0}, s[9] = {0}, r[3], w[3], v[9], a[3] = {0};
@@ -351,7 +351,7 @@ void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const do
     }
 }
 
-/* the untangling rule: rotations around nodes from the elements that are not inverted, then those of the others */
+/* averaged rotations: around nodes from the elements that are not inverted, then of the others */
 static void recover(pal_elastic_tets *t)
 {
     memset(t->around, 0, 9 * sizeof(double) * (size_t)t->n_node);

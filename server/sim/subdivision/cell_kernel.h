@@ -1,17 +1,19 @@
-/* Elements of a subdivision solid that follow their own frames (paper A 3.2-3.4): forces, energy, tangent, measures, recovery.
+/* Elements of a subdivision solid that follow their own frames (paper A 3.2-3.4): forces, energy, tangent, measures,
+ * recovery.
  *
- * With Q the polar rotation of F at an element's middle, y = x - x_0 its nodes relative to one of them and X the same at rest:
- *     d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, at 64 Gauss points,
- * with gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. Departure from the paper: in trilinear elements
- * and pyramids of operator polar the change of volume in K is the element's mean (B-bar). The force is the exact gradient of E: with
- * g = K d^, the change of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE = t.w with t = -sum (Q'y) x g, and
- * (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF receives Q [z], z = (tr S I - S)^-1 t, at the middle. E is invariant to rotations of
- * the body, so forces have no resultant and no torque. Near a flat or collapsed middle, where det(tr S I - S) is below 1e-3 of (tr)^3, z
- * goes to 0 with that determinant.
+ * With Q the polar rotation of F at an element's middle, y = x - x_0 its nodes relative to one of them and X the same
+ * at rest: d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, at 64 Gauss points, with
+ * gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. Departure from the paper: in
+ * trilinear elements and pyramids of operator polar the change of volume in K is the element's mean (B-bar). The force
+ * is the exact gradient of E: with g = K d^, the change of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE =
+ * t.w with t = -sum (Q'y) x g, and (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF receives Q [z], z = (tr S I -
+ * S)^-1 t, at the middle. E is invariant to rotations of the body, so forces have no resultant and no torque. Near a
+ * flat or collapsed middle, where det(tr S I - S) is below 1e-3 of (tr)^3, z goes to 0 with that determinant.
  *
- * Blocks have eight elements of a kind side by side. Cubic elements store no K: sum factorisation over the 4 x 4 x 4 points applies it.
- * Others have K without their node 0, which takes minus the sum. A stored K is rounded to float; sums are double.
- * Memory from the arena. Thread: make [load], else [sim]; energy and force update the start values of the rotations. */
+ * Blocks have eight elements of a kind side by side. Cubic elements store no K: sum factorisation over the 4 x 4 x 4
+ * points applies it. Others have K without their node 0, which takes minus the sum. A stored K is rounded to float;
+ * sums are double. Memory from the arena. Thread: make [load], else [sim]; energy and force update the start values of
+ * the rotations. */
 #ifndef PAL_SIM_SUBDIVISION_CELL_KERNEL_H
 #define PAL_SIM_SUBDIVISION_CELL_KERNEL_H
 #include "server/num/block_matrix.h"
@@ -93,7 +95,7 @@ typedef struct pal_cell_recovery {
 typedef struct pal_cells_elastic {
     const pal_subdivision_solid *solid;
     pal_cell_operator op;
-    uint64_t sampled;     /* revision of the solid for which constants hold */
+    uint64_t sampled;            /* revision of the solid for which constants hold */
     pal_force_cache force_cache; /* made by cell_elastic for PAL_CELL_POLAR under an implicit solver */
     pal_cell_recovery recovery;
     pal_cell_volume volume;
@@ -131,7 +133,7 @@ double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d);
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out);
 /* least and largest volume of every element over that at rest, at the 2 x 2 x 2 Gauss points of its cell, to
- * tangle.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
+ * recovery.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
 void pal_cells_corners_make(pal_cells_elastic *c);
 void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
 /* turn [n][9] += Q by the elements' stiffness, mu V, at their nodes */
@@ -155,7 +157,7 @@ typedef struct pal_cell_points {
 /* the same for both operators */
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,
                               pal_cell_points *out);
-/* one number of a Gauss point: what a view shows */
+/* one number at a Gauss point, for display */
 typedef double pal_cell_value(const pal_cell_points *points, int p);
 /* sum [n] += value times volume at the nodes by their shape functions, volume_m3 [n] += volume; all elements */
 void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_cell_value *value, double *sum,
@@ -163,28 +165,32 @@ void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_
 
 /* ---- recovery from inversion (cell_recovery.c) ----
  *
- * Elements with one rotation each have states of balance that are not the body's shape at rest: folded, mirrored, crumpled. Where the volume
- * of an element at one of 8 points falls below 0.05 of that at rest, or rises above 30 of it, it and its neighbours form a region, whose
- * elements are replaced by a spring in space along each edge of their cells:
+ * Elements with one rotation each have states of balance that are not the body's shape at rest: folded, mirrored,
+ * crumpled. Where the volume of an element at one of 8 points falls below 0.05 of that at rest, or rises above 30 of
+ * it, it and its neighbours form a region, whose elements are replaced by a spring in space along each edge of their
+ * cells:
  *
  *     E = s min_G 1/2 sum_ij k |(x_i - x_j) - G (X_i - X_j)|^2,   k = 3 mu V / (n sum of |X_ij|^2 / n),
  *
- * n edges of an element of volume V: the Dirichlet energy of x - G X, one rotation G for a region. For a given G it is convex; at the best
- * one its gradient is the one with G fixed (envelope theorem), so that forces are the exact gradient without resultant or torque, and the
- * balance of the region is X turned by G. A region of more than half of the body takes the rotation of the supports, where they have one.
+ * n edges of an element of volume V: the Dirichlet energy of x - G X, one rotation G for a region. For a given G it is
+ * convex; at the best one its gradient is the one with G fixed (envelope theorem), so that forces are the exact
+ * gradient without resultant or torque, and the balance of the region is X turned by G. A region of more than half of
+ * the body takes the rotation of the supports, where they have one.
  *
- * s <= 1 makes a region begin with no more energy than its elements had. It becomes elements again when none of them is below 0.3 (above 20),
- * they store at most 0.1 mu V, and body and elements then have no more energy than when regions first appeared, or after 120 updates in a
- * row with the body at rest (loads hold it). A region that does not recover takes in its neighbours every 30 updates, unless a lasting load
- * or weight pulls at the body: then s returns to 1, by a quarter every 4 updates, since what hangs by a soft region is drawn out by 1 / s.
- * The stiffening damper takes away what that adds (stiffened_J). Half blocks with all elements in regions are skipped, except for their
- * energies in an update and to linearise. */
+ * s <= 1 makes a region begin with no more energy than its elements had. It becomes elements again when none of them is
+ * below 0.3 (above 20), they store at most 0.1 mu V, and body and elements then have no more energy than when regions
+ * first appeared, or after 120 updates in a row with the body at rest (loads hold it). A region that does not recover
+ * takes in its neighbours every 30 updates, unless a lasting load or weight pulls at the body: then s returns to 1, by
+ * a quarter every 4 updates, since what hangs by a soft region is drawn out by 1 / s. The stiffening damper takes away
+ * what that adds (stiffened_J). Half blocks with all elements in regions are skipped, except for their energies in an
+ * update and to linearise. */
 /* MEMORY */
 pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *arena, pal_cell_recovery *out);
 /* constants for changed samples */
 void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c);
 void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c);
-/* Examines all elements; loaded: a lasting load pulls at the body. True: the elements in regions, or the s of one, have changed. No heap */
+/* Examines all elements; loaded: a lasting load pulls at the body. True: the elements in regions, or the s of one, have
+ * changed. No heap */
 bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, bool loaded);
 
 /* of all regions, at nodes d: energy, J; forces are added to f [n_node][3] where it is not NULL */

@@ -1,4 +1,4 @@
-/* Packing of a body's active points, and FORCE rows on them. */
+/* Packing of a body's active dofs, and FORCE components on them. */
 #include "server/sim/surface/active_nodes.h"
 
 #include "server/base/clock.h"
