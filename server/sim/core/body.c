@@ -50,7 +50,7 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     return PAL_ERR_OK;
 }
 
-pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
+pal_err pal_body_allocate_interpolated(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
 {
     size_t n3 = 3 * (size_t)rows->n_row;
     PAL_TRY(pal_body_allocate(body, arena, rows->n_point));

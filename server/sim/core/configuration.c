@@ -289,8 +289,8 @@ static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prep
 {
     pal_loose_components parts;
     uint8_t *fixed = calloc((size_t)mesh->tets.n_node, sizeof *fixed);
-    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
-    pal_body_def_hold(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
+    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find the fixed nodes");
+    pal_body_def_mark_fixed(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
     pal_err err = pal_loose_components_drop(body->name, fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;

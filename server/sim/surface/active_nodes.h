@@ -1,6 +1,6 @@
-/* The active dofs of a body packed in the order of the active list: what a solver that assembles forces several times in a sub-step
- * advances, and what components with compute_forces work on. Only files compiled with the room's options include this (simd.h).
- * Memory from the arena. Thread: make [load], then [sim]. */
+/* The active dofs of a body packed in the order of the active list: what a solver that assembles forces several times
+ * in a sub-step advances, and what components with compute_forces work on. Only files compiled with the room's options
+ * include this (simd.h). Memory from the arena. Thread: make [load], then [sim]. */
 #ifndef PAL_SIM_SURFACE_ACTIVE_NODES_H
 #define PAL_SIM_SURFACE_ACTIVE_NODES_H
 #include "server/sim/core/effect.h"
@@ -25,7 +25,7 @@ PAL_INLINE pal_v8 pal_v8_join(pal_quad first, pal_quad second)
     return __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-/* makes body->pack unless there is one; MEMORY. [load] */
+/* makes body->active_nodes unless there is one; MEMORY. [load] */
 pal_err pal_active_nodes_make(pal_body *body, pal_arena *arena);
 /* xv and rest from the body's x, v, x_rest and mass_kg */
 void pal_active_nodes_load(const pal_body *body);

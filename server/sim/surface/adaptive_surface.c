@@ -29,9 +29,9 @@ enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 static pal_err check_options(const pal_adaptive_options *o, pal_diagnostic *diag)
 {
     if (!(o->mass_kg > 0) || !isfinite(o->mass_kg))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "shell: a mass of %g kg", o->mass_kg);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: a mass of %g kg", o->mass_kg);
     if (o->n_level >= 1 && (o->start_level < 0 || o->start_level >= o->n_level))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "shell: start level %d, there are levels 0 to %d",
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: start level %d, there are levels 0 to %d",
                                   o->start_level, o->n_level - 1);
     return PAL_ERR_OK;
 }
@@ -129,7 +129,7 @@ static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t
 {
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
-        "shell: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
+        "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
         "surface",
         n_level, what, (double)n_byte / MEBI, (double)budget / MEBI);
 }
@@ -175,7 +175,7 @@ pal_err pal_adaptive_check_bytes(const pal_adaptive_surface *adaptive, size_t n_
 {
     const pal_adaptive_options *o = &adaptive->options;
     if (n_byte <= o->budget_byte) return PAL_ERR_OK;
-    return refuse_bytes(o->n_level, "with rows, tools and what is shown ", n_byte, o->budget_byte, diag);
+    return refuse_bytes(o->n_level, "with components, tools and display ", n_byte, o->budget_byte, diag);
 }
 
 /* ---- splitting ---- */
