@@ -97,7 +97,7 @@ static unsigned recover(void *self, pal_step *step)
     const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, is_loaded(step));
     if (changed) pal_force_cache_invalidate(&row->force_cache);
     if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
-    const unsigned now = row->recovery.still ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
+    const unsigned now = row->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
     return (row->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 

@@ -404,10 +404,10 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
 {
     double fixed[9];
     int n_free = 0;
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int i = 0; i < t->n_node; i++) n_free += !body->support[i];
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = led && 2 * t->of[p].n > n_free;
+        t->of[p].fixed = has_rotation && 2 * t->of[p].n > n_free;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     t->k_J = r->of[PAL_SPRING_DISTANCE]->spring.k_J;
@@ -428,9 +428,9 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
 static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
     double fixed[9];
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = t->of[p].fixed && led;
+        t->of[p].fixed = t->of[p].fixed && has_rotation;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     if (edges->spring.k_J == t->k_J) return;

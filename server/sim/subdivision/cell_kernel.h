@@ -86,9 +86,9 @@ typedef struct pal_cell_recovery {
     int n_region, n_recovering;                /* regions, elements in them                                  */
     double first_J;     /* of motion and elements when regions first appeared: the bound for leaving */
     double stiffened_J; /* at the last update, of regions whose s has grown                           */
-    bool still;  /* the body's motion has next to no energy                                                     */
-    bool off;    /* for one linearisation at rest: all elements act                               */
-    bool weighs; /* an update needs the energies of elements in regions too                       */
+    bool at_rest; /* the body's motion has next to no energy                                                     */
+    bool off;     /* for one linearisation at rest: all elements act                               */
+    bool weighs;  /* an update needs the energies of elements in regions too                       */
     uint64_t n_inversion, n_change; /* updates with regions, changes of their elements; not yet reported       */
 } pal_cell_recovery;
 

@@ -230,14 +230,14 @@ static double whole(const pal_cell_recovery *t, double kinetic_J)
 }
 
 /* which regions become elements again; true: some do */
-static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool still)
+static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool at_rest)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
         pal_cell_region *region = &t->of[p];
         const double rise = region->element_J - region->region_J;
         region->age++;
-        region->loose = region->bad || !still ? 0 : region->loose + 1;
+        region->loose = region->bad || !at_rest ? 0 : region->loose + 1;
         const bool fits = rise <= spare_J && region->element_J <= calm * region->shear_J;
         if (region->bad || (!fits && region->loose < LEAVE_UPDATES)) continue;
         spare_J -= rise;
@@ -321,11 +321,11 @@ static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
 static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
 {
     double fixed[9];
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int cell = 0; cell < t->n_cell; cell++)
         if (t->region[cell] >= 0) t->of[t->region[cell]].n++;
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = led && 2 * t->of[p].n > t->n_cell;
+        t->of[p].fixed = has_rotation && 2 * t->of[p].n > t->n_cell;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     weigh(t, c, body->d);
@@ -379,8 +379,8 @@ bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const 
     memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_region);
     const bool first = t->n_region == 0;
     const double kinetic_J = pal_body_kinetic_J(body);
-    t->still = kinetic_J < PAL_REGION_REST_SHARE * regions(t);
-    bool changed = leave(t, first ? 0 : t->first_J - whole(t, kinetic_J), leave_share[c->op], t->still);
+    t->at_rest = kinetic_J < PAL_REGION_REST_SHARE * regions(t);
+    bool changed = leave(t, first ? 0 : t->first_J - whole(t, kinetic_J), leave_share[c->op], t->at_rest);
     memcpy(t->before, t->region, sizeof *t->region * (size_t)t->n_cell);
     changed |= enter(t, c->solid, loaded);
     if (changed && c->volume.n > 0) enter_whole_cells(t, c);

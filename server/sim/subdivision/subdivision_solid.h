@@ -1,5 +1,6 @@
-/* A subdivision solid as finite elements (paper A 3.1, 3.4): the cells after subdivision, their elements, the interpolation d = A p, and the
- * material as samples at the Gauss points, so that it may vary continuously within an element.
+/* A subdivision solid as finite elements (paper A 3.1, 3.4): the cells after subdivision, their elements, the
+ * interpolation d = A p, and the material as samples at the Gauss points, so that it may vary continuously within an
+ * element.
  *
  * Nodes are the vertices of the subdivided cells, then the virtual nodes in the middle of cells that are no hexahedra.
  * A cubic element's nodes are control points of its spline: its material passes near them, not through them.
