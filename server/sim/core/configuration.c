@@ -466,7 +466,7 @@ static pal_err change(const pal_scene *from, const pal_configuration *now, const
     return pal_scene_check(&set->scene, diag);
 }
 
-pal_err pal_configuration_check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag)
+static pal_err check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag)
 {
     if (body < 0 || body >= from->n_body)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d: the scene has %d", body, from->n_body);
@@ -486,7 +486,7 @@ pal_err pal_configuration_make(const pal_scene *from, int body, const pal_config
 {
     pal_configuration now;
     *out = NULL;
-    PAL_TRY(pal_configuration_check(from, body, to, diag));
+    PAL_TRY(check(from, body, to, diag));
     pal_configured_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
     set->scene = *from;
@@ -530,7 +530,7 @@ void pal_configured_scene_free(pal_configured_scene *set)
 pal_err pal_configuration_check_live(const pal_scene *scene, int body, const pal_configuration *to,
                                      pal_diagnostic *diag)
 {
-    PAL_TRY(pal_configuration_check(scene, body, to, diag));
+    PAL_TRY(check(scene, body, to, diag));
     double n_node = pal_configuration_estimate_nodes(scene, body, to);
     if (n_node <= PAL_CONFIGURATION_LIVE_NODES) return PAL_ERR_OK;
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
