@@ -1,9 +1,9 @@
 /* An adaptive surface of mass points: which part of its levels is active, its springs and masses, what is drawn
  * (C, spatial adaptation and adjustment of physical properties).
  *
- * Every face of mesh/levels.h is absent, a leaf or split; the leaves tile the surface. Splitting a leaf makes its four
- * children leaves; joining undoes it. Two leaves with a common edge differ by one level at most (2:1). From that state
- * everything else follows, and only from it, so that a state that comes back brings back every bit:
+ * Every face of mesh/geometry/levels.h is absent, a leaf or split; the leaves tile the surface. Splitting a leaf makes
+ * its four children leaves; joining undoes it. Two leaves with a common edge differ by one level at most (2:1). From
+ * that state everything else follows, and only from it, so that a state that comes back brings back every bit:
  *
  *   nodes     vertices of level 0 and the midpoints of edges beside a split face. All others stand at x_rest with v, f,
  *             load and mass 0
