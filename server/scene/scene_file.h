@@ -17,7 +17,7 @@
  *     "largest": true,                                     keep only the largest of its components: what is joined by
  *                                                          faces. Without it components without support are dropped
  *                                                          below 1 % of the largest one and refused above, unless
- *                                                          nothing of the body is held (mesh/loose_components.h)
+ *                                                          nothing of the body is held (mesh/volume/loose_components.h)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "regions": [                                         other materials in parts of the body, at most 32; what a
  *                                                          region does not give is the body's; later ones win. Springs
@@ -143,9 +143,9 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
  * pal_cell_file_load */
 pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                              pal_diagnostic *diag);
-/* our own procedural organ as a scene, for when nothing else can be had; or the shapes of mesh/stomach.h: a stomach
- * held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m on anchors fixed in space, a sheet of 17 x 17
- * vertices and 0.2 m held at its border. REFUSED: there is no such shape */
+/* our own procedural organ as a scene, for when nothing else can be had; or the shapes of mesh/geometry/stomach.h: a
+ * stomach held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m on anchors fixed in space, a sheet of
+ * 17 x 17 vertices and 0.2 m held at its border. REFUSED: there is no such shape */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_diagnostic *diag);
 /* writes DIR/scene.json, DIR/NAME.palmesh (NAME.palcells) for every body and NAME_regionK.nii for every label region,
