@@ -134,9 +134,9 @@ if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
     step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
-    step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
-    step "a solid is sculpted in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
-    step "what accuracy costs in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
+    step "an adaptive surface in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
+    step "sculpting in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
+    step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with sanitizers"
     wait

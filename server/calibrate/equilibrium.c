@@ -85,7 +85,7 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
     if (!out->x_rest || !out->fixed) return PAL_ERR_MEMORY;
     memcpy(out->x_rest, body->x_rest, 3 * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
-        out->fixed[i] = body->fixed[i] != 0;
+        out->fixed[i] = body->support[i] != PAL_FREE;
         out->n_free += !out->fixed[i];
     }
     for (int r = 0; r < pal_world_component_count(world); r++) {

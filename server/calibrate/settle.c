@@ -29,7 +29,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
     double force = 0, mass = 0;
     for (int i = 0; i < body->n_dof; i++) {
         force += pal_norm3(force_N + 3 * i);
-        if (!body->fixed[i]) mass += body->mass_kg[i];
+        if (!body->support[i]) mass += body->mass_kg[i];
     }
     return force / mass;
 }
@@ -40,7 +40,7 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
     double v_most = 0, v_sum = 0, a_most = 0, a_sum = 0, u_most = 0;
     int n = 0;
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         const double *v = body->v + 3 * i, *f = body->f + 3 * i;
         double a[3], speed = pal_norm3(v);
         for (int c = 0; c < 3; c++) a[c] = f[c] / body->mass_kg[i] - damping_1_s * v[c];

@@ -193,7 +193,7 @@ static bool take_loads(const pal_body *body, const pal_estimate_state *state, do
 {
     double sum = 0;
     for (int i = 0; i < 3 * state->n_node; i++) {
-        out[i] = body->fixed[i / 3] ? 0 : state->borne[i];
+        out[i] = body->support[i / 3] ? 0 : state->borne[i];
         sum += out[i] * out[i];
     }
     for (int i = 0; i < 3 * state->n_node && sum > 0; i++) out[i] /= sqrt(sum);

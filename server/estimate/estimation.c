@@ -64,7 +64,7 @@ static pal_err set_state(const pal_estimation *w, pal_world *world)
     memcpy(body->x, s->x, 3 * sizeof(double) * (size_t)body->n_dof);
     memcpy(body->v, s->v, 3 * sizeof(double) * (size_t)body->n_dof);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
+        if (body->support[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
     body->frozen = false;
     pal_world_invalidate_limits(world, 0);
     return PAL_ERR_OK;
@@ -151,7 +151,7 @@ static bool find_borne(pal_estimation *w)
     if (pal_world_assemble_forces(w->live, 0)) return false;
     memcpy(s->borne, s->load, 3 * sizeof(double) * (size_t)s->n_node);
     for (int i = 0; i < s->n_node; i++)
-        if (!body->fixed[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
+        if (!body->support[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
     return true;
 }
 

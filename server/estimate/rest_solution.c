@@ -378,7 +378,8 @@ static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, 
     /* from scratch after a failure, else from where it was */
     if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
     for (int i = 0; i < own->n_node && r->n_near == 0; i++)
-        if (from || own->fixed[i]) pal_copy3(own->x + 3 * i, from && !own->fixed[i] ? from + 3 * i : state->x + 3 * i);
+        if (from || own->support[i])
+            pal_copy3(own->x + 3 * i, from && !own->support[i] ? from + 3 * i : state->x + 3 * i);
     memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
     pal_world_invalidate_limits(r->world, 0);
     return put_loads(r, state, part);
@@ -389,7 +390,7 @@ static bool nothing_acts(const pal_rest_solution *r, double young_Pa)
     const pal_body *own = pal_world_view_body(r->world, 0);
     double sum = 0, most = nothing_left * young_Pa * own->edge_m * own->edge_m;
     for (int i = 0; i < own->n_dof; i++)
-        if (!own->fixed[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
+        if (!own->support[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
     return sum <= most * most * own->n_dof;
 }
 
@@ -441,7 +442,7 @@ static double pressed_J(const pal_estimate_state *s, const pal_body *body, const
         double u[3], touch[3];
         pal_sub3(u, x + 3 * (size_t)i, body->node_rest + 3 * (size_t)i);
         touch_at(s, i, touch);
-        if (!body->fixed[i]) sum += pal_dot3(touch, u);
+        if (!body->support[i]) sum += pal_dot3(touch, u);
     }
     return sum;
 }

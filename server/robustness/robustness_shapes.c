@@ -46,7 +46,7 @@ static void spoil(pal_trial *trial, int b, shape how)
     int flat = thinnest(low, high);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (!body->fixed[i]) insult_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
+        if (!body->support[i]) insult_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
     }
 }
 
@@ -212,7 +212,7 @@ static void long_steps(pal_trial *trial, double times, int n)
         pal_trial_box(trial, b, low, high);
         for (int k = 0; k < body->n_active; k++) {
             size_t i = (size_t)pal_body_point(body, k);
-            if (body->fixed[i]) continue;
+            if (body->support[i]) continue;
             /* a blow that grows with the height */
             double height = 0, all = 1e-300;
             for (int c = 0; c < 3; c++) {

@@ -282,7 +282,7 @@ void pal_robustness_supports(pal_trial *trial)
         return;
     }
     for (int b = 0; b < trial->scene->n_body; b++)
-        if (pal_world_body(trial->world, b)->adaptive) {
+        if (pal_world_body(trial->world, b)->active) {
             pal_trial_skip(trial, "a surface that adapts begins at rest when its scene changes");
             return;
         }

@@ -142,13 +142,13 @@ double pal_trial_random(pal_trial *trial)
 /* points that are there in every state of a body: of one that adapts those of its coarsest level */
 static int common_points(const pal_body *body)
 {
-    return body->adaptive ? body->adaptive->levels.n_vertex[0] : body->n_dof;
+    return body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
 }
 
 static bool is_free(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) return false;
+        if (body->support[i]) return false;
     return true;
 }
 
@@ -305,7 +305,7 @@ int pal_trial_far_node(const pal_trial *trial, int b)
     double from[3] = {0, 0, 0}, most = -1;
     int n = 0, far = pal_body_point(body, 0);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
+        if (body->support[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
     for (int k = 0; k < pal_body_nodes(body) && n == 0; k++)
         pal_axpy3(from, 1.0 / pal_body_nodes(body), body->node_rest + 3 * (size_t)pal_body_point(body, k));
     if (n > 0) pal_scale3(from, 1.0 / n, from);
@@ -578,7 +578,7 @@ static void look_at_rows(pal_trial *trial)
             if (info.body == pal_world_body(trial->world, b)->name) trial->body = b, first = false;
         trial->touches = true;
     }
-    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->adaptive != NULL;
+    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->active != NULL;
 }
 
 static pal_err open_rig(pal_trial *trial, const pal_scene *scene)

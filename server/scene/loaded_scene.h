@@ -3,7 +3,7 @@
 #ifndef PAL_SCENE_LOADED_SCENE_H
 #define PAL_SCENE_LOADED_SCENE_H
 #include "server/mesh/geometry/levels.h"
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 #include "server/sim/core/definition.h"
 
 /* what a region borrows */
@@ -17,10 +17,10 @@ typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
-    pal_cells cells[PAL_BODY_MAX];       /* control cells about the body's origin; of another model none   */
-    pal_stroke *stroke[PAL_BODY_MAX];    /* what a body's strokes borrow, from malloc; NULL: none          */
-    double *spring_grid[PAL_BODY_MAX];   /* what a body's spring_grid borrows, from malloc; NULL: none */
-    pal_loose_parts loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
+    pal_cells cells[PAL_BODY_MAX];            /* control cells about the body's origin; of another model none   */
+    pal_stroke *stroke[PAL_BODY_MAX];         /* what a body's strokes borrow, from malloc; NULL: none          */
+    double *spring_grid[PAL_BODY_MAX];        /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_loose_components loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
     int n_mesh;
 } pal_loaded_scene;
 

@@ -17,7 +17,7 @@
  *     "largest": true,                                     keep only the largest of its components: what is joined by
  *                                                          faces. Without it components without support are dropped
  *                                                          below 1 % of the largest one and refused above, unless
- *                                                          nothing of the body is held (mesh/loose_parts.h)
+ *                                                          nothing of the body is held (mesh/loose_components.h)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "regions": [                                         other materials in parts of the body, at most 32; what a
  *                                                          region does not give is the body's; later ones win. Springs

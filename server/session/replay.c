@@ -2,7 +2,7 @@
  * and the record takes effect, exactly as in the session that wrote it. */
 #include "server/session/replay.h"
 
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/session/input_log.h"
 
 #include <stdlib.h>

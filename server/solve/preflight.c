@@ -6,8 +6,6 @@
 #include "server/num/conjugate_gradient.h"
 #include "server/num/lanczos.h"
 #include "server/sim/springs/spring_constraint.h"
-#include "server/sim/subdivision/subdivision_solid.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -78,10 +76,8 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
 static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
     const pal_tets *tets = body->interpolation ? NULL : body->tets;
-    const int n = tets ? 4 : 3, n_simplex = tets             ? tets->n_tet
-                                            : body->adaptive ? body->adaptive->levels.first_face[1]
-                                                             : 0;
-    const int32_t *simplex = tets ? tets->tet : body->adaptive ? body->adaptive->levels.face : NULL;
+    const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->active ? body->dofs.levels->first_face[1] : 0;
+    const int32_t *simplex = tets ? tets->tet : body->active ? body->dofs.levels->face : NULL;
     for (int e = 0; e < n_simplex; e++) {
         const int32_t *corner = simplex + (size_t)n * (size_t)e;
         double mean2, at[3];
@@ -98,9 +94,9 @@ static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_b
         middle(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
         if ((double)body->fill[e] < min_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
     }
-    out->n_element = body->element ? body->n_element
-                     : body->solid ? pal_cell_elements_count(&body->solid->elements)
-                                   : n_simplex;
+    out->n_element = body->element         ? body->n_element
+                     : body->dofs.n_clique ? pal_dofs_element_count(&body->dofs)
+                                           : n_simplex;
 }
 
 static void look_at_masses(const pal_body *body, pal_preflight_body *out)
@@ -109,8 +105,8 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        out->n_fixed += body->fixed[i] != 0;
-        if (!body->fixed[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+        out->n_fixed += body->support[i] != 0;
+        if (!body->support[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
@@ -125,7 +121,7 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
         if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (body->fixed[i] || !(bound[i] > most * body->mass_kg[i])) continue;
+        if (body->support[i] || !(bound[i] > most * body->mass_kg[i])) continue;
         most = bound[i] / body->mass_kg[i];
         out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
         pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
@@ -164,7 +160,7 @@ static void apply(void *user, const double *v, double *out)
     force_at(p, v, -way, p->low);
     force_at(p, v, way, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
-        bool moves = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3];
+        bool moves = body->mass_kg[i / 3] > 0 && !body->support[i / 3];
         out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
     }
 }
@@ -179,7 +175,7 @@ static bool over_mass(void *user, const double *b, double *out)
 {
     const pal_body *body = ((const probe *)user)->body;
     for (int i = 0; i < 3 * body->n_dof; i++)
-        out[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
+        out[i] = body->mass_kg[i / 3] > 0 && !body->support[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
     return true;
 }
 
@@ -205,7 +201,7 @@ static double fast(probe *p, double *room)
     uint64_t seed = 7;
     for (int i = 0; i < n; i++) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
-        l.z[i] = body->fixed[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
+        l.z[i] = body->support[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
     }
     (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
     free(basis);
@@ -230,7 +226,7 @@ static double slow(probe *p, double *room)
         double uf = 0, uu = 0;
         for (size_t i = 0; i < n; i++) {
             u[i] = 0;
-            b[i] = cg.r[i] = i % 3 == axis && !body->fixed[i / 3] ? body->mass_kg[i / 3] : 0;
+            b[i] = cg.r[i] = i % 3 == axis && !body->support[i / 3] ? body->mass_kg[i / 3] : 0;
         }
         (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
         /* u'Ku = u'(b - r) */
@@ -266,8 +262,8 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
  */
 static double component_ns(const pal_body *body, const char *name)
 {
-    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->adaptive ? body->adaptive->n_spring : 0;
-    const double n_cell = body->solid ? pal_cell_elements_count(&body->solid->elements) : 0;
+    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->dofs.n_spring;
+    const double n_cell = pal_dofs_element_count(&body->dofs);
     const struct {
         const char *name;
         double ns;

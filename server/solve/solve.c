@@ -189,7 +189,7 @@ static void move_supports(const job *j, double share)
     pal_body *b = j->s->body;
     for (int i = 0; i < b->n_node; i++) {
         double x[3];
-        if (!b->fixed[i]) continue;
+        if (!b->support[i]) continue;
         pal_add3(x, b->x_rest + 3 * i, j->s->mesh.tets.origin_m);
         for (int k = 0; k < j->problem->n_support; k++)
             if (pal_box_contains(&j->problem->support[k].region, x, pal_case_tolerance_m(&j->s->mesh.tets))) {
@@ -265,7 +265,7 @@ static void sum_up(const job *j)
         pal_sub3(u, b->x + 3 * i, b->x_rest + 3 * i);
         r->max_m = fmax(r->max_m, pal_norm3(u));
         r->work_J += b->external_force ? pal_dot3(b->external_force + 3 * i, u) : 0;
-        if (b->fixed[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
+        if (b->support[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
     }
     r->energy_J = pal_world_energy_J(j->s->world);
 }
@@ -302,7 +302,7 @@ static pal_err prepare(const job *j, const pal_surface *surface)
     j->result->n_element = b->n_element;
     j->result->edge_m = b->edge_m;
     j->result->volume_m3 = volume_of(s);
-    for (int i = 0; i < b->n_node; i++) j->result->n_fixed += b->fixed[i] != 0;
+    for (int i = 0; i < b->n_node; i++) j->result->n_fixed += b->support[i] != 0;
     j->result->n_dof = 3 * (b->n_node - j->result->n_fixed);
     pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
     return err ? pal_diagnostic_set(j->diag, err, "no memory to find points in the mesh") : PAL_ERR_OK;

@@ -37,7 +37,7 @@ static pal_err choose_places(const pal_study_job *job, const pal_study_world *w,
     for (int i = 0; i < job->n_probe; i++) {
         far[i] = INFINITY;
         for (int k = 0; k < w->body->n_dof; k++)
-            if (w->body->fixed[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
+            if (w->body->support[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
     }
     for (int p = 0; p < PRESSES; p++) {
         out[p] = 0;
@@ -169,7 +169,7 @@ pal_err pal_study_presses(pal_study_job *job)
     int place[PRESSES], n_fixed = 0;
     double low[3];
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
-    for (int i = 0; i < w.body->n_dof; i++) n_fixed += w.body->fixed[i] != 0;
+    for (int i = 0; i < w.body->n_dof; i++) n_fixed += w.body->support[i] != 0;
     pal_err err = PAL_ERR_OK;
     if (n_fixed == 0 && !job->adaptive)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",

@@ -57,7 +57,7 @@ static inline double told(const mem_client *c, const char *key)
 
 static inline const char *trouble(const mem_client *c)
 {
-    return c->last[PAL_CONTROL_ERROR].problem.text;
+    return c->last[PAL_CONTROL_ERROR].error.text;
 }
 
 /* waits for a frame of the epoch that the client has */

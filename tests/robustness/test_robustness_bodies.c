@@ -29,7 +29,7 @@ static void three_make(fem_beam *b, bool springs)
     for (int k = 0; k < 3; k++) {
         pal_body *body = pal_world_body(b->world, k);
         for (int i = 0; i < body->n_dof; i++)
-            if (!body->fixed[i]) body->v[3 * i + 2] = 0.2 * body->x[3 * i] / b->length_m;
+            if (!body->support[i]) body->v[3 * i + 2] = 0.2 * body->x[3 * i] / b->length_m;
     }
 }
 
@@ -45,7 +45,7 @@ static void throw_away(pal_world *world, int which)
 {
     pal_body *body = pal_world_body(world, which);
     for (int i = 0; i < body->n_dof; i++)
-        if (!body->fixed[i]) body->x[3 * i] += 100 * body->length_scale_m;
+        if (!body->support[i]) body->x[3 * i] += 100 * body->length_scale_m;
     pal_world_invalidate_limits(world, which);
 }
 

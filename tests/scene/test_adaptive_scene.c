@@ -214,7 +214,7 @@ static pal_world *world_of(const pal_scene *scene)
 static int n_fixed(const pal_body *body, int n)
 {
     int fixed = 0;
-    for (int i = 0; i < n; i++) fixed += body->fixed[i] != 0;
+    for (int i = 0; i < n; i++) fixed += body->support[i] != PAL_FREE;
     return fixed;
 }
 
@@ -226,13 +226,13 @@ static void a_stomach_is_held_at_both_ends_with_the_midpoints_between(void)
     pal_world *world = world_of(&loaded->scene);
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
-    const pal_levels *levels = &body->adaptive->levels;
+    const pal_levels *levels = &body->model.adaptive->levels;
     CHECK_INT(n_fixed(body, PAL_STOMACH_VERTEX), 2 * (PAL_STOMACH_RING + 1));
-    for (int k = 0; k < PAL_STOMACH_RING; k++) CHECK(body->fixed[s.oesophagus[k]] && body->fixed[s.duodenum[k]]);
-    CHECK(body->fixed[s.oesophagus_cap] && body->fixed[s.duodenum_cap]);
+    for (int k = 0; k < PAL_STOMACH_RING; k++) CHECK(body->support[s.oesophagus[k]] && body->support[s.duodenum[k]]);
+    CHECK(body->support[s.oesophagus_cap] && body->support[s.duodenum_cap]);
     for (int32_t e = 0; e < levels->first_edge[1]; e++) {
         const int32_t *end = levels->edge[e].vertex;
-        if (body->fixed[end[0]] && body->fixed[end[1]]) CHECK(body->fixed[pal_levels_edge_midpoint(levels, e)]);
+        if (body->support[end[0]] && body->support[end[1]]) CHECK(body->support[pal_levels_edge_midpoint(levels, e)]);
     }
     pal_stomach_free(&s);
     pal_world_destroy(world);
@@ -343,7 +343,7 @@ static void every_key_of_the_model_arrives(void)
     REQUIRE(write_text("x.obj", tube));
     CHECK_TEXT(try_text(text, &loaded, &world), "");
     REQUIRE(world != NULL);
-    const pal_adaptive_surface *surface = pal_world_body(world, 0)->adaptive;
+    const pal_adaptive_surface *surface = pal_world_body(world, 0)->model.adaptive;
     CHECK_INT(surface->levels.n_level, 3);
     CHECK_INT(surface->options.start_level, 1);
     CHECK_NEAR(surface->options.mass_kg, 0.25, 0);

@@ -150,7 +150,7 @@ static void every_bad_body_has_its_sentence(void)
         {"{\"bodies\": [{\"material\": []}]}", "bodies[0].material: is not an object"},
         {"{\"bodies\": [{\"material\": {\"E\": 1}}]}", "bodies[0].material.E: unknown key; known are young_Pa"},
         {"{\"bodies\": [{\"material\": {\"young_Pa\": 0}}]}", "bodies[0].material.young_Pa: 0 is outside"},
-        {"{\"bodies\": [{\"material\": {\"young_Pa\": 1e13}}]}", "bodies[0].material.young_Pa: 1e+13 is outside"},
+        {"{\"bodies\": [{\"material\": {\"young_Pa\": 1e16}}]}", "bodies[0].material.young_Pa: 1e+16 is outside"},
         {"{\"bodies\": [{\"material\": {\"poisson\": 0.6}}]}", "bodies[0].material.poisson: 0.6 is outside"},
         {"{\"bodies\": [{\"material\": {\"density_kg_m3\": -1}}]}", "bodies[0].material.density_kg_m3: -1 is outside"},
         {"{\"bodies\": [{\"material\": {\"damping_1_s\": true}}]}", "bodies[0].material.damping_1_s: is not a number"},

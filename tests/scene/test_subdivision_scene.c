@@ -317,10 +317,10 @@ static void a_scene_of_cells_steps(void)
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
     int n_fixed = 0;
-    for (int i = 0; i < body->n_dof; i++) n_fixed += body->fixed[i];
+    for (int i = 0; i < body->n_dof; i++) n_fixed += body->support[i];
     CHECK_INT(body->n_dof, 36);
     CHECK_INT(n_fixed, 9);
-    CHECK_INT(pal_cell_elements_count(&body->solid->elements), 96);
+    CHECK_INT(pal_cell_elements_count(&body->model.solid->elements), 96);
     for (int k = 0; k < 10; k++) CHECK_INT(pal_world_step(world, 0.01), 0);
     CHECK(pal_body_finite(body));
     /* gravity is on by default */

@@ -276,14 +276,14 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
 {
     studio s;
     REQUIRE(studio_open(&s));
-    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid);
-    double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->solid);
+    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid);
+    double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->model.solid);
     CHECK_NEAR(kg, 1000 * litre, 1e-9 * kg);
     /* a hard brush over all of it */
     pal_stroke all = {{0, 0, 0}, 1, 0, 2, 5};
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = all}), 0);
-    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid), 5 * kg, 1e-6 * kg);
-    CHECK_NEAR(pal_world_body(s.world, 0)->solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
+    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid), 5 * kg, 1e-6 * kg);
+    CHECK_NEAR(pal_world_body(s.world, 0)->model.solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
     static const struct {
         pal_stroke stroke;
         const char *says;
@@ -346,7 +346,7 @@ static pal_sculpt any_command(const pal_sculptor *sculptor)
 /* what must hold after every command that was taken */
 static void check_solid(const studio *s)
 {
-    const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->solid;
+    const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->model.solid;
     const pal_body *body = pal_world_body(s->world, 0);
     if (pal_cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
     double kg = pal_subdivision_solid_mass_kg(solid), sum = 0;

@@ -163,7 +163,7 @@ static void what_cannot_run_is_refused_with_the_node_that_is_to_blame(void)
     pal_scene *scene = box_scene(&box, true, false);
     scene->body[0].material.young_Pa = 1e12;
     CHECK_INT(pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &p, &diag), PAL_ERR_BUDGET);
-    CHECK(strstr(diag.text, "most_substep allows 2000") != NULL);
+    CHECK(strstr(diag.text, "max_substep allows 2000") != NULL);
     CHECK(strstr(diag.text, "node ") != NULL && strstr(diag.text, " mm sets it") != NULL);
     free(scene);
     box_free(&box);

@@ -103,7 +103,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
     for (int i = 0; i < 10; i++) hard_random(&seed);
     for (int i = body->n_node - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         if (insult == HARD_PLANE) x[2] = 0.3 * high[2];
         if (insult == HARD_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
         if (insult == HARD_MIRROR) x[0] = high[0] - x[0];
@@ -112,7 +112,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
             for (int c = 0; c < 3; c++) x[c] = low[c] + hard_random(&seed) * (high[c] - low[c]);
         if (insult == HARD_SWAP) {
             int j = (int)(hard_random(&seed) * (i + 1));
-            if (body->fixed[j]) continue;
+            if (body->support[j]) continue;
             double keep[3];
             pal_copy3(keep, x);
             pal_copy3(x, body->x + 3 * j);

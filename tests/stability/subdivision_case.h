@@ -36,13 +36,13 @@ static inline void solid_make(solid_scene *s, const solid_kind *kind, int nx, in
 static inline void solid_kick(solid_scene *s, double speed_m_s, uint64_t seed)
 {
     for (int i = 0; i < 3 * s->body->n_dof; i++)
-        if (!s->body->fixed[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
+        if (!s->body->support[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
 }
 
 /* elements that are turned over or flat in their middle */
 static inline int solid_inverted(const solid_scene *s)
 {
-    const pal_subdivision_solid *solid = s->body->solid;
+    const pal_subdivision_solid *solid = s->body->model.solid;
     const double middle[3] = {0.5, 0.5, 0.5};
     int n = 0;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
@@ -105,7 +105,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
     for (int i = 0; i < 10; i++) solid_random(&seed);
     for (int i = body->n_dof - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         if (insult == SOLID_PLANE) x[2] = 0.3 * high[2];
         if (insult == SOLID_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
         if (insult == SOLID_MIRROR) x[0] = high[0] - x[0];
@@ -115,7 +115,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
         if (insult == SOLID_SWAP) {
             int j = (int)(solid_random(&seed) * (i + 1));
             double keep[3];
-            if (body->fixed[j]) continue;
+            if (body->support[j]) continue;
             pal_copy3(keep, x);
             pal_copy3(x, body->x + 3 * j);
             pal_copy3(body->x + 3 * j, keep);

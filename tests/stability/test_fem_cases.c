@@ -21,7 +21,7 @@ static void long_steps_stay_bounded(void)
             REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2));
             uint64_t seed = 9;
             for (int i = 0; i < 3 * b.body->n_dof; i++)
-                if (!b.body->fixed[i / 3]) b.body->v[i] = 2 * hard_random(&seed) - 0.5;
+                if (!b.body->support[i / 3]) b.body->v[i] = 2 * hard_random(&seed) - 0.5;
             hard_run run;
             hard_steps(&b, times * 60.0 / 60, times / 60.0, &run);
             CHECK(run.finite);

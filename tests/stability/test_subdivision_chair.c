@@ -36,7 +36,7 @@ static void insult(solid_scene *s, int how, uint64_t seed)
         low[i % 3] = fmin(low[i % 3], body->x_rest[i]), high[i % 3] = fmax(high[i % 3], body->x_rest[i]);
     for (int i = 0; i < 3 * body->n_dof; i++) {
         const double l = low[i % 3], h = high[i % 3];
-        if (body->fixed[i / 3]) continue;
+        if (body->support[i / 3]) continue;
         if (how == CHAIR_POINT) body->x[i] = l + 0.3 * (h - l);
         if (how == CHAIR_MIRROR && i % 3 == 0) body->x[i] = l + h - body->x[i];
         if (how == CHAIR_SHUFFLE) body->x[i] = l + (h - l) * solid_random(&seed);

@@ -19,7 +19,6 @@
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -67,15 +66,15 @@ static bool changes(const pal_component *row, int n, double time_s)
 
 static const float *shown_vertex(const pal_body *body, int k)
 {
-    return body->shown + 3 * (size_t)(body->adaptive ? body->active[k] : k);
+    return body->shown + 3 * (size_t)(body->active ? body->active[k] : k);
 }
 
 /* box of what is shown and its longest edge */
 static void measure(sleeper *row, const pal_body *body)
 {
-    const int32_t *tri = body->adaptive ? body->adaptive->tri : body->surface->tri;
-    int n_tri = body->adaptive ? body->adaptive->n_tri : body->surface->n_tri;
-    int n_shown = body->adaptive ? body->n_active : body->n_shown;
+    const int32_t *tri = body->surface->tri;
+    int n_tri = body->surface->n_tri;
+    int n_shown = body->active ? body->n_active : body->n_shown;
     double edge2 = 0;
     for (int c = 0; c < 3; c++) row->low[c] = INFINITY, row->high[c] = -INFINITY;
     for (int k = 0; k < n_shown; k++)
@@ -104,7 +103,7 @@ static bool passes_box(const sleeper *row, const double a[3], const double b[3],
 /* does it come within reach of a vertex? */
 static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
 {
-    int n_shown = body->adaptive ? body->n_active : body->n_shown;
+    int n_shown = body->active ? body->n_active : body->n_shown;
     double way[3], reach2 = reach * reach;
     pal_sub3(way, b, a);
     double way2 = pal_dot3(way, way);
@@ -152,7 +151,7 @@ static bool balanced(const sleeper *row, pal_step *step)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         mass += body->mass_kg[i];
-        if (!body->fixed[i]) force += pal_norm3(body->g + 3 * (size_t)i);
+        if (!body->support[i]) force += pal_norm3(body->g + 3 * (size_t)i);
     }
     return force <= row->rest_1_s2 * body->length_scale_m * mass;
 }

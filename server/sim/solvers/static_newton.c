@@ -41,7 +41,6 @@
 #include "server/sim/core/effect_list.h"
 #include "server/sim/implicit/compliance.h"
 #include "server/sim/implicit/inertia_relief.h"
-#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <limits.h>
 #include <string.h>
@@ -66,7 +65,7 @@ typedef struct static_newton {
     double *now, *low;           /* work space of the true stiffness [n_dof][3] */
     double *inertia;             /* what balances the loads; NULL: no relief              [n_dof][3] */
     double *node_displacement_m; /* the way of nodes carried by points; NULL: none        [n_node][3] */
-    uint64_t sampled;            /* of body->solid, at the factor                 */
+    uint64_t sampled;            /* pal_dofs_material_revision(&body->dofs) at the factor   */
     double shift_1_s2;           /* eps                                           */
     bool has_factor, stale;      /* a factor is there; it is not worth its while  */
     bool eager;                  /* nor was it in the iteration after its own: one is made in every iteration */
@@ -148,7 +147,7 @@ static void multiply_true(void *user, const double *p, double *out)
     pal_system_true_stiffness(&row->system, row->now, row->low, p, out);
     if (row->system.has_contact) pal_system_multiply_contact(&row->system, 1, 0, p, out);
     for (int i = 0; i < row->cg.n; i++)
-        out[i] = body->fixed[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
+        out[i] = body->support[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
 }
 
 static void precondition(void *user, const double *r, double *z)
@@ -193,7 +192,7 @@ static void probe(static_newton *row)
 {
     const pal_body *body = row->system.body;
     double before = pal_clock_s();
-    row->sampled = body->solid ? body->solid->sampled : 0;
+    row->sampled = pal_dofs_material_revision(&body->dofs);
     pal_interpolated_system_invalidate(row->system.interpolated_system);
     (void)pal_system_probe(&row->system, INT_MAX);
     pal_system_linearise(&row->system);
@@ -270,7 +269,7 @@ static pal_err make_factors(static_newton *row, pal_build *build)
     PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
     PAL_TRY(pal_node_rotations_make(&row->system, build->arena, &row->turns));
     if (row->linear == LINEAR_INCOMPLETE)
-        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->fixed, build->arena, &row->incomplete));
+        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->support, build->arena, &row->incomplete));
     else
         PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
     pal_system_linearise(&row->system);
@@ -358,7 +357,7 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
     }
     for (int i = 0; i < body->n_dof; i++) {
         loads += pal_norm3(row->external_force + 3 * i);
-        if (!body->fixed[i]) continue;
+        if (!body->support[i]) continue;
         reactions += pal_norm3(r + 3 * i);
         pal_set3(r + 3 * i, 0, 0, 0);
     }
@@ -581,7 +580,7 @@ static pal_err solve(static_newton *row, pal_step *step, bool *bad)
         row->report.converged = true;
         return PAL_ERR_OK;
     }
-    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
+    if (row->sampled != pal_dofs_material_revision(&body->dofs)) row->has_factor = false;
     if (row->part == 0) row->part = 1;
     PAL_TRY(find_rest(row, step));
     if (row->answer.door.solve) pal_warp_rotate(&row->answer.warp, &row->turns);
@@ -604,7 +603,7 @@ static pal_err run(void *self, pal_step *step)
     }
     memcpy(row->x0, body->x, bytes3(row));
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->fixed[i])
+        if (body->support[i])
             pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
         else
             pal_set3(body->v + 3 * i, 0, 0, 0);

@@ -118,7 +118,7 @@ static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *are
     memcpy(body->x, l->x, 3 * n * sizeof *body->x);
     s->surface = (pal_surface){.n_vertex = (int)n, .x = s->levels.x, .tri = s->tri};
     pal_copy3(s->surface.origin_m, l->origin_m);
-    body->adaptive = s;
+    body->model.adaptive = s;
     body->surface = &s->surface;
     body->active = s->node;
     body->edge_m = mean_edge(l, s->options.start_level);
@@ -160,6 +160,7 @@ pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options
     pal_adaptive_set_level(s, body, options->start_level);
     pal_adaptive_update(s, body);
     s->n_log = 0;
+    pal_adaptive_fill_dofs(s, body);
     *out = s;
     return PAL_ERR_OK;
 }
@@ -301,7 +302,7 @@ static void place(const pal_adaptive_surface *s, pal_body *body, int32_t e)
     const double *ra = body->x_rest + 3 * (size_t)end[0], *rb = body->x_rest + 3 * (size_t)end[1];
     const double *va = body->v + 3 * (size_t)end[0], *vb = body->v + 3 * (size_t)end[1];
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
-    bool stands = body->fixed[v] == 1, firm[2] = {body->fixed[end[0]] > 0, body->fixed[end[1]] > 0};
+    bool stands = body->support[v] == PAL_FIXED, firm[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
     for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
     /* an edge at rest keeps every bit; a held midpoint goes with its edge only when that is held too, else with the end
      * that is: at rest, or where that was when it was taken hold of */

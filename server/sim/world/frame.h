@@ -7,6 +7,8 @@
 #include "server/sim/core/definition.h"
 #include "server/sim/core/tools.h"
 
+typedef struct pal_world pal_world;
+
 enum { PAL_FRAME_COMPONENT_MAX = 64 };
 
 /* a field in colour; value NULL: not shown */
@@ -73,4 +75,10 @@ typedef struct pal_frame {
     const char *component_name[PAL_FRAME_COMPONENT_MAX]; /* constants; more than at load while fields are shown */
     int component_body[PAL_FRAME_COMPONENT_MAX];         /* whose row it is                                     */
 } pal_frame;
+
+pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
+/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
+ * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
+pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
+void pal_frame_destroy(pal_frame *frame);
 #endif

@@ -120,11 +120,6 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
  * their sum stays. Without memory it bears none. [sim] */
 void pal_world_transfer_loads(pal_world *world, int body, const pal_world *before);
 
-pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
-/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
- * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
-pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
-void pal_frame_destroy(pal_frame *frame);
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
 pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */

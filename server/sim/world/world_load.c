@@ -1,7 +1,7 @@
 /* Lasting loads on nodes, and how much of a load nodes bear. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>
@@ -10,7 +10,7 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
-    if (node < 0 || node >= b->n_node || (b->adaptive && !pal_adaptive_has(b->adaptive, node))) return PAL_ERR_REFUSED;
+    if (node < 0 || node >= b->n_node || (b->active && !pal_dofs_has(&b->dofs, node))) return PAL_ERR_REFUSED;
     if (!b->external_force) b->external_force = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
     if (!b->external_force) return PAL_ERR_MEMORY;
     pal_copy3(b->external_force + 3 * node, force_N);
@@ -46,7 +46,8 @@ static const double least_share = 0.01;
 static bool stays(const pal_body *body)
 {
     bool fixed = false, led = false;
-    for (int i = 0; i < body->n_dof; i++) fixed |= body->fixed[i] == 1, led |= body->fixed[i] == 2;
+    for (int i = 0; i < body->n_dof; i++)
+        fixed |= body->support[i] == PAL_FIXED, led |= body->support[i] == PAL_PRESCRIBED;
     return fixed && !led;
 }
 

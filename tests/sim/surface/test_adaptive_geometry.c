@@ -173,8 +173,8 @@ static void held_midpoints_stand_as_far_from_rest_as_the_ends_that_are_held(void
         thing t = make(SHEET, (pal_adaptive_options){.n_level = 2});
         const pal_levels *l = &t.adaptive->levels;
         const int32_t e = l->face_edge[3 * 20], mid = pal_levels_edge_midpoint(l, e);
-        t.body.fixed[mid] = 1;
-        for (int k = 0; k < n_fixed; k++) t.body.fixed[l->edge[e].vertex[k]] = 1;
+        t.body.support[mid] = 1;
+        for (int k = 0; k < n_fixed; k++) t.body.support[l->edge[e].vertex[k]] = 1;
         for (int i = 0; i < 35; i++) t.body.x[3 * i] += 0.01, t.body.v[3 * i] = 1;
         CHECK_INT(pal_adaptive_split(t.adaptive, &t.body, 20, 0), 1);
         CHECK_NEAR(t.body.x[3 * mid] - t.body.x_rest[3 * mid], n_fixed > 0 ? 0.01 : 0, 1e-15);

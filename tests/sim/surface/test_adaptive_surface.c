@@ -294,7 +294,7 @@ static record record_of(const thing *t)
     record r = {0};
     size_t n = (size_t)b->n_node;
     put(&r, b->x, 24 * n), put(&r, b->v, 24 * n), put(&r, b->f, 24 * n), put(&r, b->load, 24 * n);
-    put(&r, b->mass_kg, 8 * n), put(&r, b->fixed, n);
+    put(&r, b->mass_kg, 8 * n), put(&r, b->support, n);
     put(&r, s->face_state, (size_t)s->levels.first_face[s->levels.n_level]);
     put(&r, s->edge_split, (size_t)s->levels.first_edge[s->levels.n_level]);
     put(&r, s->leaf, 4 * (size_t)s->n_leaf), put(&r, s->spring, 4 * (size_t)s->n_spring);
@@ -480,7 +480,7 @@ static pal_err try_make(const pal_surface *s, pal_adaptive_options o, pal_diagno
     pal_adaptive_surface *adaptive = NULL;
     diag->text[0] = 0;
     pal_err err = pal_adaptive_make(s, &o, &body, arena, diag, &adaptive);
-    if (err && (adaptive || body.adaptive)) CHECK_FAIL("made although refused");
+    if (err && (adaptive || body.model.adaptive)) CHECK_FAIL("made although refused");
     pal_arena_destroy(arena);
     return err;
 }

@@ -1,18 +1,10 @@
-/* Sums of rescues and the sentence of a stopped body. */
-#include "server/sim/core/safeguards.h"
-
+/* Why a body was stopped, in one sentence. */
 #include "server/base/vec3.h"
 #include "server/sim/core/body.h"
 
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-
-uint64_t pal_safeguards_sum(const pal_safeguards *safeguards)
-{
-    return safeguards->n_capped + safeguards->n_clamped + safeguards->n_mass_scaled + safeguards->n_inversion +
-           safeguards->n_search + safeguards->n_tool_reset + safeguards->n_stopped;
-}
 
 /* six times the volume of a tetrahedron, or of the one at the first corner of another element */
 static double volume6(const double *x, const int32_t *corner, int n_corner)

@@ -1,11 +1,11 @@
-// PATCH: tables change as the message says or not at all, hostile bytes are refused, and what a table shows.
+// TOPOLOGY_DELTA: a table changes as the message says or not at all, hostile bytes are refused, visible triangles.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
-import { applyPatch, readPatchHead, shownOf } from "../src/patch_decoder.js";
+import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "../src/topology_delta.js";
 import { activeText } from "../src/plan_list.js";
 import { KIND, MAGIC, WireError } from "../src/wire.js";
 import { hello, part as partInfo } from "./fixtures/messages.js";
@@ -24,20 +24,20 @@ const fold = (d) => ((d << 1) ^ (d >> 31)) >>> 0;
 const planes = (values) => [0, 8, 16, 24].flatMap((shift) => values.map((v) => (v >>> shift) & 255));
 
 /**
- * @param {{part?: number, epoch: number, revision?: number, places: number[], corners: number[]}} patch corners: three for each place
+ * @param {{part?: number, epoch: number, revision?: number, slots: number[], corners: number[]}} delta corners: three for each slot
  * @returns {Uint8Array}
  */
-function writePatch({ part = 0, epoch, revision = 1, places, corners }) {
+function writeDelta({ part = 0, epoch, revision = 1, slots, corners }) {
     const block = literal([
-        ...planes(places.map((p, i) => fold((p - (i ? places[i - 1] : 0)) | 0))),
+        ...planes(slots.map((p, i) => fold((p - (i ? slots[i - 1] : 0)) | 0))),
         ...planes(corners.map((c, e) => fold((c - (e < 3 ? 0 : corners[e - 3])) | 0))),
     ]);
-    const bytes = new Uint8Array(32 + block.length),
-        view = new DataView(bytes.buffer);
+    const bytes = new Uint8Array(32 + block.length);
+    const view = new DataView(bytes.buffer);
     view.setUint32(0, MAGIC, true);
-    view.setUint8(4, KIND.PATCH);
+    view.setUint8(4, KIND.TOPOLOGY_DELTA);
     view.setUint16(6, part, true);
-    [epoch, places.length, revision, 0, 16 * places.length, block.length].forEach((v, i) =>
+    [epoch, slots.length, revision, 0, 16 * slots.length, block.length].forEach((v, i) =>
         view.setUint32(8 + 4 * i, v, true),
     );
     bytes.set(block, 32);
@@ -45,10 +45,10 @@ function writePatch({ part = 0, epoch, revision = 1, places, corners }) {
 }
 
 const N = 300;
-/** a table of 40 places, every fourth taken */
+/** a table of 40 slots, every fourth taken */
 const table = () => Uint32Array.from({ length: 120 }, (_, e) => (e % 12 < 3 ? (7 * e + 1) % N : 0));
 const good = () =>
-    writePatch({ part: 2, epoch: 5, revision: 9, places: [0, 3, 39], corners: [4, 5, 6, 0, 0, 0, 299, 0, 298] });
+    writeDelta({ part: 2, epoch: 5, revision: 9, slots: [0, 3, 39], corners: [4, 5, 6, 0, 0, 0, 299, 0, 298] });
 
 /** numbers below n from a seed @param {number} seed */
 function random(seed) {
@@ -58,10 +58,10 @@ function random(seed) {
     };
 }
 
-test("changes the places it names and no other", () => {
-    const x = table(),
-        head = applyPatch(good(), x, N),
-        wanted = table();
+test("a delta changes the slots it names and no other", () => {
+    const x = table();
+    const head = applyTopologyDelta(good(), x, N);
+    const wanted = table();
     wanted.set([4, 5, 6], 0);
     wanted.set([0, 0, 0], 9);
     wanted.set([299, 0, 298], 117);
@@ -69,46 +69,46 @@ test("changes the places it names and no other", () => {
     assert.deepEqual(head, { part: 2, epoch: 5, n: 3, revision: 9, nRaw: 48 });
 });
 
-test("a thousand random changes give the table they were taken from", () => {
-    const below = random(5),
-        mine = table(),
-        theirs = table();
+test("a thousand random deltas reproduce the table", () => {
+    const below = random(5);
+    const mine = table();
+    const theirs = table();
     for (let k = 0; k < 1000; k++) {
-        const places = [...new Set(Array.from({ length: 1 + below(12) }, () => below(40)))].sort((a, b) => a - b);
-        const corners = places.flatMap(() => (below(3) ? [below(N), below(N), below(N)] : [0, 0, 0]));
-        places.forEach((p, i) => theirs.set(corners.slice(3 * i, 3 * i + 3), 3 * p));
-        applyPatch(writePatch({ epoch: 1, revision: k, places, corners }), mine, N);
+        const slots = [...new Set(Array.from({ length: 1 + below(12) }, () => below(40)))].sort((a, b) => a - b);
+        const corners = slots.flatMap(() => (below(3) ? [below(N), below(N), below(N)] : [0, 0, 0]));
+        slots.forEach((p, i) => theirs.set(corners.slice(3 * i, 3 * i + 3), 3 * p));
+        applyTopologyDelta(writeDelta({ epoch: 1, revision: k, slots, corners }), mine, N);
         assert.deepEqual(mine, theirs);
     }
 });
 
-test("refuses places out of order or of no table, corners of no vertex, and counts that do not fit", () => {
+test("slots out of order or beyond the table, corners that are no vertices, and wrong counts are refused", () => {
     const wrong = [
-        { code: "RANGE", places: [3, 3], corners: [1, 2, 3, 1, 2, 3] }, // twice
-        { code: "RANGE", places: [4, 3], corners: [1, 2, 3, 1, 2, 3] }, // descending
-        { code: "RANGE", places: [40], corners: [1, 2, 3] },
-        { code: "RANGE", places: [-1], corners: [1, 2, 3] },
-        { code: "RANGE", places: [1], corners: [1, 2, N] },
-        { code: "RANGE", places: [1, 2], corners: [1, 2, 3, 1, -1, 3] },
-        { code: "COUNT", places: [], corners: [] },
+        { code: "RANGE", slots: [3, 3], corners: [1, 2, 3, 1, 2, 3] }, // twice
+        { code: "RANGE", slots: [4, 3], corners: [1, 2, 3, 1, 2, 3] }, // descending
+        { code: "RANGE", slots: [40], corners: [1, 2, 3] },
+        { code: "RANGE", slots: [-1], corners: [1, 2, 3] },
+        { code: "RANGE", slots: [1], corners: [1, 2, N] },
+        { code: "RANGE", slots: [1, 2], corners: [1, 2, 3, 1, -1, 3] },
+        { code: "COUNT", slots: [], corners: [] },
         {
             code: "COUNT",
-            places: Array.from({ length: 41 }, (_, i) => i),
+            slots: Array.from({ length: 41 }, (_, i) => i),
             corners: Array.from({ length: 123 }, () => 0),
         },
     ];
-    for (const { code, places, corners } of wrong) {
+    for (const { code, slots, corners } of wrong) {
         const x = table();
         assert.throws(
-            () => applyPatch(writePatch({ epoch: 1, places, corners }), x, N),
+            () => applyTopologyDelta(writeDelta({ epoch: 1, slots, corners }), x, N),
             { code },
-            `${places}: ${corners}`,
+            `${slots}: ${corners}`,
         );
         assert.deepEqual(x, table());
     }
 });
 
-test("refuses wrong kinds, flags, parts, revisions and lengths", () => {
+test("wrong kinds, flags, parts, revisions and lengths are refused", () => {
     for (const [at, value, code] of [
         [0, 0, "MAGIC"],
         [4, 1, "KIND"],
@@ -125,22 +125,22 @@ test("refuses wrong kinds, flags, parts, revisions and lengths", () => {
     ]) {
         const bytes = good();
         bytes[Number(at)] = Number(value);
-        assert.throws(() => readPatchHead(bytes), { code }, `byte ${at}`);
+        assert.throws(() => readTopologyDeltaHead(bytes), { code }, `byte ${at}`);
     }
 });
 
-test("cut, lengthened or changed anywhere it is a refusal that leaves the table, or a table whose corners are vertices", () => {
+test("a damaged delta is refused without a change, or gives a table whose corners are vertices", () => {
     const bytes = good();
     for (let n = 0; n < bytes.length; n++)
-        assert.throws(() => applyPatch(bytes.slice(0, n), table(), N), WireError, `cut to ${n}`);
-    assert.throws(() => applyPatch(new Uint8Array([...bytes, 0]), table(), N), WireError);
+        assert.throws(() => applyTopologyDelta(bytes.slice(0, n), table(), N), WireError, `cut to ${n}`);
+    assert.throws(() => applyTopologyDelta(new Uint8Array([...bytes, 0]), table(), N), WireError);
     for (let at = 0; at < bytes.length; at++)
         for (let value = 0; value < 256; value++) {
-            const broken = bytes.slice(),
-                x = table();
+            const broken = bytes.slice();
+            const x = table();
             broken[at] = value;
             try {
-                applyPatch(broken, x, N);
+                applyTopologyDelta(broken, x, N);
                 assert.ok(x.every((v) => v < N));
             } catch (error) {
                 assert.ok(error instanceof WireError, `byte ${at}: ${error}`);
@@ -150,15 +150,15 @@ test("cut, lengthened or changed anywhere it is a refusal that leaves the table,
 });
 
 test("a message that states more than its bytes can hold takes no memory", () => {
-    const bytes = good(),
-        view = new DataView(bytes.buffer),
-        n = 2 ** 22;
+    const bytes = good();
+    const view = new DataView(bytes.buffer);
+    const n = 2 ** 22;
     view.setUint32(12, n, true);
     view.setUint32(24, 16 * n, true);
-    assert.throws(() => readPatchHead(bytes), { code: "COUNT" });
+    assert.throws(() => readTopologyDeltaHead(bytes), { code: "COUNT" });
 });
 
-test("shows the triangles without empty places, and the vertices in them", () => {
+test("shows the triangles without empty slots, and the vertices in them", () => {
     const shown = shownOf(new Uint32Array([0, 0, 0, 0, 5, 2, 0, 0, 0, 7, 2, 5]), 9);
     assert.deepEqual(shown, { triangles: new Uint32Array([0, 5, 2, 7, 2, 5]), visible: new Uint32Array([0, 2, 5, 7]) });
     // nothing is hidden: no list
@@ -167,10 +167,10 @@ test("shows the triangles without empty places, and the vertices in them", () =>
 });
 
 test("normals of visible vertices are those of the whole mesh, hidden ones are left alone", () => {
-    const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
-        triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
-    const all = new Float32Array(15),
-        some = new Float32Array(15).fill(7);
+    const x = new Float32Array([0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const triangles = new Uint32Array([0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4]);
+    const all = new Float32Array(15);
+    const some = new Float32Array(15).fill(7);
     vertexNormals(x, triangles, all);
     vertexNormals(x, triangles, some, new Uint32Array([0, 2, 3, 4]));
     assert.deepEqual([...some.subarray(3, 6)], [7, 7, 7]);
@@ -178,11 +178,11 @@ test("normals of visible vertices are those of the whole mesh, hidden ones are l
 });
 
 test("says what is active in a sentence, with the body's name only among several", () => {
-    const active = [{ part: 1, nodes: 133, springs: 385, of_nodes: 450, of_springs: 1344 }];
+    const active = [{ part: 1, nodes: 133, springs: 385, finest_nodes: 450, finest_springs: 1344 }];
     assert.deepEqual(activeText(active, [{ name: "liver" }, { name: "stomach" }]), [
         "stomach: 133 of 450 nodes, 385 of 1344 springs",
     ]);
-    assert.deepEqual(activeText([{ ...active[0], part: 0, of_nodes: 100002 }], [{ name: "stomach" }]), [
+    assert.deepEqual(activeText([{ ...active[0], part: 0, finest_nodes: 100002 }], [{ name: "stomach" }]), [
         "133 of 100,002 nodes, 385 of 1344 springs",
     ]);
     assert.deepEqual(activeText([], [{ name: "liver" }]), []);
@@ -191,9 +191,9 @@ test("says what is active in a sentence, with the body's name only among several
 /** @param {string} name */
 const load = (name) => new Uint8Array(readFileSync(new URL(`../../../tests/data/golden/${name}`, import.meta.url)));
 const turn = () => new Promise((resolve) => setImmediate(resolve));
-const frame = load("frame_bend.bin"),
-    epoch = new DataView(frame.buffer).getUint32(8, true),
-    part = new DataView(frame.buffer).getUint16(6, true);
+const frame = load("frame_bend.bin");
+const epoch = new DataView(frame.buffer).getUint32(8, true);
+const part = new DataView(frame.buffer).getUint16(6, true);
 const asset = decodeAsset(load("asset.bin"));
 
 /** a connection that has heard hello and waits for the asset of the golden frames */
@@ -217,10 +217,10 @@ function stand() {
         later: () => {},
     });
     link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    const say = (/** @type {any} */ m) =>
+    const receive = (/** @type {any} */ m) =>
         socket.onmessage({ data: m instanceof Uint8Array ? m.slice().buffer : JSON.stringify(m) });
     const parts = (/** @type {number} */ e) => Array.from({ length: part + 1 }, () => partInfo({ epoch: e }));
-    say(hello({ parts: parts(epoch) }));
+    receive(hello({ parts: parts(epoch) }));
     const giveAsset = async () => {
         give(load("asset.bin").buffer);
         await turn();
@@ -228,67 +228,67 @@ function stand() {
     };
     return {
         socket,
-        say,
+        receive,
         parts,
         giveAsset,
         of: (/** @type {string} */ type) => posted.filter((m) => m.type === type && m.part === part),
     };
 }
 
-/** the asset's table with these places changed @param {Record<number, number[]>} changes */
+/** the asset's table with these slots changed @param {Record<number, number[]>} changes */
 function changed(changes) {
     const triangles = asset.triangles.slice();
-    for (const [place, corners] of Object.entries(changes)) triangles.set(corners, 3 * Number(place));
+    for (const [slot, corners] of Object.entries(changes)) triangles.set(corners, 3 * Number(slot));
     return shownOf(triangles, asset.rest.length / 3);
 }
 
-test("a patch shows nothing by itself: its triangles come with the frame that follows, once", async () => {
-    const { say, giveAsset, of } = stand();
+test("a delta is displayed with the next frame, once", async () => {
+    const { receive, giveAsset, of } = stand();
     await giveAsset();
-    say(frame);
+    receive(frame);
     assert.equal(of("frame")[0].shown, null);
-    say(writePatch({ part, epoch, places: [0, 2], corners: [0, 0, 0, 3, 2, 1] }));
-    say(writePatch({ part, epoch, places: [2, 5], corners: [4, 2, 1, 0, 0, 0] }));
+    receive(writeDelta({ part, epoch, slots: [0, 2], corners: [0, 0, 0, 3, 2, 1] }));
+    receive(writeDelta({ part, epoch, slots: [2, 5], corners: [4, 2, 1, 0, 0, 0] }));
     assert.equal(of("frame").length, 1);
-    say(frame);
+    receive(frame);
     assert.deepEqual(of("frame")[1].shown, changed({ 0: [0, 0, 0], 2: [4, 2, 1], 5: [0, 0, 0] }));
-    say(frame);
+    receive(frame);
     assert.equal(of("frame")[2].shown, null);
 });
 
-test("patches that come before the asset are taken in order, a frame from before them is not shown", async () => {
-    const { say, giveAsset, of } = stand();
-    say(frame);
-    say(writePatch({ part, epoch, places: [0], corners: [3, 2, 1] }));
-    say(writePatch({ part, epoch, places: [0], corners: [4, 2, 1] }));
+test("deltas before the asset are applied in order, a frame before them is dropped", async () => {
+    const { receive, giveAsset, of } = stand();
+    receive(frame);
+    receive(writeDelta({ part, epoch, slots: [0], corners: [3, 2, 1] }));
+    receive(writeDelta({ part, epoch, slots: [0], corners: [4, 2, 1] }));
     await giveAsset();
     assert.equal(of("part").length, 1);
     assert.equal(of("frame").length, 0);
-    say(frame);
+    receive(frame);
     assert.deepEqual(of("frame")[0].shown, changed({ 0: [4, 2, 1] }));
 });
 
-test("patches of an older epoch are dropped, those of a newer one wait for its asset", async () => {
-    const { say, parts, giveAsset, of } = stand();
+test("deltas of an older epoch are dropped, those of a newer one wait for its asset", async () => {
+    const { receive, parts, giveAsset, of } = stand();
     await giveAsset();
-    say(writePatch({ part, epoch: epoch - 1, places: [0], corners: [3, 2, 1] }));
-    say(frame);
+    receive(writeDelta({ part, epoch: epoch - 1, slots: [0], corners: [3, 2, 1] }));
+    receive(frame);
     assert.equal(of("frame")[0].shown, null);
-    say(writePatch({ part, epoch: epoch + 1, places: [0], corners: [3, 2, 1] }));
-    say({ type: "topology", parts: parts(epoch + 1) });
+    receive(writeDelta({ part, epoch: epoch + 1, slots: [0], corners: [3, 2, 1] }));
+    receive({ type: "topology", parts: parts(epoch + 1) });
     await giveAsset();
     assert.equal(of("part").length, 2);
     const next = frame.slice();
     new DataView(next.buffer).setUint32(8, epoch + 1, true);
-    say(next);
+    receive(next);
     assert.deepEqual(of("frame")[1].shown, changed({ 0: [3, 2, 1] }));
 });
 
-test("a patch that cannot be read closes the connection, also when it had to wait", async () => {
+test("an unreadable delta closes the connection, also after waiting", async () => {
     for (const early of [false, true]) {
-        const { socket, say, giveAsset } = stand();
+        const { socket, receive, giveAsset } = stand();
         if (!early) await giveAsset();
-        say(writePatch({ part, epoch, places: [0], corners: [3, 2, asset.rest.length / 3] }));
+        receive(writeDelta({ part, epoch, slots: [0], corners: [3, 2, asset.rest.length / 3] }));
         if (early) await giveAsset();
         assert.equal(socket.closed, 4900);
     }

@@ -1,7 +1,7 @@
 /* Components that nothing holds: what is joined by faces is one, small ones without support go, larger ones are
  * refused, and what is left is a whole mesh. */
 #include "server/mesh/cells/cell_lattice.h"
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
 
@@ -64,10 +64,10 @@ static void what_meets_in_an_edge_or_a_corner_is_apart(void)
                                         {{0, 0, 0, 4, 4, 4}, {4, 4, 4, 8, 8, 8}}};
     for (int k = 0; k < 3; k++) {
         pal_prepared mesh;
-        pal_loose_parts parts;
+        pal_loose_components parts;
         REQUIRE(make_boxes(2, box[k], 8, &mesh));
         uint8_t *fixed = calloc((size_t)mesh.tets.n_node, 1);
-        REQUIRE(fixed && !pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag));
+        REQUIRE(fixed && !pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag));
         CHECK_INT(parts.n_component, k == 0 ? 1 : 2);
         CHECK_INT(parts.n_dropped, 0);
         free(fixed);
@@ -81,26 +81,26 @@ static const double speck[2][6] = {{0, 0, 0, 10, 10, 10}, {10, 10, 4, 11, 11, 5}
 static void a_small_component_without_support_is_dropped_and_told(void)
 {
     pal_prepared mesh;
-    pal_loose_parts parts;
+    pal_loose_components parts;
     REQUIRE(make_boxes(2, speck, 11, &mesh));
     CHECK_INT(mesh.hexes.n_hex, 1001);
     uint8_t *fixed = hold(&mesh, 2, 0, 0);
-    REQUIRE(fixed && !pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag));
+    REQUIRE(fixed && !pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag));
     free(fixed);
     CHECK_INT(parts.n_component, 2);
     CHECK_INT(parts.n_dropped, 1);
     CHECK_NEAR(parts.volume_m3, 1001e-9, 1e-15);
     CHECK_NEAR(parts.dropped_m3, 1e-9, 1e-15);
-    CHECK_NEAR(parts.most_dropped_m3, 1e-9, 1e-15);
+    CHECK_NEAR(parts.max_dropped_m3, 1e-9, 1e-15);
     /* one component, and it is held: every node reaches a support through shared faces */
     check_whole(&mesh, 1000, 1);
-    pal_loose_parts_tell(&parts, "b", &diag);
+    pal_loose_components_describe(&parts, "b", &diag);
     CHECK_TEXT(diag.text, "body \"b\": dropped 1 of 2 components, 0.001 ml of 1 ml (0.1 %): small and without support");
     /* again there is nothing to drop */
     fixed = hold(&mesh, 2, 0, 0);
-    REQUIRE(fixed && !pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag));
+    REQUIRE(fixed && !pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag));
     CHECK_INT(parts.n_dropped, 0);
-    pal_loose_parts_tell(&parts, "b", &diag);
+    pal_loose_components_describe(&parts, "b", &diag);
     CHECK_TEXT(diag.text, "");
     free(fixed);
     pal_prepared_free(&mesh);
@@ -109,11 +109,11 @@ static void a_small_component_without_support_is_dropped_and_told(void)
 static void a_small_component_that_is_held_stays(void)
 {
     pal_prepared mesh;
-    pal_loose_parts parts;
+    pal_loose_components parts;
     REQUIRE(make_boxes(2, speck, 11, &mesh));
     uint8_t *fixed = hold(&mesh, 0, 11, 11);
     for (int i = 0; fixed && i < mesh.tets.n_node; i++) fixed[i] |= mesh.tets.x[3 * i + 2] < 1e-6;
-    REQUIRE(fixed && !pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag));
+    REQUIRE(fixed && !pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag));
     CHECK_INT(parts.n_dropped, 0);
     check_whole(&mesh, 1001, 2);
     free(fixed);
@@ -126,10 +126,11 @@ static void the_limit_is_one_in_a_hundred_of_the_largest(void)
     for (int n = 9; n <= 11; n += 2) {
         const double box[2][6] = {{0, 0, 0, 10, 10, 10}, {12, 0, 5, 13, n, 6}};
         pal_prepared mesh;
-        pal_loose_parts parts;
+        pal_loose_components parts;
         REQUIRE(make_boxes(2, box, 13, &mesh));
         uint8_t *fixed = hold(&mesh, 2, 0, 0);
-        CHECK_INT(pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag), n < 10 ? PAL_ERR_OK : PAL_ERR_REFUSED);
+        CHECK_INT(pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag),
+                  n < 10 ? PAL_ERR_OK : PAL_ERR_REFUSED);
         check_whole(&mesh, n < 10 ? 1000 : 1011, n < 10 ? 1 : 2);
         free(fixed);
         pal_prepared_free(&mesh);
@@ -142,31 +143,31 @@ static const double three[3][6] = {{0, 0, 0, 4, 4, 4}, {8, 0, 0, 12, 4, 4}, {0, 
 static void a_large_component_without_support_is_refused(void)
 {
     pal_prepared mesh;
-    pal_loose_parts parts;
+    pal_loose_components parts;
     REQUIRE(make_boxes(3, three, 12, &mesh));
     uint8_t *fixed = hold(&mesh, 2, 0, 0);
-    CHECK_INT(pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "body \"b\": 1 of 3 components has no support, the largest of 0.08 ml (38.5 % of the body) "
                           "around (0.0025, 0.0020, 0.0080) m: hold each component by a support");
     check_whole(&mesh, 64 + 64 + 80, 3);
     free(fixed);
     fixed = hold(&mesh, 2, 10, 10);
-    CHECK_INT(pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "2 of 3 components have no support, the largest of 0.064 ml"));
     free(fixed);
     /* a support on each */
     fixed = calloc((size_t)mesh.tets.n_node, 1);
     REQUIRE(fixed != NULL);
     memset(fixed, 1, (size_t)mesh.tets.n_node);
-    CHECK_INT(pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_OK);
+    CHECK_INT(pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag), PAL_ERR_OK);
     CHECK_INT(parts.n_dropped, 0);
     /* or the largest alone, held or not */
     memset(fixed, 0, (size_t)mesh.tets.n_node);
-    REQUIRE(!pal_loose_parts_drop("b", fixed, true, &mesh, &parts, &diag));
+    REQUIRE(!pal_loose_components_drop("b", fixed, true, &mesh, &parts, &diag));
     CHECK_INT(parts.n_dropped, 2);
     CHECK_NEAR(parts.dropped_m3, 128e-9, 1e-15);
     check_whole(&mesh, 80, 1);
-    pal_loose_parts_tell(&parts, "b", &diag);
+    pal_loose_components_describe(&parts, "b", &diag);
     CHECK(strstr(diag.text, "dropped 2 of 3 components") && strstr(diag.text, "only the largest is kept"));
     free(fixed);
     pal_prepared_free(&mesh);
@@ -176,10 +177,10 @@ static void a_free_body_keeps_its_large_components_alone(void)
 {
     const double box[3][6] = {{0, 0, 0, 10, 10, 10}, {12, 0, 0, 16, 10, 10}, {10, 10, 4, 11, 11, 5}};
     pal_prepared mesh;
-    pal_loose_parts parts;
+    pal_loose_components parts;
     REQUIRE(make_boxes(3, box, 16, &mesh));
     uint8_t *fixed = calloc((size_t)mesh.tets.n_node, 1);
-    REQUIRE(fixed && !pal_loose_parts_drop("b", fixed, false, &mesh, &parts, &diag));
+    REQUIRE(fixed && !pal_loose_components_drop("b", fixed, false, &mesh, &parts, &diag));
     CHECK_INT(parts.n_component, 3);
     CHECK_INT(parts.n_dropped, 1);
     check_whole(&mesh, 1400, 2);
@@ -218,7 +219,7 @@ static void control_cells_are_kept_by_the_same_rule(void)
                 {0.0201, false, {false, false}, PAL_ERR_OK, 3}};
     for (size_t k = 0; k < sizeof turn / sizeof *turn; k++) {
         pal_cells cells;
-        pal_loose_parts parts;
+        pal_loose_components parts;
         last_width = turn[k].width;
         REQUIRE(make_cells(apart, &cells));
         uint8_t *fixed = calloc((size_t)cells.n_vertex, 1);
