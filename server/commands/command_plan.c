@@ -3,8 +3,8 @@
  * there, with the words that would call for it. Of a body that adapts all its levels, and what of them is active now;
  * of a subdivided solid its elements as in Table 1 of paper A. */
 #include "server/base/clock.h"
+#include "server/cli/flags.h"
 #include "server/cli/median.h"
-#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/plan_reasons.h"
 #include "server/commands/preflight_report.h"

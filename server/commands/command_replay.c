@@ -1,6 +1,6 @@
 /* `palpate replay`: runs an input log against its scene and compares the hashes. */
 #include "server/base/clock.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/scene/scene_arg.h"
 #include "server/session/replay.h"

@@ -1,6 +1,6 @@
 /* `palpate robustness SCENE`: the cases of robustness.h on a user's own scene, what happened and whether that is
  * within the criterion. Exit code 1 when something failed or could not be judged. */
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/commands/robustness_picture.h"
 #include "server/scene/scene_arg.h"
