@@ -145,7 +145,7 @@ static pal_err read_keys(pal_config *config, const char *name, const cJSON *root
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
         if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is there twice", where);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is given twice", where);
         PAL_TRY(set_json(config, s, item, where, diag));
     }
     return PAL_ERR_OK;

@@ -26,7 +26,7 @@ static int parse(bool with_config, char **word)
                                   .about = "",
                                   .flag = flag,
                                   .n_flag = 4,
-                                  .most_operand = 2,
+                                  .max_operand = 2,
                                   .config = with_config ? &config : NULL};
     int argc = 0;
     while (word[argc]) argc++;
@@ -88,8 +88,8 @@ static void what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range(void)
     WRONG(PARSE("--count", "99999999999"), "--count: 99999999999 is outside 1 .. 9");
     WRONG(PARSE("--count"), "--count needs a value");
     WRONG(PARSE("--on=1"), "--on takes no value");
-    WRONG(PARSE("--on", "--on"), "--on is there twice");
-    WRONG(PARSE("a", "b", "c"), "\"c\" is one word too many");
+    WRONG(PARSE("--on", "--on"), "--on is given twice");
+    WRONG(PARSE("a", "b", "c"), "\"c\" is one operand too many");
     WRONG(PARSE("--port", "80"), "unknown flag --port");
     WRONG(PARSE("--x\ny"), "unknown flag --x y");
 }
@@ -127,7 +127,7 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     CHECK(strstr(said, "PALPATE_PORT: \"x\" is not a number") != NULL);
     unsetenv("PALPATE_PORT");
     unsetenv("PALPATE_ALLOW_REMOTE");
-    WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is there twice");
+    WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is given twice");
     WRONG(CONFIGURE("--most-clients", "0"), "--most-clients: 0 is outside 1 .. 10000");
     WRONG(CONFIGURE("--log", "loud"), "--log: \"loud\" is not error, warn, info or debug");
     WRONG(CONFIGURE("--listen", ""), "--listen: is empty");
@@ -145,7 +145,7 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
                {"[]", "c.json: not a JSON object"},
                {"{} x", "c.json: line 1: not JSON"},
                {"{\"prot\": 1}", "c.json: prot: unknown key"},
-               {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is there twice"},
+               {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is given twice"},
                {"{\"most_clients\": 3, \"port\": -1}", "c.json: port: -1 is outside 0 .. 65535"},
                {"{\"port\": 80.5}", "c.json: port: 80.5 is not a whole number"},
                {"{\"port\": \"80\"}", "c.json: port: is not a number"},
