@@ -376,10 +376,10 @@ check "the organ is no longer made of tetrahedra" has out '"tets":[1-9]'
 rm -rf x
 end
 
-begin "plan tells nodes and springs of every level, and what is active"
+begin "plan prints nodes and springs of every level, and what is active"
 run plan stomach
 check "exit code $code" code_is 0
-check "active" has out "stomach: a surface that adapts, 188 nodes and 558 springs of"
+check "active" has out "stomach: an adaptive surface, 188 nodes and 558 springs active of"
 check "finest" has out "level 1: 746 nodes, 2232 springs"
 for row in edge_spring shape_spring viscous refine rk4 surface_out; do check "no row $row" has out "$row"; done
 run plan stomach --json
