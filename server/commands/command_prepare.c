@@ -331,7 +331,7 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     else
         print_solid(mesh, r);
     if (n_component > 1) printf("the components are not connected, each has its own support (--largest keeps one)\n");
-    pal_loose_parts_tell(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
+    pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
     if (dropped.text[0]) printf("%s\n", dropped.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
@@ -487,11 +487,14 @@ static const pal_flag flag[] = {
      "triangles of the surface of a scan or of the computed organ (50,000); adaptive: of the coarsest\nlevel of a scan "
      "(1,500) or of a file (as many as it has, 1,500 when it has more than 3,000)"},
     {"--largest", NULL, PAL_FLAG_SWITCH, &args.scene.largest_only, 0, 0, "keep the largest of several components only"},
-    {"--young-Pa", "E", PAL_FLAG_NUMBER, &args.scene.material.young_Pa, 1e-6, 1e12,
+    {"--young-Pa", "E", PAL_FLAG_NUMBER, &args.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
      "Young's modulus (5000; adaptive: 50,000)"},
-    {"--poisson", "NU", PAL_FLAG_NUMBER, &args.scene.material.poisson, -0.9999, 0.499999, "Poisson's ratio (0.45)"},
-    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &args.scene.material.density_kg_m3, 1e-3, 1e6, "density (1000)"},
-    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, 1e6, "damping rate (4)"},
+    {"--poisson", "NU", PAL_FLAG_NUMBER, &args.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
+     "Poisson's ratio (0.45)"},
+    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &args.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
+     PAL_DENSITY_MAX_KG_M3, "density (1000)"},
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
+     "damping rate (4)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
      "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},

@@ -144,7 +144,7 @@ static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
         PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
-        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
+        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
         PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
@@ -166,7 +166,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .allow_remote = run->config.allow_remote,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
-                                  .most_clients = run->config.most_clients,
+                                  .max_clients = run->config.max_clients,
                                   .setting = run->setting,
                                   .n_setting = run->n_setting,
                                   .setting_body = run->setting_body,

@@ -1,5 +1,5 @@
 /* Contact points of the shown surface: collection, evaluation, and forces back to the nodes. */
-#include "server/sim/contact/contact_samples.h"
+#include "server/sim/contact/contact_points.h"
 
 #include "server/base/vec3.h"
 
@@ -67,9 +67,9 @@ int pal_contact_points_collect(pal_contact_points *touch, const pal_body *body, 
         high[c] = (float)(fmax(a[c], b[c]) + reach_m);
     }
     int n = 0;
-    int n_vertex = body->adaptive ? body->n_active : touch->n_vertex;
+    int n_vertex = body->active ? body->n_active : touch->n_vertex;
     for (int k = 0; k < n_vertex; k++) {
-        int i = body->adaptive ? body->active[k] : k;
+        int i = body->active ? body->active[k] : k;
         const float *s = body->shown + 3 * (size_t)i;
         if (!((s[0] >= low[0]) & (s[0] <= high[0]) & (s[1] >= low[1]) & (s[1] <= high[1]) & (s[2] >= low[2]) &
               (s[2] <= high[2])))
@@ -135,13 +135,13 @@ static void add_lag(const pal_body *body, int vertex, double x[3])
 void pal_contact_points_update(pal_contact_points *touch, const pal_body *body, double dt_s)
 {
     uint32_t before = touch->sub_step++;
-    for (int i = 0; i < touch->n_live && body->adaptive; i++) {
+    for (int i = 0; i < touch->n_live && body->active; i++) {
         size_t at = 3 * (size_t)touch->live[i];
         pal_copy3(touch->x + at, body->d + at);
         pal_copy3(touch->v + at, body->dv + at);
         add_lag(body, touch->live[i], touch->x + at);
     }
-    if (body->adaptive) return;
+    if (body->active) return;
     if (body->skin) pal_skin_frames_of(body->skin, body->d, touch->frame, touch->n_frame, body->skin_axes);
     for (int i = 0; i < touch->n_live; i++) {
         int vertex = touch->live[i];
@@ -230,9 +230,9 @@ bool pal_contact_points_nearest(const pal_contact_points *touch, const pal_body 
 {
     double best = INFINITY, at[3], sum[3] = {0};
     int nearest = -1;
-    int n_vertex = body->adaptive ? body->n_active : touch->n_vertex;
+    int n_vertex = body->active ? body->n_active : touch->n_vertex;
     for (int k = 0; k < n_vertex + touch->n_fixed - touch->n_vertex; k++) {
-        int i = k >= n_vertex ? k - n_vertex + touch->n_vertex : body->adaptive ? body->active[k] : k;
+        int i = k >= n_vertex ? k - n_vertex + touch->n_vertex : body->active ? body->active[k] : k;
         shown_point(touch, body, i, at);
         pal_sub3(at, at, p);
         double d2 = pal_dot3(at, at);

@@ -129,4 +129,8 @@ int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, do
 
 /* largest s in [0, 1] with |force so far on the tool + s force| <= the tool's cap at its present ramp */
 double pal_tool_force_share(const pal_tool *tool, const double force_N[3]);
+
+/* contact_samples.c, for contact_points.c alone: adds samples of this step to triangles at the listed vertices that
+ * were short at rest and are long now */
+void pal_contact_points_sample_stretched(pal_contact_points *touch, const pal_body *body, const int32_t *list, int n);
 #endif

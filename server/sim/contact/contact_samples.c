@@ -3,10 +3,9 @@
  * A body that adapts (sim/adaptive_surface.h) draws other triangles from time to time, and only its active vertices are
  * points then. Its fixed samples, fans and areas are made again when body->revision has changed, at the cost of what is
  * drawn now. */
-#include "server/sim/contact/contact_samples.h"
+#include "server/sim/contact/contact_points.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -58,7 +57,7 @@ static int64_t count_samples(const pal_body *body, double spacing_m)
 {
     const pal_surface *surface = body->surface;
     int64_t n = 0;
-    const pal_levels *levels = body->adaptive ? &body->adaptive->levels : NULL;
+    const pal_levels *levels = body->dofs.levels;
     for (int32_t f = 0; levels && f < levels->first_face[1]; f++) n += most_of_family(levels, spacing_m, f);
     if (levels) return n;
     for (int t = 0; t < surface->n_tri; t++) {
@@ -98,14 +97,14 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
 {
     size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
     size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0;
-    size_t n_tri = (size_t)(body->adaptive ? body->adaptive->n_slot : body->surface->n_tri),
+    size_t n_tri = (size_t)(body->active ? body->dofs.n_slot : body->surface->n_tri),
            room = (size_t)n_sample + PASSING_MAX;
     t->corner = PAL_NEW(arena, int32_t, 3 * room);
     t->share = PAL_NEW(arena, float, 3 * room);
     t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
     t->fan_start = PAL_NEW(arena, int32_t, n_vertex + 2);
-    t->fan_end = body->adaptive ? PAL_NEW(arena, int32_t, n_vertex) : t->fan_start + 1;
-    if (body->adaptive) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
+    t->fan_end = body->active ? PAL_NEW(arena, int32_t, n_vertex) : t->fan_start + 1;
+    if (body->active) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
     t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
     t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
     t->live = PAL_NEW(arena, int32_t, n_vertex);
@@ -126,7 +125,7 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
     t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
     t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
     t->force = PAL_NEW(arena, double, 3 * n_node);
-    bool all = t->fan_end && (t->run || !body->adaptive) && t->corner && t->share && t->area_m2 && t->fan_start &&
+    bool all = t->fan_end && (t->run || !body->active) && t->corner && t->share && t->area_m2 && t->fan_start &&
                t->fan && t->tri_mark && t->live && t->frame && t->live_mark && t->frame_mark && t->x && t->v &&
                t->slot && t->node && t->slot_mark && t->node_mark && t->slot_force && t->slot_torque && t->force &&
                t->turning && t->spin_mark && t->tool_mark && t->seen;
@@ -198,7 +197,7 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
     t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
     t.max_point = t.n_fixed + PASSING_MAX;
     PAL_TRY(allocate(body, arena, (int)n_sample, &t));
-    if (body->adaptive) {
+    if (body->active) {
         make_active(body, &t);
     } else {
         make_fans(surface, &t);
@@ -210,7 +209,7 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
 
 bool pal_contact_points_update_topology(pal_contact_points *touch, const pal_body *body)
 {
-    if (!body->adaptive || touch->revision == body->revision) return false;
+    if (!body->active || touch->revision == body->revision) return false;
     make_active(body, touch);
     return true;
 }

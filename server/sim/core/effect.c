@@ -30,3 +30,9 @@ pal_err pal_assemble_forces(pal_step *step)
     }
     return PAL_ERR_OK;
 }
+
+const char *pal_stage_name(pal_stage stage)
+{
+    static const char *const names[] = {"contact", "force", "solve", "adapt", "guard", "output"};
+    return (unsigned)stage < PAL_STAGE_COUNT ? names[stage] : "?";
+}

@@ -22,6 +22,7 @@ typedef enum pal_stage {
     PAL_STAGE_OUTPUT,
     PAL_STAGE_COUNT
 } pal_stage;
+const char *pal_stage_name(pal_stage stage); /* "contact" ...; never NULL [any] */
 
 typedef struct pal_component pal_component;
 

@@ -108,7 +108,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
     tool_grasp *grasp = self;
     (void)body, (void)diag;
     grasp->young_Pa = mat->young_Pa;
-    grasp->poisson = fmin(mat->poisson, 0.4999);
+    grasp->poisson = fmin(mat->poisson, PAL_POISSON_CLAMP);
     return PAL_ERR_OK;
 }
 
@@ -143,7 +143,7 @@ static pal_err make_grip(grip *g, const pal_body *body, pal_arena *arena)
     g->weight = PAL_NEW(arena, double, n_node);
     if (!g->node || !g->weight) return PAL_ERR_MEMORY;
     if (body->implicit && !(g->firm = PAL_NEW(arena, firm_grip, 1))) return PAL_ERR_MEMORY;
-    if (body->adaptive && !(g->live = PAL_NEW(arena, pal_adaptive_grasp, 1))) return PAL_ERR_MEMORY;
+    if (body->active && !(g->live = PAL_NEW(arena, pal_adaptive_grasp, 1))) return PAL_ERR_MEMORY;
     g->share = PAL_NEW(arena, uint16_t, (size_t)body->n_shown);
     return g->share ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -197,11 +197,11 @@ static bool close_on(tool_grasp *grasp, grip *g, const pal_body *body, const flo
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
     int nearest = -1;
-    int n_shown = body->adaptive ? body->n_active : body->n_shown;
+    int n_shown = body->active ? body->n_active : body->n_shown;
     g->by_vertex = true;
     memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
     for (int k = 0; k < n_shown; k++) {
-        int i = body->adaptive ? body->active[k] : k;
+        int i = body->active ? body->active[k] : k;
         const float *s = shown + 3 * (size_t)i;
         double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
         double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
@@ -284,7 +284,7 @@ static void take_hold(tool_grasp *grasp, grip *g, const pal_tool *tool, const pa
 /* once a step: the same grips on the points that are in use now */
 static void follow(tool_grasp *grasp, const pal_body *body)
 {
-    if (!body->adaptive || grasp->revision == body->revision) return;
+    if (!body->active || grasp->revision == body->revision) return;
     grasp->revision = body->revision;
     for (int t = 0; t < grasp->n_tool; t++) {
         grip *g = &grasp->grip[t];

@@ -81,7 +81,7 @@ typedef struct tool_push {
 static void take_material(tool_push *push, const pal_material *material)
 {
     push->young_Pa = material->young_Pa;
-    push->poisson = fmin(material->poisson, 0.4999);
+    push->poisson = fmin(material->poisson, PAL_POISSON_CLAMP);
     push->damping_1_s = material->damping_1_s;
     push->density_kg_m3 = material->density_kg_m3;
 }
@@ -255,7 +255,7 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
         pal_tool_contact_end_blend(h);
         h->ease = 0, body->safeguards.n_tool_reset++;
     }
-    if (!body->adaptive) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
+    if (!body->active) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);
     pal_copy3(h->limits.a, h->proxy.x), pal_copy3(h->limits.b, next);
     h->limits.radius_m = tool->radius_m;
@@ -383,7 +383,7 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
     }
     double rate =
         SAFETY * n_share * pal_contact_points_max_eigenvalue(&push->touch, step->body, h->contact, h->n_contact);
-    double alpha = step->body->adaptive ? ALPHA_HELD : step->body->interpolation ? ALPHA_CARRIED : ALPHA;
+    double alpha = step->body->active ? ALPHA_HELD : step->body->interpolation ? ALPHA_CARRIED : ALPHA;
     double most = fmax(alpha / (step->dt_s * step->dt_s), SAFETY * n_share * h->told),
            share = rate > most ? most / rate : 1;
     h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
@@ -435,9 +435,9 @@ static double keep_force(holder *h, double sum[3])
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    if (body->adaptive) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
+    if (body->active) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
     double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), sum[3] = {0}, stiffness = 0;
-    double damping_s = step->dt_s * (body->adaptive ? GAMMA_HELD : GAMMA);
+    double damping_s = step->dt_s * (body->active ? GAMMA_HELD : GAMMA);
     if (h->n_contact == 0 || soft <= 0) {
         pal_set3(h->slip, 0, 0, 0);
         h->uncapped_N = 0;
@@ -448,7 +448,7 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
         pal_add3(sum, sum, h->contact[i].force);
         stiffness += soft * h->contact[i].k_N_m;
     }
-    if (body->adaptive) stiffness *= keep_force(h, sum);
+    if (body->active) stiffness *= keep_force(h, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, h, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);

@@ -60,7 +60,7 @@ typedef struct pal_implicit {
     bool energy_rose;            /* ... and was not kept in this sub-step ... */
     int n_energy_rise, n_steady; /* ... nor in so many (0 after half a second of peace); sub-steps since then */
     int max_cg;                  /* in one solve of this sub-step       */
-    uint64_t sampled;            /* of body->solid, at the factor       */
+    uint64_t sampled;            /* material revision of the body at the factor (dofs.h) */
     bool probing;                /* an embedded body's matrices are being found anew */
     pal_solve_report report;
 } pal_implicit;

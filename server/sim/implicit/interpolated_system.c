@@ -2,7 +2,6 @@
 #include "server/sim/implicit/interpolated_system.h"
 
 #include "server/sim/implicit/system.h"
-#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -64,13 +63,8 @@ static pal_err add_cliques(clique_list *l, const pal_interpolation *rows, const 
 
 static pal_err add_elements(clique_list *l, const pal_body *body)
 {
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        const pal_cell_elements *e = &body->solid->elements;
-        pal_cliques nodes = {.n_item = e->n[kind],
-                             .n_corner = pal_cell_kind_nodes(kind),
-                             .node = pal_subdivision_solid_nodes(body->solid, kind, 0)};
-        if (nodes.n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &nodes));
-    }
+    for (int k = 0; k < body->dofs.n_clique; k++)
+        if (body->dofs.clique[k].n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &body->dofs.clique[k]));
     return PAL_ERR_OK;
 }
 
@@ -86,7 +80,7 @@ static pal_err add_all(clique_list *l, int n)
 static pal_err list_cliques(const pal_body *body, const pal_component *force, int n_force, clique_list *l)
 {
     bool silent = false;
-    l->list = calloc((size_t)n_force + PAL_CELL_KINDS + 1, sizeof *l->list);
+    l->list = calloc((size_t)n_force + PAL_DOFS_CLIQUES + 1, sizeof *l->list);
     if (!l->list) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_force; i++) {
         const pal_tangent *tangent = force[i].effect->tangent;
@@ -98,7 +92,7 @@ static pal_err list_cliques(const pal_body *body, const pal_component *force, in
             silent = true;
     }
     if (!silent) return PAL_ERR_OK;
-    return body->solid ? add_elements(l, body) : add_all(l, body->n_dof);
+    return body->dofs.n_clique ? add_elements(l, body) : add_all(l, body->n_dof);
 }
 
 /* ---- groups ---- */
@@ -235,30 +229,6 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
 void pal_interpolated_system_invalidate(pal_interpolated_system *e)
 {
     e->next = 0;
-}
-
-/* one group along one axis; into `value` go the columns of its points, from the diagonal down */
-static void probe(pal_interpolated_system *e, const pal_system *system, int move, double *value)
-{
-    const int axis = move % 3, group = move / 3;
-    const int32_t *point = e->point + e->start[group], n = e->start[group + 1] - e->start[group];
-    memset(e->unit, 0, 3 * sizeof(double) * (size_t)e->rest.n);
-    memset(e->answer, 0, 3 * sizeof(double) * (size_t)e->rest.n);
-    for (int32_t i = 0; i < n; i++) e->unit[3 * point[i] + axis] = 1;
-    pal_system_multiply_stiffness(system, value != e->damping, value == e->damping, e->unit, e->answer);
-    for (int32_t i = 0; i < n; i++)
-        for (int32_t k = e->rest.start[point[i]]; k < e->rest.start[point[i] + 1]; k++)
-            for (int c = 0; c < 3; c++)
-                value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->answer[3 * e->rest.row[k] + c];
-}
-
-bool pal_interpolated_system_probe(pal_interpolated_system *e, const pal_system *system, int most)
-{
-    for (; most > 0 && e->next < e->n_move; most--, e->next++) {
-        bool second = e->next >= 3 * e->n_group;
-        probe(e, system, second ? e->next - 3 * e->n_group : e->next, second ? e->damping : e->rest.value);
-    }
-    return e->next == e->n_move;
 }
 
 void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to)

@@ -11,8 +11,6 @@
 #define PAL_SIM_IMPLICIT_INTERPOLATED_SYSTEM_H
 #include "server/sim/core/effect.h"
 
-struct pal_system;
-
 typedef struct pal_interpolated_system {
     double *p, *q;         /* a motion and its answer at nodes                       [n_node][3] */
     double *turn;          /* the rows' rotations at nodes                           [n_node][9] */
@@ -27,14 +25,12 @@ typedef struct pal_interpolated_system {
 } pal_interpolated_system;
 
 /* work space, pattern and groups for the FORCE rows [n_force]. Points are coupled where a row couples nodes of both,
- * for rows that do not say so where an element of body->solid has both, or else everywhere. BUDGET: moves times nodes
+ * for rows that do not say so where an element (dofs.clique) has both, or else everywhere. BUDGET: moves times nodes
  * are more than 2e7, some ten seconds' work; MEMORY. [load] */
 pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *force, int n_force, pal_arena *arena,
                                      pal_diagnostic *diag, pal_interpolated_system **out);
 /* the numbers are out of date: rows have other material */
 void pal_interpolated_system_invalidate(pal_interpolated_system *e);
-/* at most `most` moves more; the rows are linearised at rest. True: all there. No heap */
-bool pal_interpolated_system_probe(pal_interpolated_system *e, const struct pal_system *system, int most);
 /* to += rows' sum of 9 numbers at nodes [n_node][9], pulled back to points [n_dof][9] */
 void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to);
 #endif

@@ -1,65 +1,23 @@
-/* Scene -> bodies and ordered rows. */
-#include "server/sim/plan/plan_requests.h"
+/* Bodies and ordered components from a scene. */
+#include "server/sim/plan/plan.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/plan/plan_requests.h"
 #include "server/sim/subdivision/subdivision_body.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-const char *pal_stage_name(pal_stage stage)
-{
-    static const char *const names[] = {"contact", "force", "solve", "adapt", "guard", "output"};
-    return (unsigned)stage < PAL_STAGE_COUNT ? names[stage] : "?";
-}
-
-static pal_err add_wish(pal_plan_requests *s, pal_config_entry *item, bool replaces)
-{
-    const pal_effect *effect = pal_effect_find(item->name);
-    const char *body = s->build.body->name;
-    if (!effect)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: there is no effect \"%s\"", body,
-                                  item->path, item->name);
-    for (int i = 0; i < s->n_request; i++) {
-        bool solver = effect->stage == PAL_STAGE_SOLVE && s->wish[i].effect->stage == PAL_STAGE_SOLVE;
-        if (s->wish[i].effect != effect && !solver) continue;
-        bool models = s->wish[i].item >= s->recipe.row && s->wish[i].item < s->recipe.row + PAL_ENTRIES_MAX;
-        if (!replaces || !models)
-            return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
-                                      item->path, item->name);
-        s->wish[i] = (pal_plan_request){effect, item};
-        return PAL_ERR_OK;
-    }
-    if (s->n_request == PAL_PLAN_REQUEST_MAX)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body,
-                                  PAL_PLAN_REQUEST_MAX);
-    s->wish[s->n_request++] = (pal_plan_request){effect, item};
-    return PAL_ERR_OK;
-}
-
-/* the entry `solver` or `output`; an empty name asks for nothing */
-static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_config_entry *item, pal_stage stage)
-{
-    if (!item->name[0]) return PAL_ERR_OK;
-    *own = *item;
-    PAL_TRY(add_wish(s, own, true));
-    if (pal_effect_find(own->name)->stage != stage)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: \"%s\" is not of stage %s",
-                                  s->build.body->name, own->path, own->name, pal_stage_name(stage));
-    return PAL_ERR_OK;
-}
-
 /* holds the vertices on open edges, on every level: the halves of an open edge are open edges too */
 static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
-    if (!body->adaptive)
+    if (!body->active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "body \"%s\" supports[%d].rim: the model has no surface of its own", body->name,
                                   index);
-    const pal_levels *levels = &body->adaptive->levels;
+    const pal_levels *levels = body->dofs.levels;
     if (levels->closed)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the surface has no open edge",
                                   body->name, index);
@@ -94,14 +52,6 @@ static const double *mesh_origin(const pal_prepared *mesh)
     return mesh->tets.n_node > 0 ? mesh->tets.origin_m : mesh->surface.origin_m;
 }
 
-/* a body that adapts is its own surface, a solid shows its boundary: what skin_output, the default, would put between
- * them is not there */
-static void choose_output(const pal_body *body, pal_config_entry *output)
-{
-    if ((body->adaptive || body->solid) && !strcmp(output->name, "skin_output"))
-        snprintf(output->name, sizeof output->name, "surface_output");
-}
-
 /* arrays, supports and the ordered wishes of one body */
 static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
 {
@@ -119,69 +69,15 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
     *own = def->model;
     PAL_TRY(model->build(own, &s->build, &s->recipe));
     PAL_TRY(hold(body, def, scene->up, s->build.diag));
-    if (body->solid) pal_subdivision_solid_update_mass(body);
+    if (body->dofs.update_mass) body->dofs.update_mass(body);
     body->length_scale_m = box_diagonal(body);
     body->load_cap_N = pal_body_load_cap_N(body, def->material.young_Pa);
-    if (body->tets || body->solid) body->full_corner_kg = def->material.density_kg_m3 * pow(body->edge_m, 3) / 8;
+    if (body->tets || body->interpolation)
+        body->full_corner_kg = def->material.density_kg_m3 * pow(body->edge_m, 3) / 8;
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
     for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
 
     return pal_plan_requests_collect(s);
-}
-
-pal_err pal_plan_requests_collect(pal_plan_requests *s)
-{
-    const pal_body_def *def = s->build.def;
-    pal_config_entry *own = s->own;
-    s->n_request = 0;
-    for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
-    /* what is shown comes before the entries, so that a row field_output finds it */
-    pal_config_entry output = def->output;
-    choose_output(s->build.body, &output);
-    PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));
-    for (int i = 0; i < def->n_effect; i++) {
-        *++own = def->effect[i];
-        PAL_TRY(add_wish(s, own, true));
-    }
-    return add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE);
-}
-
-/* a row's own memory begins with a block of this size and grows by such */
-enum { ROW_BLOCK = 4096 };
-
-pal_err pal_plan_requests_make(pal_plan_requests *s, const pal_plan_request *wish, bool shared, pal_component *row)
-{
-    pal_arena *body_arena = s->build.arena;
-    pal_arena *own = shared ? NULL : pal_arena_create(ROW_BLOCK, true);
-    if (!shared && !own) return PAL_ERR_MEMORY;
-    size_t before = shared ? pal_arena_used(body_arena) : 0;
-    *row = (pal_component){.effect = wish->effect, .arena = own, .reason = ""};
-    s->build.body_arena = body_arena;
-    s->build.arena = own ? own : body_arena;
-    pal_err err = wish->effect->make(wish->item, &s->build, &row->self);
-    row->n_byte = pal_arena_used(s->build.arena) - before;
-    s->build.arena = body_arena;
-    return err;
-}
-
-void pal_plan_destroy_component(pal_component *row)
-{
-    if (row->self && row->effect->destroy) row->effect->destroy(row->self);
-    pal_arena_destroy(row->arena);
-    row->self = NULL, row->arena = NULL;
-}
-
-/* where a wish comes from: the model's recipe, the solver or output of the scene, or an effect of it */
-size_t pal_plan_request_reason(const pal_plan_requests *s, const pal_plan_request *wish, char *text, size_t n_byte)
-{
-    const pal_config_entry *model = &s->own[0], *item = wish->item;
-    const pal_body_def *def = s->build.def;
-    bool recipe = item >= s->recipe.row && item < s->recipe.row + PAL_ENTRIES_MAX;
-    if (recipe && wish->effect->drag)
-        return (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
-                                def->name);
-    if (recipe) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);
-    return (size_t)snprintf(text, n_byte, "%s \"%s\"", item->path, item->name);
 }
 
 /* the sentences of a body's rows, in one piece of memory */
@@ -259,11 +155,11 @@ static pal_err check_memory(const pal_plan_requests *s, size_t arena_byte)
     enum { WORLD_BYTE = 1 << 17 };
     const pal_body *body = s->build.body;
     pal_diagnostic reason = {{0}};
-    if (!body->adaptive) return PAL_ERR_OK;
+    if (!body->dofs.check_memory) return PAL_ERR_OK;
     size_t n = (size_t)body->n_node,
-           shown = n * (3 * sizeof(float) + 2 * sizeof(int32_t)) + (size_t)body->adaptive->n_slot * 3 * sizeof(int32_t);
+           shown = n * (3 * sizeof(float) + 2 * sizeof(int32_t)) + (size_t)body->dofs.n_slot * 3 * sizeof(int32_t);
     size_t n_byte = arena_byte + s->build.scratch_byte + shown + 3 * n * sizeof(double) + WORLD_BYTE;
-    pal_err err = pal_adaptive_check_bytes(body->adaptive, n_byte, &reason);
+    pal_err err = body->dofs.check_memory(body, n_byte, &reason);
     if (err) pal_diagnostic_set(s->build.diag, err, "body \"%s\" model: %s", body->name, reason.text);
     return err;
 }
@@ -302,12 +198,10 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_diagnosti
 }
 
 /* what bodies own beside the arena */
-static void free_solids(pal_plan *plan)
+static void free_models(pal_plan *plan)
 {
-    for (int b = 0; b < plan->n_body && plan->body; b++) {
-        pal_subdivision_solid_free(plan->body[b].solid);
-        plan->body[b].solid = NULL;
-    }
+    for (int b = 0; b < plan->n_body && plan->body; b++)
+        if (plan->body[b].dofs.destroy) plan->body[b].dofs.destroy(&plan->body[b]);
 }
 
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic *diag, pal_plan *out)
@@ -320,7 +214,7 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
     /* rows that were made before something was refused */
     for (int i = 0; err && i < out->n_row; i++) pal_plan_destroy_component(&made[i]);
     if (err) {
-        free_solids(out);
+        free_models(out);
         *out = (pal_plan){0};
     }
     free(s);
@@ -333,5 +227,5 @@ void pal_plan_free(pal_plan *plan)
     plan->n_row = 0;
     if (plan->row != plan->load_component) free(plan->row);
     plan->row = plan->load_component = NULL;
-    free_solids(plan);
+    free_models(plan);
 }

@@ -38,7 +38,6 @@ pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int body, const 
 /* would pal_plan_switch refuse to switch this row off as the plan is now? */
 bool pal_plan_requires(const pal_plan *plan, int row);
 size_t pal_plan_bytes(const pal_plan *plan); /* heap memory: tables of more rows than at load, rows, solids */
-const char *pal_stage_name(pal_stage stage); /* "contact" ... */
 /* one line per row into text (cut at n_byte, always ended); returns the length it wanted. [any] */
 size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte);
 #endif

@@ -1,8 +1,8 @@
-/* What the files of the plan share: what the entries of a body ask for. Private to plan*.c. */
+/* The components that the entries of one body ask for, in order, before they are made. Used by the files of this room
+ * only. Thread: that of the plan. */
 #ifndef PAL_SIM_PLAN_PLAN_REQUESTS_H
 #define PAL_SIM_PLAN_PLAN_REQUESTS_H
 #include "server/sim/core/model.h"
-#include "server/sim/plan/plan.h"
 
 /* what one body's entries ask for, in order, before rows are made */
 typedef struct pal_plan_request {

@@ -1,5 +1,6 @@
 /* Rows that are switched off and on while a world runs. Off, a row is destroyed with its memory; on, it is made anew
  * from its entry. make functions expect a body at rest, so its state is put aside meanwhile. */
+#include "server/sim/plan/plan.h"
 #include "server/sim/plan/plan_requests.h"
 
 #include "server/sim/core/effect_list.h"

@@ -1,7 +1,9 @@
 /* What the files transfer*.c share. Private to these. */
 #ifndef PAL_SIM_TRANSFER_TRANSFER_CORE_H
 #define PAL_SIM_TRANSFER_TRANSFER_CORE_H
-#include "server/sim/transfer/transfer.h"
+#include "server/sim/world/world.h"
+
+typedef struct pal_transfer pal_transfer;
 
 struct pal_transfer {
     int body;
@@ -41,6 +43,7 @@ void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);
 /* do shown vertices of body b of the same number mean the same place in both worlds? */
 bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int b);
+struct pal_transfer_report;
 /* the new body is shown where the old one was, and how far it is to be let go from there; body_move_m is known */
-void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *before, pal_transfer_report *out);
+void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *before, struct pal_transfer_report *out);
 #endif

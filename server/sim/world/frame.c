@@ -1,16 +1,16 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/world/frame.h"
 
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
+#include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 
 /* room for the triangles of a part that adapts; no table taken yet */
-static bool make_slots(pal_frame_part *part, const pal_adaptive_surface *adaptive)
+static bool make_slots(pal_frame_part *part, const pal_dofs *dofs)
 {
-    const pal_levels *levels = &adaptive->levels;
-    part->n_slot = adaptive->n_slot;
+    const pal_levels *levels = dofs->levels;
+    part->n_slot = dofs->n_slot;
     part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
     part->slot_log = UINT64_MAX;
     part->n_finest = levels->n_vertex[levels->n_level - 1];
@@ -30,14 +30,13 @@ pal_frame *pal_frame_create(const pal_world *world)
     pal_frame *frame = calloc(1, sizeof *frame);
     if (!frame) return NULL;
     frame->slowdown = 1;
-    for (int i = 0; i < pal_world_part_count(world); i++) {
-        pal_shown shown;
-        pal_world_shown(world, i, &shown);
+    for (int i = 0; i < world->plan.n_body; i++) {
+        const pal_body *body = &world->plan.body[i];
         pal_frame_part *part = &frame->part[frame->n_part++];
-        part->n_vertex = shown.n_vertex;
-        part->position_m = calloc(3 * (size_t)shown.n_vertex + 1, sizeof(float));
-        const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
-        bool made = part->position_m && (!shown.adapts || make_slots(part, body->adaptive)) &&
+        part->n_vertex = world->part[i].n_vertex;
+        part->position_m = calloc(3 * (size_t)part->n_vertex + 1, sizeof(float));
+        bool adapts = body->active && part->n_vertex > 0;
+        bool made = part->position_m && (!adapts || make_slots(part, &body->dofs)) &&
                     (!body->interpolation || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);
@@ -63,7 +62,7 @@ pal_err pal_frame_fit(pal_frame *frame, const pal_world *world)
 {
     pal_err err = PAL_ERR_OK;
     for (int i = 0; i < frame->n_part; i++) {
-        const pal_body *body = pal_world_body((pal_world *)(uintptr_t)world, i);
+        const pal_body *body = &world->plan.body[i];
         pal_frame_part *part = &frame->part[i];
         for (int k = 0; k < PAL_FIELD_COUNT; k++) {
             pal_frame_field *field = &part->field[k];

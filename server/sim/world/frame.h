@@ -7,6 +7,8 @@
 #include "server/sim/core/definition.h"
 #include "server/sim/core/tools.h"
 
+typedef struct pal_world pal_world;
+
 enum { PAL_FRAME_COMPONENT_MAX = 64 };
 
 /* a field in colour; value NULL: not shown */
@@ -24,7 +26,7 @@ typedef struct pal_frame_part {
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
     /* since the body's reset: what kept it within its bounds (safeguards.h), how many in all, and their time */
     pal_safeguards safeguards;
-    uint64_t n_rescue, rescue_ns;
+    uint64_t n_safeguard, rescue_ns;
     bool asleep;       /* at rest: its rows are not run until something comes near (row sleep)      */
     uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
@@ -73,4 +75,10 @@ typedef struct pal_frame {
     const char *component_name[PAL_FRAME_COMPONENT_MAX]; /* constants; more than at load while fields are shown */
     int component_body[PAL_FRAME_COMPONENT_MAX];         /* whose row it is                                     */
 } pal_frame;
+
+pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
+/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
+ * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
+pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
+void pal_frame_destroy(pal_frame *frame);
 #endif

@@ -30,7 +30,7 @@ typedef struct pal_shown {
                           * ones (pal_frame_part.slot brings its changes)  [n_tri][3] */
     uint64_t revision;
     const int32_t *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no solid [n_tri] */
-    bool adapts;         /* triangles change while it runs */
+    bool is_adaptive;    /* triangles change while it runs */
     /* how vertices hang together where they are more than `tri` shows: vertex i >= n_coarse is the midpoint of the
      * smaller vertices parent[2 (i - n_coarse)], parent[.. + 1]; NULL: it is no such body */
     int n_coarse;
@@ -120,11 +120,6 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
  * their sum stays. Without memory it bears none. [sim] */
 void pal_world_transfer_loads(pal_world *world, int body, const pal_world *before);
 
-pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
-/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
- * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
-pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
-void pal_frame_destroy(pal_frame *frame);
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
 pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */

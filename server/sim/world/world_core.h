@@ -6,7 +6,6 @@
 #include "server/sim/world/blend_component.h"
 #include "server/sim/world/brush_components.h"
 #include "server/sim/world/field_components.h"
-#include "server/sim/world/world.h"
 
 /* shown surface of a body as at load */
 typedef struct pal_world_part {
