@@ -167,7 +167,7 @@ static void load(pal_world *world, const pressed *p, double share)
             int i = pal_body_point(body, k);
             double r = pal_dist3(body->x_rest + 3 * i, p->at) / p->radius_m;
             double weight = (1 - r * r) * (1 - r * r) * body->mass_kg[i];
-            if (body->fixed[i] || r >= 1) continue;
+            if (body->support[i] || r >= 1) continue;
             f[p->axis] = turn ? -share * p->force_N * weight / sum : 0;
             if (turn)
                 (void)pal_world_load(world, 0, i, f);

@@ -10,7 +10,7 @@
 #include "server/bench/bench.h"
 #include "server/bench/bench_report.h"
 #include "server/cli/median.h"
-#include "server/estimate/estimate_work.h"
+#include "server/estimate/estimation.h"
 #include "server/scene/scene_file.h"
 #include "server/session/configuration_switch.h"
 
@@ -90,13 +90,13 @@ static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, i
 static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_estimate_cost *cost, int n_cost,
                         pal_estimate *out, pal_diagnostic *diag)
 {
-    pal_estimate_work *work = NULL;
-    PAL_TRY(pal_estimate_work_open(scene, 0, NULL, diag, &work));
-    pal_estimate_state *state = pal_estimate_work_state(work);
+    pal_estimation *work = NULL;
+    PAL_TRY(pal_estimation_open(scene, 0, NULL, diag, &work));
+    pal_estimate_state *state = pal_estimation_state(work);
     bool ok = pal_estimate_copy(state, world, 0);
     for (int i = 0; i < n_cost && i < PAL_ESTIMATE_STEPS; i++) state->cost[state->n_cost++] = cost[i];
-    ok = ok && pal_estimate_work_run(work, out);
-    pal_estimate_work_close(work);
+    ok = ok && pal_estimation_run(work, out);
+    pal_estimation_close(work);
     return ok ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "the state has no estimate");
 }
 

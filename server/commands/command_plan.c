@@ -95,12 +95,12 @@ static void add_absent(cJSON *o, const pal_world *world)
 }
 
 /* the configuration that was picked from the study */
-static void add_configuration(cJSON *o, const pal_studied *studied)
+static void add_configuration(cJSON *o, const pal_studied_scene *studied)
 {
     char text[PAL_CONFIGURATION_TEXT];
     if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
     if (studied->picked < 0) return;
-    const pal_measured_configuration *p = &studied->file->study.point[studied->picked].priced;
+    const pal_measured_configuration *p = &studied->file->study.point[studied->picked].measured;
     cJSON *picked = cJSON_AddObjectToObject(o, "picked");
     cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
     cJSON_AddStringToObject(picked, "configuration", pal_configuration_text(&p->setting, text));
@@ -108,7 +108,7 @@ static void add_configuration(cJSON *o, const pal_studied *studied)
     cJSON_AddNumberToObject(picked, "error_m", p->error_m);
 }
 
-static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
+static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
     cJSON *o = cJSON_CreateObject();
@@ -187,7 +187,7 @@ static void print_absent(const pal_world *world)
             printf("  %-50s %s\n", pal_effects[i]->name, pal_effect_words(pal_effects[i]->name, words));
 }
 
-static void print(const pal_studied *studied, pal_world *world, cost *c)
+static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
     if (studied->said[0]) printf("%s\n", studied->said);
@@ -247,7 +247,7 @@ int command_plan(int argc, char **argv)
     pal_preflight preflight = {0};
     if (!err) {
         err = pal_world_create(scene, &reason, &world);
-        if (!err) err = pal_preflight_look(scene, PAL_PREFLIGHT_FULL, &preflight, &reason);
+        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &reason);
         if (err) pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     }
     pal_report_progress("measure", 0, &common);

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static cJSON *result_json(const pal_torture_result *r)
+static cJSON *result_json(const pal_robustness_result *r)
 {
     static const char *const verdict[] = {"passed", "failed", "undecided", "skipped", "collapsed"};
     cJSON *o = cJSON_CreateObject(), *safeguards = cJSON_AddObjectToObject(o, "safeguards");
@@ -18,8 +18,8 @@ static cJSON *result_json(const pal_torture_result *r)
         const char *key;
         uint64_t n;
     } count[] = {{"capped", r->safeguards.n_capped},           {"clamped", r->safeguards.n_clamped},
-                 {"mass_scaled", r->safeguards.n_mass_scaled}, {"inversions", r->safeguards.n_inversion},
-                 {"search", r->safeguards.n_search},           {"tool_resets", r->safeguards.n_tool_reset},
+                 {"mass_scaled", r->safeguards.n_mass_scaled}, {"inverted", r->safeguards.n_inversion},
+                 {"search", r->safeguards.n_search},           {"tool_reset", r->safeguards.n_tool_reset},
                  {"stopped", r->safeguards.n_stopped},         {"ns", r->safeguards.ns}};
     cJSON_AddStringToObject(o, "name", r->name);
     cJSON_AddStringToObject(o, "what", r->what);
@@ -30,9 +30,9 @@ static cJSON *result_json(const pal_torture_result *r)
     cJSON_AddBoolToObject(o, "stopped", r->frozen);
     pal_json_add_finite(o, "energy_excess", r->energy);
     pal_json_add_finite(o, "energy_limit", r->limit);
-    pal_json_add_finite(o, "energy_not_judged", r->forgiven);
-    pal_json_add_finite(o, "left_S", r->left_S);
-    pal_json_add_finite(o, "back_s", r->back_s);
+    pal_json_add_finite(o, "energy_excluded", r->excluded_rise);
+    pal_json_add_finite(o, "deviation_S", r->deviation_S);
+    pal_json_add_finite(o, "return_s", r->return_s);
     pal_json_add_finite(o, "simulated_s", r->simulated_s);
     pal_json_add_finite(o, "cpu_s", r->took_s);
     for (size_t k = 0; k < sizeof count / sizeof count[0]; k++)
@@ -40,7 +40,8 @@ static cJSON *result_json(const pal_torture_result *r)
     return o;
 }
 
-static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options, const pal_torture_report *report)
+static cJSON *as_json(const pal_scene *scene, const pal_robustness_options *options,
+                      const pal_robustness_report *report)
 {
     cJSON *o = cJSON_CreateObject();
     cJSON_AddBoolToObject(o, "ok", report->n_failed + report->n_undecided == 0);
@@ -59,29 +60,29 @@ static cJSON *as_json(const pal_scene *scene, const pal_torture_options *options
     return o;
 }
 
-static void print_result(const pal_torture_result *r)
+static void print_result(const pal_robustness_result *r)
 {
-    char energy[24] = "-", unjudged[24] = "-", left[24] = "-", safeguards[64] = "";
-    if (isfinite(r->forgiven)) snprintf(unjudged, sizeof unjudged, "%.1g", r->forgiven);
+    char energy[24] = "-", excluded[24] = "-", left[24] = "-", safeguards[64] = "";
+    if (isfinite(r->excluded_rise)) snprintf(excluded, sizeof excluded, "%.1g", r->excluded_rise);
     if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
-    if (isfinite(r->left_S)) snprintf(left, sizeof left, "%.2g", 100 * r->left_S);
+    if (isfinite(r->deviation_S)) snprintf(left, sizeof left, "%.2g", 100 * r->deviation_S);
     uint64_t n = pal_safeguards_sum(&r->safeguards);
     if (n > 0)
         snprintf(safeguards, sizeof safeguards, " (%llu safeguards, %.3g ms)", (unsigned long long)n,
                  1e-6 * (double)r->safeguards.ns);
-    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, unjudged, left,
+    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, excluded, left,
            r->simulated_s, r->took_s, r->diag, safeguards);
     if (r->verdict != PAL_VERDICT_FAILED) return;
     printf("%26s%s\n%26scriterion: %s\n", "", r->what, "", r->criterion);
 }
 
-static void print(const pal_scene *scene, const pal_torture_report *report)
+static void print(const pal_scene *scene, const pal_robustness_report *report)
 {
     printf("%s: %s\n\n", scene->title,
            report->rests ? "comes to rest by itself"
            : report->led ? "has a prescribed motion without end: compared with an unloaded run"
                          : "DOES NOT COME TO REST by itself");
-    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "case", "verdict", "energy +", "unjudged", "% S left", "sim s",
+    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "case", "verdict", "energy +", "excluded", "% S left", "sim s",
            "cpu s", "what happened");
     for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
     char collapsed[40] = "";
@@ -93,8 +94,9 @@ static void print(const pal_scene *scene, const pal_torture_report *report)
 static void list_cases(char *text, size_t n_byte)
 {
     size_t used = 0;
-    for (int k = 0; k < pal_insults() && used < n_byte; k++)
-        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", pal_insult_name(k), pal_insult_what(k));
+    for (int k = 0; k < pal_robustness_case_count() && used < n_byte; k++)
+        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", pal_robustness_case_name(k),
+                                 pal_robustness_case_about(k));
 }
 
 int command_robustness(int argc, char **argv)
@@ -127,18 +129,18 @@ int command_robustness(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     bool known = !only;
-    for (int k = 0; k < pal_insults() && !known; k++) known = !strcmp(only, pal_insult_name(k));
+    for (int k = 0; k < pal_robustness_case_count() && !known; k++) known = !strcmp(only, pal_robustness_case_name(k));
     if (!known) return pal_flags_wrong(&common, "there is no case \"%.60s\"", only);
-    pal_torture_options options;
-    pal_torture_default(&options);
-    options.seed = (uint64_t)seed, options.most_s = seconds, options.only = only;
+    pal_robustness_options options;
+    pal_robustness_default(&options);
+    options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
     options.progress = pal_report_continue, options.user = &common;
     pal_scene_input input = {0};
     pal_diagnostic diag = {""}, reason = {""};
-    pal_torture_report *report = calloc(1, sizeof *report);
+    pal_robustness_report *report = calloc(1, sizeof *report);
     pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
     const pal_scene *scene = input.studied.scene;
-    if (!err && (err = pal_torture(scene, &options, report, &reason)))
+    if (!err && (err = pal_robustness_run(scene, &options, report, &reason)))
         pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = pal_robustness_picture(report, scene->title, picture, &diag);

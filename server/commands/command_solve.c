@@ -202,7 +202,7 @@ static cJSON *as_json(const study *s, const arguments *args)
     cJSON_AddNumberToObject(o, "nodes", r->n_node);
     cJSON_AddNumberToObject(o, "elements", r->n_element);
     cJSON_AddNumberToObject(o, "dof", r->n_dof);
-    cJSON_AddNumberToObject(o, "held_nodes", r->n_held);
+    cJSON_AddNumberToObject(o, "held_nodes", r->n_fixed);
     cJSON_AddNumberToObject(o, "iterations", r->n_newton);
     cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
     cJSON_AddNumberToObject(o, "residual", r->residual);
@@ -251,15 +251,15 @@ static bool is_table(const arguments *args)
 
 static int run_table(const pal_flag_common *common, const study *s, const arguments *args)
 {
-    const pal_study_case what = {.problem = s->problem,
-                                 .load_case = s->load_case,
-                                 .reference = s->reference,
-                                 .samples_file = s->samples_file,
-                                 .samples = s->samples_file ? &s->samples : NULL,
-                                 .surface = &s->surface,
-                                 .options = &args->solve,
-                                 .plot = args->plot};
-    return pal_study_run(common, &what, &args->list);
+    const pal_solve_study what = {.problem = s->problem,
+                                  .load_case = s->load_case,
+                                  .reference = s->reference,
+                                  .samples_file = s->samples_file,
+                                  .samples = s->samples_file ? &s->samples : NULL,
+                                  .surface = &s->surface,
+                                  .options = &args->solve,
+                                  .plot = args->plot};
+    return pal_solve_study_run(common, &what, &args->list);
 }
 
 static int run(pal_flag_common *common, arguments *args)
@@ -349,7 +349,7 @@ int command_solve(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&flags, argc, argv, &common, &args.problem, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
-    if (!pal_study_parse(args.element, args.resolution, &args.list, &diag))
+    if (!pal_solve_study_parse(args.element, args.resolution, &args.list, &diag))
         return pal_flags_wrong(&common, "%s", diag.text);
     const char *sentence = check_flags(&args);
     if (sentence) return pal_flags_wrong(&common, "%s", sentence);

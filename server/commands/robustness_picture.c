@@ -21,7 +21,7 @@ static void frame(FILE *to, double x, double y)
 }
 
 /* the range of the samples; false: nothing moved */
-static bool range(const pal_torture_result *r, double *seconds, double *low, double *high)
+static bool range(const pal_robustness_result *r, double *seconds, double *low, double *high)
 {
     *seconds = *low = *high = 0;
     for (int i = 0; i < r->n_sample; i++) {
@@ -34,7 +34,7 @@ static bool range(const pal_torture_result *r, double *seconds, double *low, dou
     return *seconds > 0 && *high > 1e-20;
 }
 
-static void curve(FILE *to, const pal_torture_result *r, double x, double y)
+static void curve(FILE *to, const pal_robustness_result *r, double x, double y)
 {
     double seconds, low, high;
     char text[40];
@@ -61,7 +61,7 @@ static void curve(FILE *to, const pal_torture_result *r, double x, double y)
     pal_svg_text(to, x + PLOT_WIDE, y + PLOT_HIGH + 13, "end", " font-size=\"10\"", text, 0);
 }
 
-pal_err pal_robustness_picture(const pal_torture_report *report, const char *title, const char *path,
+pal_err pal_robustness_picture(const pal_robustness_report *report, const char *title, const char *path,
                                pal_diagnostic *diag)
 {
     pal_svg svg;
@@ -72,7 +72,7 @@ pal_err pal_robustness_picture(const pal_torture_report *report, const char *tit
     pal_svg_text(svg.to, COLUMNS * WIDE - 16, 26, "end", " font-size=\"12\"",
                  "energy above that at rest, J, over simulated time", 0);
     for (int k = 0; k < report->n; k++) {
-        const pal_torture_result *r = &report->result[k];
+        const pal_robustness_result *r = &report->result[k];
         double x = LEFT + k % COLUMNS * WIDE, y = HEAD + k / COLUMNS * HIGH + TOP - 14;
         snprintf(text, sizeof text, "%s: %s", r->name, pal_verdict_name(r->verdict));
         pal_svg_text(svg.to, x, y - 7, "start", " font-size=\"12\" font-weight=\"bold\"", text, 0);

@@ -7,19 +7,19 @@
 
 typedef struct pal_scene_input {
     pal_loaded_scene *loaded;
-    pal_studied studied; /* studied.scene is the scene to run */
+    pal_studied_scene studied; /* studied.scene is the scene to run */
 } pal_scene_input;
 
 /* path: scene.json, its folder, control cells, a surface or a scan; input: zeroed. Close it also after an error. */
 static inline pal_err pal_scene_input_open(const char *path, pal_scene_input *input, pal_diagnostic *diag)
 {
     PAL_TRY(pal_scene_arg(path, NULL, &input->loaded, NULL, NULL, diag));
-    return pal_studied_open(path, &input->loaded->scene, &input->studied, diag);
+    return pal_studied_scene_open(path, &input->loaded->scene, &input->studied, diag);
 }
 
 static inline void pal_scene_input_close(pal_scene_input *input)
 {
-    pal_studied_close(&input->studied);
+    pal_studied_scene_close(&input->studied);
     pal_scene_free(input->loaded);
 }
 #endif

@@ -4,7 +4,7 @@
 # usage: test_robustness.sh PALPATE
 set -u
 palpate=$(realpath "$1")
-. "$(dirname "$0")/shell.sh"
+. "$(dirname "$0")/adaptive_surface.sh"
 run() {
     timeout 600 "$palpate" robustness "$@" >out 2>err </dev/null
     code=$?
@@ -65,12 +65,12 @@ if long "one case alone gives the same as among all, in JSON too"; then
     begin "$name"
     gives 0 fem --json --only shuffled --seconds 8
     check "its verdict" has out '"name":"shuffled",.*"verdict":"passed"'
-    grep -o "\"left_S\":[^,]*" out | cut -c1-16 >alone
+    grep -o "\"deviation_S\":[^,]*" out | cut -c1-21 >alone
     run fem --json --seconds 8
-    grep -o '"name":"shuffled".*' out | grep -o '"left_S":[^,]*' | head -n 1 | cut -c1-16 >among
+    grep -o '"name":"shuffled".*' out | grep -o '"deviation_S":[^,]*' | head -n 1 | cut -c1-21 >among
     check "the same figure" cmp -s alone among
     run fem --json --only shuffled --seconds 8 --seed 2
-    grep -o '"left_S":[^,]*' out | cut -c1-16 >other
+    grep -o '"deviation_S":[^,]*' out | cut -c1-21 >other
     check "another with another seed" [ -s other ]
     if cmp -s alone other; then check "another with another seed" false; fi
     end
@@ -101,7 +101,7 @@ end
 begin "a mirrored subdivision solid recovers with either solver"
 "$palpate" cells chair -o chair.palcells --quiet || exit 2
 cp "$problems/../demos/chair.json" folded.json
-sed 's/"model": {/"solver": {"name": "implicit_euler"}, &/' folded.json >implicit.json
+sed 's/"model": {/"solver": {"name": "implicit_euler"}, &/' folded.json >implicit_solver.json
 for scene in folded implicit; do
     gives 0 $scene.json --only mirrored --seconds 12
     check "it was inverted and has recovered" has out "mirrored *passed "
