@@ -178,7 +178,7 @@ for row in 2 "$all"; do
     check "row $row: does not say which" [ "$(number row out)" = "$row" ]
     size=$(setting_of o/study.csv "$row" | cut -d , -f 5)
     model=$(setting_of o/study.csv "$row" | cut -d , -f 1)
-    check "row $row: its setting is not said" has out "\"setting\":\"$(echo "$model" | tr -d '"').* $size voxels"
+    check "row $row: its configuration is not in the output" has out "\"configuration\":\"$(echo "$model" | tr -d '"').* $size voxels"
     check "row $row: the scene has another model" has "row_$row/scene.json" "$model"
     check "row $row: the study is not beside it" [ -s "row_$row/study.json" ]
     check "row $row: the scene is not called as its problem" has "row_$row/scene.json" '"title":.*soft cantilever'
