@@ -21,8 +21,8 @@ enum { PAL_CONTACT_BLEND_STEPS = 10 };
 
 /* what a tool needs beside with an implicit solver */
 typedef struct pal_tool_contact_implicit {
-    pal_contact_implicit press;
-    pal_haptic_stiffness haptic_stiffness;
+    pal_contact_implicit solve;
+    pal_haptic_stiffness stiffness;
     pal_contact_patches old_patches; /* published anew when the solver asks again */
     int n_old_patch;
     double old_side[3], old_back_m;
@@ -49,7 +49,7 @@ typedef struct pal_contact_blend {
 typedef struct pal_tool_contact {
     bool active; /* the proxy is somewhere */
     pal_proxy proxy;
-    double ease;          /* 0..1: rises after the proxy was seated */
+    double ramp;          /* 0..1: rises after the proxy was seated */
     double time_behind_s; /* for how long it has been far behind    */
     int32_t *list;        /* contact points near in this step [max_point] */
     int n_list;
@@ -60,12 +60,12 @@ typedef struct pal_tool_contact {
     double slip[3];      /* sideways way of the tool over tissue that friction still holds, m */
     double uncapped_N;   /* normal force of the last sub-step before caps */
     bool retriangulated; /* other triangles are drawn since the step before */
-    double told;         /* the bound that `wanted` gave */
+    double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
     double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3];     /* on the tool, this sub-step, this body */
     pal_contact_patches patches;
     pal_contact_blend hold;
-    pal_tool_contact_implicit *firm; /* implicit solvers only */
+    pal_tool_contact_implicit *implicit; /* implicit solvers only */
 } pal_tool_contact;
 
 /* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; points: that body's, and place
