@@ -381,7 +381,7 @@ run plan stomach
 check "exit code $code" code_is 0
 check "active" has out "stomach: a surface that adapts, 188 nodes and 558 springs of"
 check "finest" has out "level 1: 746 nodes, 2232 springs"
-for row in edge_spring shape_spring viscous refine rk4 surface_out; do check "no row $row" has out "$row"; done
+for row in edge_spring shape_spring viscous refine rk4 surface_output; do check "no row $row" has out "$row"; done
 run plan stomach --json
 check "not one JSON object" is_json out
 check "levels" has out '"nodes":188,"springs":558,"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'

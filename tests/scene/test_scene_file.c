@@ -254,7 +254,7 @@ static void given_keys_arrive(void)
         "\"force_cap_N\": 2}], \"bodies\": [{\"name\": \"a b\", \"mesh\": \"ball.palmesh\", \"material\": "
         "{\"young_Pa\": "
         "9000, \"poisson\": 0.3, \"density_kg_m3\": 1100, \"damping_1_s\": 0}, \"model\": {\"name\": \"tet_springs\", "
-        "\"k_distance_J\": 0.5}, \"solver\": {\"name\": \"verlet\"}, \"output\": {\"name\": \"surface_out\"}, "
+        "\"k_distance_J\": 0.5}, \"solver\": {\"name\": \"verlet\"}, \"output\": {\"name\": \"surface_output\"}, "
         "\"supports\": [{\"lowest\": 0.2}, {\"box\": {\"low_m\": [-1, -2, -3], \"high_m\": [1, 2, 3]}}], \"effects\": "
         "[{\"name\": \"x\", \"yes\": true, \"word\": \"w\", \"list\": [1, 2.5], \"number\": -3}]}]}";
     pal_loaded_scene *loaded = NULL;

@@ -5,11 +5,8 @@
 
 #include <string.h>
 
-/* passes of conjugate gradients for the stiffness of a contact, and steps from one answer to the next */
-enum { FELT_PASSES = 2, FELT_EVERY = 3 };
 /* solves of a sub-step after which ties may be chosen anew: contacts that act, friction that sticks or slides */
 enum { ROUNDS = 2 };
-#define FELT_FORCE_CHANGE 0.02
 /* share of the pushing forces that ties may pull, or points may come through, without another solve */
 #define WRONG 0.05
 /* friction may pass its limit, or fall short of it, by this share without another solve */
@@ -328,20 +325,7 @@ bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_spring
     return chosen || fixed;
 }
 
-/* ---- felt stiffness ---- */
-
-static int find_entry(const pal_haptic_stiffness *haptic_stiffness, const pal_contact_group *contact_group)
-{
-    int best = -1;
-    double cosine = 0.70710678118654752;
-    for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++) {
-        const pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-        if (!e->used || e->contact != (contact_group->force_N > 0)) continue;
-        double c = pal_dot3(e->normal, contact_group->normal);
-        if (c > cosine) cosine = c, best = i;
-    }
-    return best;
-}
+/* ---- groups of contacts ---- */
 
 bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *contact_group)
 {
@@ -393,101 +377,4 @@ bool pal_contact_group_near(const double centre[3], double radius_m, double near
     if (!(least < INFINITY)) return false;
     *contact_group = (pal_contact_group){.gap_m = fmax(0, least - radius_m)};
     return pal_unit3(contact_group->normal, sum, 0);
-}
-
-bool pal_haptic_stiffness_find(const pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], double min_m)
-{
-    int i = find_entry(haptic_stiffness, contact_group);
-    contact_group->k_N_m = 0;
-    if (i < 0) return true;
-    const pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-    contact_group->k_N_m = e->k_N_m;
-    if (haptic_stiffness->step - e->step < FELT_EVERY) return false;
-    return pal_dist3(e->at_m, at_m) > min_m ||
-           fabs(contact_group->force_N - e->force_N) > FELT_FORCE_CHANGE * e->force_N ||
-           fabs(contact_group->gap_m - e->gap_m) > min_m || pal_dot3(e->normal, contact_group->normal) < 0.995;
-}
-
-static void keep(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group, const double at_m[3],
-                 double k_N_m)
-{
-    int i = find_entry(haptic_stiffness, contact_group);
-    for (int j = 0; j < PAL_CONTACT_PATCH_MAX && i < 0; j++)
-        if (!haptic_stiffness->entry[j].used) i = j;
-    if (i < 0) i = haptic_stiffness->turn++ % PAL_CONTACT_PATCH_MAX;
-    contact_group->k_N_m = k_N_m;
-    pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-    *e = (pal_haptic_stiffness_entry){.used = true,
-                                      .step = haptic_stiffness->step,
-                                      .contact = contact_group->force_N > 0,
-                                      .force_N = contact_group->force_N,
-                                      .gap_m = contact_group->gap_m,
-                                      .k_N_m = k_N_m};
-    pal_copy3(e->normal, contact_group->normal);
-    pal_copy3(e->at_m, at_m);
-}
-
-/* what the normal force loses for each metre because contacts turn: tissue moves with `answer` for each metre that the
- * tool goes against the normal */
-static double turned_N_m(const pal_contact_points *touch, const pal_body *body, const pal_contact *contact,
-                         double radius_m, const double normal[3], const double *answer)
-{
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double weight[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3], r[3];
-    int n = pal_contact_points_slots(touch, body, contact->point, slot, weight, arm);
-    pal_copy3(r, normal);
-    for (int k = 0; k < n; k++)
-        pal_axpy3(r, weight[k], answer + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]));
-    pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
-    return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
-}
-
-void pal_haptic_stiffness_contact(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                                  const double at_m[3], pal_contact_implicit *press,
-                                  pal_contact_springs *contact_springs, const pal_contact_points *touch,
-                                  const pal_body *body, const pal_contact *contact, double radius_m, pal_arena *scratch)
-{
-    size_t used = pal_arena_used(scratch);
-    double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node), lost = 0;
-    int32_t row[PAL_CONTACT_IMPLICIT_MAX];
-    int n = 0;
-    for (int i = 0; i < press->n_contact; i++) {
-        double into = -pal_dot3(contact[i].away, contact_group->normal);
-        if (into < PAL_CONTACT_GROUP_COSINE || pal_dot3(contact[i].force, contact[i].force) == 0) continue;
-        if (contact_springs->k_N_m[press->first + i] <= 0) continue;
-        press->share[n] = into;
-        row[n++] = press->first + i;
-    }
-    double k = pal_contact_springs_stiffness(contact_springs, body, row, press->share, n, FELT_PASSES, answer, scratch);
-    for (int i = 0; i < n && answer && k > 0; i++)
-        lost += turned_N_m(touch, body, &contact[row[i] - press->first], radius_m, contact_group->normal, answer);
-    pal_arena_rewind(scratch, used);
-    keep(haptic_stiffness, contact_group, at_m, fmax(0.25 * k, k - lost));
-}
-
-void pal_haptic_stiffness_near(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], const pal_contact_points *touch, const pal_body *body,
-                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
-{
-    size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
-    double *load = PAL_NEW(scratch, double, n3), *move = PAL_NEW(scratch, double, n3), give = 1 / k_N_m;
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double share[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3];
-    bool known = load && move && body->compliance && k_N_m > 0;
-    for (int i = 0; i < n && known; i++) {
-        int m = pal_contact_points_slots(touch, body, point[i], slot, share, arm);
-        for (int k = 0; k < m; k++)
-            pal_axpy3(load + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]), -weight[i] * share[k],
-                      contact_group->normal);
-    }
-    known = known && body->compliance->solve(body->compliance->self, body, load, move);
-    for (size_t i = 0; i < n3 && known; i++) give += load[i] * move[i];
-    pal_arena_rewind(scratch, used);
-    keep(haptic_stiffness, contact_group, at_m, known && give > 0 && isfinite(give) ? 1 / give : 0);
-}
-
-size_t pal_haptic_stiffness_scratch(const pal_body *body)
-{
-    return 9 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
 }

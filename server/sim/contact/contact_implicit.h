@@ -61,17 +61,6 @@ bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_
 bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
                                  pal_tool *tool, pal_contact *contact, double friction);
 
-/* tangent stiffness in a direction, found when it is asked for and has changed */
-typedef struct pal_haptic_stiffness_entry {
-    bool used, contact;
-    double normal[3], at_m[3], force_N, gap_m, k_N_m;
-    int step; /* when it was found */
-} pal_haptic_stiffness_entry;
-typedef struct pal_haptic_stiffness {
-    pal_haptic_stiffness_entry entry[PAL_CONTACT_PATCH_MAX];
-    int turn, step; /* entry to be replaced next; steps of the world */
-} pal_haptic_stiffness;
-
 /* contacts within 75 degrees of a patch's direction belong to it */
 #define PAL_CONTACT_GROUP_COSINE 0.25
 /* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
@@ -83,23 +72,4 @@ bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped,
  * directions of what is about as near are averaged. False: there is none */
 bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
                             const pal_contact_group *earlier, int n_earlier, pal_contact_group *contact_group);
-
-/* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
- * more than `min_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
-bool pal_haptic_stiffness_find(const pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], double min_m);
-/* Finds it again. Ties do not know that the direction of a contact turns when tissue slips round the sphere: with r the
- * tool's motion relative to tissue across `away`, a contact of force f loses f r / distance of its part along the
- * normal, which is taken off. Rows are those of the press's contacts that bear force and belong to the blob, or, for a
- * blob without contact, points near with weights (sum 1) and the contact stiffness k_N_m behind them */
-void pal_haptic_stiffness_contact(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                                  const double at_m[3], pal_contact_implicit *press,
-                                  pal_contact_springs *contact_springs, const pal_contact_points *touch,
-                                  const pal_body *body, const pal_contact *contact, double radius_m,
-                                  pal_arena *scratch);
-void pal_haptic_stiffness_near(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], const pal_contact_points *touch, const pal_body *body,
-                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch);
-/* scratch that these need in a sub-step */
-size_t pal_haptic_stiffness_scratch(const pal_body *body);
 #endif

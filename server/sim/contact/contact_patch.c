@@ -5,33 +5,21 @@
 
 #include <string.h>
 
-/* haptics.md 2.3: samples 0.05 mm apart, low-pass of one frame while the tool moves less than 0.2 mm */
-#define FORGET       0.8
-#define LEAST_MOVE_M 0.05e-3
-#define REST_MOVE_M  0.2e-3
-#define LOW_PASS     0.63212055882855767 /* 1 - 1/e */
+/* what a sample weighs when the next one comes: 0.9 would lag a millimetre behind where tissue stiffens */
+#define KEEP 0.8
+/* m. While a tool moves by less in a step, what is published is low-passed over one frame */
+#define REST_MOVE_M 0.2e-3
+#define LOW_PASS    0.63212055882855767 /* 1 - 1/e */
 /* a patch is the same one while its normal turns by less than 45 degrees from step to step */
 #define SAME_COSINE 0.70710678118654752
 /* the tangent stays within these multiples of the secant F/d, so that a reversal does not look like a soft wall */
 #define LEAST_SECANT 0.5
 #define MOST_SECANT  6.0
 
-void pal_slope_fit_start(pal_slope_fit *slope, double k_N_m)
+static void add_sample(pal_stiffness_fit *fit, double depth_m, double force_N, double prior_m, double k_start_N_m)
 {
-    *slope = (pal_slope_fit){.last_depth_m = INFINITY, .k_N_m = k_N_m};
-}
-
-void pal_slope_fit_add(pal_slope_fit *slope, double d_m, double f_N, double prior_m, double k_start_N_m)
-{
-    if (fabs(d_m - slope->last_depth_m) < LEAST_MOVE_M) return;
-    slope->last_depth_m = d_m;
-    slope->n = FORGET * slope->n + 1;
-    slope->d = FORGET * slope->d + d_m;
-    slope->f = FORGET * slope->f + f_N;
-    slope->dd = FORGET * slope->dd + d_m * d_m;
-    slope->df = FORGET * slope->df + d_m * f_N;
-    double vary = slope->dd - slope->d * slope->d / slope->n, with = slope->df - slope->d * slope->f / slope->n;
-    slope->k_N_m = (with + k_start_N_m * prior_m * prior_m) / (vary + prior_m * prior_m);
+    pal_stiffness_fit_add(fit, (const double[]){depth_m, 0, 0}, (const double[]){force_N, 0, 0}, KEEP, prior_m,
+                          k_start_N_m);
 }
 
 void pal_contact_patches_reset(pal_contact_patches *patches, int id_base)
@@ -76,14 +64,14 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
         /* first touch: the way since the gap was measured, or what the start stiffness makes of the force */
         double depth = moved && track->depth_m < 0 ? track->depth_m - pal_dot3(move, contact_group->normal) : 0;
         if (!(depth > 0)) depth = contact_group->force_N / track->k_prior_N_m;
-        pal_slope_fit_start(&track->slope, track->k_prior_N_m);
-        pal_slope_fit_add(&track->slope, 0, 0, prior, track->k_prior_N_m);
+        pal_stiffness_fit_start(&track->slope, track->k_prior_N_m);
+        add_sample(&track->slope, 0, 0, prior, track->k_prior_N_m);
         track->depth_m = depth;
     } else {
         track->depth_m -= pal_dot3(move, contact_group->normal);
     }
     if (touches) {
-        pal_slope_fit_add(&track->slope, track->depth_m, contact_group->force_N, prior, track->k_prior_N_m);
+        add_sample(&track->slope, track->depth_m, contact_group->force_N, prior, track->k_prior_N_m);
         double k = track->slope.k_N_m;
         if (track->depth_m > 0.05 * rules->radius_m) {
             double secant = contact_group->force_N / track->depth_m;
@@ -138,7 +126,7 @@ void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_
             track->id = (int16_t)(patches->id_base + patches->next_id);
             track->used = true;
             track->k_prior_N_m = rules->k_start_N_m;
-            pal_slope_fit_start(&track->slope, rules->k_start_N_m);
+            pal_stiffness_fit_start(&track->slope, rules->k_start_N_m);
         }
         taken[track - patches->track] = true;
         follow(track, rules, &contact_group[i], move, patches->known);
@@ -149,33 +137,4 @@ void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_
         if (!taken[i]) patches->track[i].used = false;
     pal_copy3(patches->last_m, tool->here_m);
     patches->known = true;
-}
-
-bool pal_contact_patch_series(double give[3][3], int n_give, double k_N_m, double K[6])
-{
-    double c[3][3], minor[3][3];
-    if (n_give == 0 || !(k_N_m > 0)) return false;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            c[i][j] = i < n_give && j < n_give ? 0.5 * (give[i][j] + give[j][i]) : 0;
-            if (i == j) c[i][j] = (i < n_give ? c[i][i] : give[0][0]) + 1 / k_N_m;
-        }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
-            minor[i][j] = c[a][p] * c[b][q] - c[a][q] * c[b][p];
-        }
-    double det = pal_dot3(c[0], minor[0]);
-    if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
-    const int place[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
-    for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
-    return isfinite(det);
-}
-
-double pal_contact_patch_along(double give[3][3], int n_give, double k_N_m, double k_guess_N_m, const double way[3])
-{
-    double give_m_N = 0;
-    if (n_give < 3) return k_guess_N_m;
-    for (int c = 0; c < 3; c++) give_m_N += way[c] * pal_dot3(give[c], way) / pal_dot3(way, way);
-    return k_N_m / (1 + k_N_m * fmax(0, give_m_N));
 }

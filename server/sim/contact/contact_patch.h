@@ -11,6 +11,7 @@
  * Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_PATCH_H
 #define PAL_SIM_CONTACT_CONTACT_PATCH_H
+#include "server/sim/contact/stiffness_fit.h"
 #include "server/sim/core/tools.h"
 
 /* one direction of contact or near contact */
@@ -20,13 +21,6 @@ typedef struct pal_contact_group {
     double gap_m;     /* way the tool has to go until it touches, >= 0; 0 in contact */
     double k_N_m;     /* tangent stiffness as the solver's compliance tells it; 0: not known */
 } pal_contact_group;
-
-/* least squares of F over d with forgetting and a start value */
-typedef struct pal_slope_fit {
-    double n, d, f, dd, df; /* weighted sums                       */
-    double last_depth_m;    /* of the newest sample                */
-    double k_N_m;           /* current estimate                    */
-} pal_slope_fit;
 
 typedef struct pal_contact_patch_options {
     double radius_m;
@@ -40,7 +34,7 @@ typedef struct pal_contact_patch_track {
     int16_t id;
     double normal[3], depth_m; /* as measured; depth below 0 is a gap */
     double k_prior_N_m;        /* start value, later what the last contact taught */
-    pal_slope_fit slope;
+    pal_stiffness_fit slope;
     pal_contact_patch shown; /* after the low-pass                   */
 } pal_contact_patch_track;
 
@@ -51,20 +45,10 @@ typedef struct pal_contact_patches {
     double last_m[3];
 } pal_contact_patches;
 
-void pal_slope_fit_start(pal_slope_fit *slope, double k_N_m);
-/* a new sample; prior_m is the spread of d at which data weigh as much as the start value k_start_N_m */
-void pal_slope_fit_add(pal_slope_fit *slope, double d_m, double f_N, double prior_m, double k_start_N_m);
-
 /* forgets everything; ids go on from id_base, so that several bodies give different ids */
 void pal_contact_patches_reset(pal_contact_patches *patches, int id_base);
 /* once a step: matches blobs [n] (at most PAL_CONTACT_PATCH_MAX) with the patches of the step before and appends the
  * result to tool->patch. The tool's place is tool->here_m. */
 void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *rules,
                                 const pal_contact_group *contact_group, int n, pal_tool *tool);
-/* K = (C + 1/k)^-1 as xx xy xz yy yz zz: tissue of compliance C, m/N, behind a spring k. give: columns of C, those from
- * n_give on are not known and taken isotropic. False: none is known, or C is no compliance */
-bool pal_contact_patch_series(double give[3][3], int n_give, double k_N_m, double K[6]);
-/* what the force rises by for each metre that the spring's end leads the tissue along way; unless all of C is known
- * k_guess_N_m */
-double pal_contact_patch_along(double give[3][3], int n_give, double k_N_m, double k_guess_N_m, const double way[3]);
 #endif

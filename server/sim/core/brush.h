@@ -2,7 +2,7 @@
  * between steps (brush_components.h, world.h). All of a body's brushes are one CONTACT row, `brush`, with memory of its
  * own.
  *
- * Force, pressure and lift come in over 10 steps, follow a change of them over 10 steps and go out over 10. Bodies
+ * Force, pressure and lift begin, follow a change and end over PAL_BLEND_BRUSH_S (blend.h) each. Bodies
  * whose shown vertices are nodes have brushes; those that adapt or have a skin do not. [sim], heap only in set and
  * destroy. */
 #ifndef PAL_SIM_CORE_BRUSH_H

@@ -7,7 +7,7 @@
  * stiffness over mass is kept below alpha / dt^2, alpha 1.2, by a common factor on k (contact_points.h). With a and b
  * the ratios of stiffness and damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4; the solver's
  * own limit leaves a <= 1 to the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the
- * tool's cap, and in its first and last 10 steps by its ramp. The opposite force acts on the tool.
+ * tool's cap and by its ramp. The opposite force acts on the tool.
  *
  * With an implicit solver (pal_body.implicit) a sub-step is the whole step and nothing limits k but the number of its
  * iterations: k is 15 times as stiff as the tissue behind half a radius, spread over that area, with E of the tissue at
@@ -18,8 +18,8 @@
  * A body that adapts (sim/adaptive_surface.h) has a solver that holds loads over a sub-step (rk4), so that they lag by
  * dt/2. With f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the
  * lag, and a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact
- * changes at once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force
- * does not rise in that moment, and grows again in EASE_S.
+ * changes at once, as a finer surface bulges where the coarse one was flat: `ramp` then falls so far that the force
+ * does not rise in that moment, and grows again in PAL_BLEND_CONTACT_S.
  *
  * Where points carry the nodes (pal_body.embed) k is that of implicit solvers below, and central_cg is told in time
  * what the points near a tool want (pal_effect.wanted), so that its sub-steps allow it. Beyond that alpha is 0.3; the
@@ -29,11 +29,12 @@
  * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
  * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
  *
- * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: correction a step, in
+ * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: correction in 1/60 s, in
  * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/tool_contact.h"
+#include "server/sim/core/blend.h"
 
 #include <math.h>
 #include <string.h>
@@ -43,9 +44,10 @@
 #define ALPHA_HELD    0.5
 #define GAMMA_HELD    1.0
 #define ALPHA_CARRIED 0.3
-#define EASE_S        (1.0 / 6)
 #define SAFETY        1.3
-#define SHARE_RISE    1.01
+/* s. The share of the stiffness that explicit contact may have rises at this rate at most: where the limit falls away
+ * for one sub-step only, contact shall not follow (tests/sim/subdivision: a pressed solid stays at rest) */
+#define SHARE_RISE_S  0.15
 #define DEEPEST_RADII 0.5
 /* implicit: contact over tissue stiffness; a point that is nearly as near as the nearest belongs to a near patch */
 #define STIFFER     15.0
@@ -54,15 +56,16 @@
 /* points so far from the sphere can come to touch in a sub-step, with an implicit and an explicit solver */
 #define COMING_RADII 1.0
 #define COMING_NEAR  0.25
-/* and it grows by STIFFEN a step while the proxy is kept from its tool, down again by SOFTEN while contact is shallow
- */
-#define STIFFEN       1.3
-#define SOFTEN        0.95
+/* in FRAME_S (s) implicit contact stiffens by STIFFEN while the proxy is kept from its tool, and softens by SOFTEN
+ * while contact is shallow. The key clamp_S refers to the same time */
+#define FRAME_S       (1.0 / 60)
+#define STIFFEN       0.3
+#define SOFTEN        0.05
 #define STIFFEST      8.0
 #define SHALLOW_RADII 0.05
 #define BELOW_CAP     0.98
-#define LEAST_EASE    0.01
-enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, EASE_STEPS = 10, FELT_A_STEP = 2, NEAR_MAX = 256 };
+#define LEAST_RAMP    0.01
+enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000, FELT_A_STEP = 2, NEAR_MAX = 256 };
 
 typedef pal_tool_contact_implicit firm;
 typedef pal_tool_contact holder;
@@ -246,16 +249,15 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
         seat(push, h, body, last, tool->radius_m);
-        h->ease = 1;
+        h->ramp = 1;
         /* it has neither touched nor slipped before */
         h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->time_behind_s > push->slip_s) {
         seat(push, h, body, next, tool->radius_m);
         pal_tool_contact_end_blend(h);
-        h->ease = 0, body->safeguards.n_tool_reset++;
+        h->ramp = 0, body->safeguards.n_tool_reset++;
     }
-    if (!body->adaptive) h->ease = fmin(1, h->ease + 1.0 / EASE_STEPS);
     double reach = tool->radius_m + near_m(push, tool->radius_m);
     pal_copy3(h->limits.a, h->proxy.x), pal_copy3(h->limits.b, next);
     h->limits.radius_m = tool->radius_m;
@@ -323,7 +325,8 @@ static void approach(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     pal_sub3(here, tool->here_m, step->body->offset_m);
     pal_tool_contact_blend(h, step, tool, here);
     pal_copy3(h->total, h->hold.now_N);
-    h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m / step->n_sub;
+    h->ramp = pal_blend_toward(h->ramp, 1, step->dt_s, PAL_BLEND_CONTACT_S);
+    h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m * (step->dt_s / FRAME_S);
     h->limits.tool_move_length_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     if (step->body->implicit) hold_back(h, here);
     size_t used = pal_arena_used(step->scratch);
@@ -386,7 +389,7 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
     double alpha = step->body->adaptive ? ALPHA_HELD : step->body->interpolation ? ALPHA_CARRIED : ALPHA;
     double most = fmax(alpha / (step->dt_s * step->dt_s), SAFETY * n_share * h->told),
            share = rate > most ? most / rate : 1;
-    h->share = share < h->share ? share : fmin(share, h->share * SHARE_RISE);
+    h->share = share < h->share ? share : fmin(share, h->share * (1 + step->dt_s / SHARE_RISE_S));
 }
 
 /* of points near a proxy as they were in the last sub-step; damping over dt/2 takes as much of a step's stability */
@@ -421,8 +424,8 @@ static double keep_force(holder *h, double sum[3])
 {
     double size = pal_norm3(sum), part = 1;
     if (h->retriangulated && size > h->uncapped_N) {
-        part = fmax(h->uncapped_N / size, LEAST_EASE);
-        h->ease *= part;
+        part = fmax(h->uncapped_N / size, LEAST_RAMP);
+        h->ramp *= part;
         pal_scale3(sum, part, sum);
         for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, part, h->contact[i].force);
     }
@@ -435,8 +438,7 @@ static double keep_force(holder *h, double sum[3])
 static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    if (body->adaptive) h->ease = fmin(1, h->ease + step->dt_s / EASE_S);
-    double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), sum[3] = {0}, stiffness = 0;
+    double soft = tool->ramp * h->ramp * h->share * (1 - h->hold.share), sum[3] = {0}, stiffness = 0;
     double damping_s = step->dt_s * (body->adaptive ? GAMMA_HELD : GAMMA);
     if (h->n_contact == 0 || soft <= 0) {
         pal_set3(h->slip, 0, 0, 0);
@@ -470,22 +472,22 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 
 /* A proxy that cannot go deeper is placed anew by tissue in each step, which is contact by steps again and trembles at
  * 60 steps a second; contact that is stiff enough lets it reach its tool. h->share is how much stiffer than asked. */
-static void find_stiffening(holder *h, const pal_tool *tool, const pal_body *body)
+static void find_stiffening(holder *h, const pal_tool *tool, const pal_body *body, double dt_s)
 {
     double here[3], deepest = 0, radius = tool->radius_m;
     pal_sub3(here, tool->here_m, body->offset_m);
     for (int i = 0; i < h->n_contact; i++) deepest = fmax(deepest, h->contact[i].depth_m);
     if (deepest > 0.9 * h->limits.max_depth_m && pal_dist3(here, h->proxy.x) > 0.01 * radius)
-        h->share = fmin(STIFFEST, h->share * STIFFEN);
+        h->share = fmin(STIFFEST, h->share * (1 + STIFFEN * (dt_s / FRAME_S)));
     else if (deepest < SHALLOW_RADII * radius)
-        h->share = fmax(1, h->share * SOFTEN);
+        h->share = fmax(1, h->share * fmax(0, 1 - SOFTEN * (dt_s / FRAME_S)));
 }
 
 /* the same with an implicit solver: ties and the loads they begin with */
 static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step)
 {
-    find_stiffening(h, tool, step->body);
-    double soft = tool->ramp * h->ease * h->share * (1 - h->hold.share), move[3], stiffness = 0;
+    find_stiffening(h, tool, step->body, step->dt_s);
+    double soft = tool->ramp * h->ramp * h->share * (1 - h->hold.share), move[3], stiffness = 0;
     pal_copy3(h->firm->old_side, h->proxy.normal);
     h->firm->old_back_m = h->firm->back_m;
     h->firm->published = false;

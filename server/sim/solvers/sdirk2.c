@@ -48,7 +48,7 @@ static pal_err run(void *self, pal_step *step)
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
-        if (core->n_energy_rise > 0) { /* one stage of the whole step: see above */
+        if (core->energy_rise_s > 0) { /* one stage of the whole step: see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
         } else {
             PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
